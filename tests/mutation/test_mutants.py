@@ -28,12 +28,12 @@ def test_every_mutant_applies():
         ("tests/golden/golden_test.cc", "x", "y", "in no room"),
     ],
 )
-def test_one_that_does_not_is_named(file, old, new, found):
+def test_mutant_that_does_not_apply_is_named(file, old, new, found):
     (error,) = check([Mutant("odd-one", file, "odd", old, new)])
     assert error.startswith("odd-one: ") and found in error
 
 
-def test_an_id_stands_once(tmp_path):
+def test_duplicate_ids_are_rejected(tmp_path):
     text = (Path(__file__).parent / "mutants.toml").read_text()
     twice = tmp_path / "mutants.toml"
     twice.write_text(text + text[text.index("[[mutant]]") : text.index("[[mutant]]", 40 + text.index("[[mutant]]"))])

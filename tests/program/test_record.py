@@ -67,7 +67,7 @@ def check_actions(traj, T):
     np.testing.assert_allclose(panda[5, :7], qpos[5]["arm"], atol=1e-6)
 
 
-def test_a_pick_as_molmospaces_readers_know_it(mjsense):
+def test_molmospaces_readers_accept_a_pick(mjsense):
     done = mjsense("record", "pick", "--robot", "franka", "--episodes", 2, "--worlds", 2, "--size", "160x96",
                    "--out", "data", "--json", "-q")
     summary = json.loads(done.stdout)
@@ -118,7 +118,7 @@ def test_absent_objects_are_marked(mjsense):
     assert actors and all(np.max(stream["max"]) < 50 for stream in actors if stream["count"] > 0)
 
 
-def test_task_info_is_json_by_the_standard(mjsense):
+def test_task_info_is_standard_json(mjsense):
     mjsense("record", "pick_and_place", "--episodes", 2, "--horizon", 3, "--keep-failures", "--cameras", "none", "--no-sheet", "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
         for traj in file.values():
@@ -129,7 +129,7 @@ def test_task_info_is_json_by_the_standard(mjsense):
             assert set(roles) == {"pickup_obj", "place_receptacle"} and all({"body", "actor"} == set(r) for r in roles.values())
 
 
-def test_the_same_bytes_with_other_worlds_and_threads(mjsense):
+def test_bytes_do_not_depend_on_worlds_and_threads(mjsense):
     common = [*QUICK, "--episodes", 3, "--no-sheet"]
     mjsense(*common, "--seed", 5, "--worlds", 1, "--threads", 1, "--out", "a")
     mjsense(*common, "--seed", 5, "--worlds", 3, "--threads", 2, "--out", "b")
@@ -177,7 +177,7 @@ def test_without_cameras(mjsense):
     assert [p.name for p in (mjsense.folder / "data/house_0").iterdir()] == ["trajectories_batch_1_of_1.h5"]
 
 
-def test_failures_are_dropped_unless_asked_for(mjsense):
+def test_failures_are_kept_only_on_request(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--max-attempts", 3, "--out", "data", "-q",
                    "--json", rc=1)
     summary = json.loads(done.stdout)
@@ -185,7 +185,7 @@ def test_failures_are_dropped_unless_asked_for(mjsense):
     assert "stopped after 3 attempts" in done.stderr
 
 
-def test_why_an_episode_failed_is_in_the_recording(mjsense):
+def test_recording_contains_the_reason_of_a_failure(mjsense):
     args = ("record", "pick", "--scene", "shelf", "--cameras", "none", "--episodes", 3, "--max-attempts", 3, "--keep-failures", "-q")
     mjsense(*args, "--horizon", 60, "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
@@ -237,7 +237,7 @@ def interrupt(mjsense, args, signals):
 
 @pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT, signal.SIGINT], [signal.SIGKILL]],
                          ids=["once", "twice", "killed"])
-def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals):
+def test_resumed_recording_equals_an_uninterrupted_one(mjsense, signals):
     args = ["record", "pick", "--size", "64x48", "--horizon", 30, "--keep-failures", "--no-sheet", "--episodes", 4]
     code, err = interrupt(mjsense, [*args, "--worlds", 2, "--out", "data"], signals)
     if signals == [signal.SIGKILL]:
@@ -249,7 +249,7 @@ def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
 
 
-def test_a_scene_that_was_changed_is_another_recording(mjsense):
+def test_recording_with_a_changed_scene_cannot_be_resumed(mjsense):
     scene = mjsense.folder / "scene.toml"
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
     args = ["record", "pick", "--scene", scene, "--cameras", "none", "--horizon", 3, "--keep-failures", "--episodes", 2, "--out", "data", "-q"]
@@ -260,7 +260,7 @@ def test_a_scene_that_was_changed_is_another_recording(mjsense):
     assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # the same again: nothing else is wrong
 
 
-def test_progress_is_plain_lines_where_nobody_watches(mjsense):
+def test_progress_without_a_terminal_is_plain_lines(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--keep-failures", "--out", "data")
     assert "1/1 episodes" in done.stderr and "\r" not in done.stderr and "\033" not in done.stderr
     assert "trajectories_batch_1_of_1.h5" in done.stdout

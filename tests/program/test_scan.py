@@ -26,7 +26,7 @@ def points(path):
     return cloud
 
 
-def test_cloud_of_a_wall_and_a_floor(mjsense, room):
+def test_point_cloud_of_a_wall_and_a_floor(mjsense, room):
     done = mjsense("scan", room, "--frame", "site:head", "--out", "cloud.ply")
     cloud = points(mjsense.folder / "cloud.ply")
     assert f"{len(cloud)} of 5760 rays returned" in done.stdout
@@ -37,7 +37,7 @@ def test_cloud_of_a_wall_and_a_floor(mjsense, room):
     assert np.abs(shift - [0, 0, 1]).max() < 1e-4
 
 
-def test_a_model_that_the_program_brings(mjsense):
+def test_embedded_model(mjsense):
     done = mjsense("scan", "embedded:scenes/table/room.xml", "--frame", "geom:table_top", "--out", "cloud.ply")
     cloud = points(mjsense.folder / "cloud.ply")
     assert f"{len(cloud)} of 5760 rays returned" in done.stdout

@@ -19,11 +19,11 @@ def run(mjsense, *args, **kwargs):
 
 
 @pytest.mark.parametrize("streams", [(2,), (0, 2), (1, 2), (0, 1, 2)])
-def test_errors_that_nobody_can_read_are_exit_codes(mjsense, streams):
+def test_exit_code_if_the_streams_are_closed(mjsense, streams):
     assert run(mjsense, "verify", "missing", preexec_fn=closing(*streams)) == 2
 
 
-def test_words_that_cannot_be_written_end_nothing(mjsense):
+def test_recording_continues_if_messages_cannot_be_written(mjsense):
     """A recording goes on when the terminal of its progress is gone, and its files hold no words of stderr."""
     with open("/dev/full", "w") as full:
         assert run(mjsense, "verify", "missing", stderr=full) == 2

@@ -93,7 +93,7 @@ WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5],
 
 
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda c: c.__name__)
-def test_no_wrong_argument_shows_a_binding(cls, live):
+def test_argument_errors_do_not_mention_bindings(cls, live):
     objects, _sim = live
     if cls not in objects:
         core = cls.__module__ == "mjsense.core_sensors"  # NativeSensors, made of a simulation's robot
@@ -137,7 +137,7 @@ def test_simulation_arguments(kwargs, text):
         mjs.Simulation(ball_scene(), **kwargs)
 
 
-def test_methods_say_what_is_wrong():
+def test_method_errors_name_the_argument():
     sim = mjs.Simulation(ball_scene(), num_worlds=np.int64(2), decimation=np.int32(1))  # NumPy's ints are ints
     for call, text in [
         (lambda: sim.step("3"), r"Simulation.step\(\): control_steps must be an int of 32 bits, not '3'"),
@@ -183,7 +183,7 @@ def test_misspelt_attributes():
     sim.qpos = sim.qpos.copy()
 
 
-def test_classes_of_users_may_have_more_attributes():
+def test_user_defined_classes_may_have_more_attributes():
     class Mine(mjs.Simulation):
         def __init__(self, scene):
             super().__init__(scene)

@@ -26,7 +26,7 @@ def test_meshes_are_found_without_import(package):
     assert assets.installed_meshes(["model = 'x.xml'"]) == {}
 
 
-def test_the_users_choice_has_priority(package, monkeypatch):
+def test_environment_variable_of_the_user_has_priority(package, monkeypatch):
     monkeypatch.setenv("MJSENSE_FRANKA_MESHES", "")
     assets.use_installed_meshes()
     assert os.environ["MJSENSE_FRANKA_MESHES"] == ""
@@ -36,7 +36,7 @@ def test_the_users_choice_has_priority(package, monkeypatch):
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES")
 
 
-def test_folders_of_packages_are_named(monkeypatch, tmp_path):
+def test_package_folders_are_exported(monkeypatch, tmp_path):
     folder = tmp_path / "site-packages"
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delenv("MJSENSE_PACKAGES", raising=False)

@@ -59,7 +59,7 @@ def in_environment(sensor, tmp_path):
 @pytest.mark.parametrize("place", [in_simulation, in_recording, in_environment])
 @pytest.mark.parametrize("kind", [Mover, UpdatingMover])
 @pytest.mark.parametrize("name", CALLS)
-def test_worlds_are_not_moved_from_inside(name, kind, place, tmp_path):
+def test_worlds_cannot_be_changed_during_a_step(name, kind, place, tmp_path):
     if place is not in_simulation and name not in ("step", "reset"):
         pytest.skip("the same code as in a simulation")
     with pytest.raises(mjs.SensorError, match=rf"sensor 'mover': .*{name}\(\) was called while the simulation is running"):

@@ -100,7 +100,7 @@ def test_camera_errors():
         scene(mjs.CameraSensorCfg(name="c", camera_name="room/ey"))
 
 
-def test_orthographic_highlights_are_those_of_opengl():
+def test_orthographic_highlights_equal_opengl():
     kwargs = dict(camera_name="room/eye", width=60, height=40, orthographic=True, fovy=4.0)
     s = scene(mjs.CameraSensorCfg("rays", **kwargs), mjs.CameraSensorCfg("opengl", renderer="opengl", **kwargs))
     try:
@@ -164,7 +164,7 @@ def test_sites_and_tendons_move_with_their_world(renderer):
                 np.testing.assert_array_equal(array[0], many[name][world], err_msg=name)
 
 
-def test_sites_and_tendons_belong_to_the_entity_that_brought_them():
+def test_sites_and_tendons_belong_to_their_entity():
     s, _ = marked()
     data = s["eye"].data
     kinds = data.segmentation[0, ..., 1]
@@ -174,7 +174,7 @@ def test_sites_and_tendons_belong_to_the_entity_that_brought_them():
     assert goal.sum() > 20 and (data.body_segmentation[0, ..., 0][goal] == s.model.site_bodyid[1]).all()
 
 
-def test_the_flow_of_a_site_is_that_of_its_body():
+def test_flow_of_a_site_equals_that_of_its_body():
     s, sim = marked()
     s["eye"].data.flow
     sim.qpos[0, 0] = 0.1

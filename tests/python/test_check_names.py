@@ -32,7 +32,7 @@ def found(first, second):
         ("inline constexpr double kA[2] = {1, 2};", "int kA = 3;", "variable kA"),
     ],
 )
-def test_two_definitions_are_found(first, second, name):
+def test_duplicate_definitions_are_found(first, second, name):
     assert found(first, second) == [f"mjsense::{name} is defined in a.cc:2 and b.cc:2"]
 
 
@@ -53,9 +53,9 @@ def test_two_definitions_are_found(first, second, name):
         ('const char* const text = "struct House {"; // struct House {', "struct House {};"),
     ],
 )
-def test_others_are_not(first, second):
+def test_other_definitions_are_not_reported(first, second):
     assert found(first, second) == []
 
 
-def test_this_repository_has_none():
+def test_repository_has_no_duplicate_definitions():
     assert check_names.main([]) == 0

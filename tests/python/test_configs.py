@@ -19,7 +19,7 @@ def imu(**kwargs):
     )
 
 
-def test_dataclass_manners():
+def test_configs_behave_like_dataclasses():
     cfg = imu(cutoff=3)
     assert cfg == imu(cutoff=3) != imu()
     assert pickle.loads(pickle.dumps(cfg)) == copy.deepcopy(cfg) == cfg
@@ -215,13 +215,13 @@ def outside(field):
 
 
 @pytest.mark.parametrize("cls, kwargs, text", WRONG, ids=lambda v: v.__name__ if isinstance(v, type) else None)
-def test_wrong_configurations_are_refused_when_they_are_made(cls, kwargs, text):
+def test_invalid_configurations_are_rejected_at_construction(cls, kwargs, text):
     with pytest.raises((ValueError, KeyError, TypeError), match=text):
         cls(**{**RIGHT.get(cls, {}), **kwargs})
 
 
 @pytest.mark.parametrize("cls", sorted(ALL, key=str), ids=lambda c: c.__name__)
-def test_no_number_may_be_nan_and_nothing_may_be_of_another_type(cls):
+def test_nan_and_wrong_types_are_rejected(cls):
     right = valid(cls)
     made = cls(**right)
     for field in dataclasses.fields(cls):
@@ -247,7 +247,7 @@ def test_no_number_may_be_nan_and_nothing_may_be_of_another_type(cls):
 
 
 @pytest.mark.parametrize("cls", sorted(ALL, key=str), ids=lambda c: c.__name__)
-def test_values_outside_the_declared_range_are_refused(cls):
+def test_values_outside_the_declared_range_are_rejected(cls):
     for field in fields_of(cls):
         for bad in outside(field):
             with pytest.raises((ValueError, KeyError), match=field["name"]):
@@ -255,7 +255,7 @@ def test_values_outside_the_declared_range_are_refused(cls):
                 pytest.fail(f"{cls.__name__}({field['name']}={bad!r}) is taken")
 
 
-def test_the_scene_says_the_same():
+def test_scene_reports_the_same_error():
     """A configuration that becomes invalid after construction is rejected by the scene with the same message."""
     cfg = mjs.ContactSensorCfg(name="feet", primary=MATCH)
     cfg.num_slots = 0

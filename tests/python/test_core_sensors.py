@@ -84,7 +84,7 @@ def test_in_a_suite_of_a_plain_simulation():
     assert one["words"] == {"world": 1}
 
 
-def test_in_an_environment_they_are_those_of_the_suite():
+def test_rows_in_an_environment_equal_the_suite():
     same = {
         "qpos": mjs.JointPositionSensor(uuid="my_qpos"),
         "qvel": mjs.JointVelocitySensor(uuid="my_qvel"),

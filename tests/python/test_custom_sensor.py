@@ -65,7 +65,7 @@ def test_three_styles(sensor_type, in_scene):
     np.testing.assert_array_equal(np.asarray(sensor.data)[:, 0], [1, 2, 3])
 
 
-def test_registry_order_and_config_of_ones_own():
+def test_registry_order_and_user_defined_config():
     class Cfg:
         name = "mine"
         prefixed_name = "ball/mine"
@@ -158,7 +158,7 @@ class Broken(mjs.Sensor):
         return np.ones(sim.num_worlds)
 
 
-def test_one_instance_for_all_worlds_hears_which_begin_anew():
+def test_shared_instance_receives_the_reset_worlds():
     class Wipes(Height):
         def reset(self):
             pass
@@ -194,7 +194,7 @@ def test_values_of_some_worlds():
     assert sensor.rows["id"].dtype == np.int64
 
 
-def test_bounds_are_kept_world_by_world():
+def test_bounds_are_checked_for_each_world():
     class Bounded(mjs.Sensor):
         uuid = "bounded"
         observation_space = gymnasium.spaces.Box(np.array([0, -np.inf]), np.array([1, np.inf]), dtype=np.float64)
@@ -227,7 +227,7 @@ def test_wrong_keys():
         sim.add(Keys()).data
 
 
-def test_one_sensor_may_ask_another():
+def test_sensor_may_read_another_sensor():
     class Outer(mjs.Sensor):
         uuid = "outer"
         observation_space = BOX
@@ -363,7 +363,7 @@ def test_suite():
     assert suite.get("height").worlds is None
 
 
-def test_nothing_is_leaked():
+def test_sensors_and_simulations_are_freed():
     def make():
         sensor = Height()
         sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
@@ -383,7 +383,7 @@ def test_nothing_is_leaked():
     assert rows.shape == (2, 1)
 
 
-def test_names_of_users_are_free():
+def test_user_defined_names_do_not_clash():
     class Mine(mjs.Sensor):
         def __init__(self):
             self.name = "mine"
@@ -423,7 +423,7 @@ class Walk(mjs.Sensor):
         return np.array([sum(self.steps)], np.float32)
 
 
-def test_random_numbers_of_update_are_those_of_the_step_read_or_not():
+def test_random_numbers_of_update_do_not_depend_on_reads():
     walks = []
     for read in (False, True):
         sim = mjs.Simulation(ball_scene(), num_worlds=2, seed=3)
@@ -438,7 +438,7 @@ def test_random_numbers_of_update_are_those_of_the_step_read_or_not():
     assert len(set(walks[0][0] + walks[0][1])) == 8, "every step and world its own"
 
 
-def test_a_reset_hook_may_not_move_the_worlds():
+def test_reset_hook_cannot_change_the_state():
     class Restless(mjs.Sensor):
         uuid, observation_space = "restless", BOX
 
@@ -454,7 +454,7 @@ def test_a_reset_hook_may_not_move_the_worlds():
         sim.reset()
 
 
-def test_two_of_one_name_are_an_error():
+def test_duplicate_names_are_an_error():
     sim = mjs.Simulation(ball_scene(), num_worlds=1)
     sim.add(Height())
     with pytest.raises(ValueError, match="'height': there is one of that name already"):

@@ -82,7 +82,7 @@ def squeezed(text):
 
 
 @pytest.mark.parametrize("page", pages("cpp", "cmake"))
-def test_cpp_stands_in_a_file_that_is_compiled(page):
+def test_cpp_blocks_are_in_compiled_files(page):
     files = [*ROOT.glob("examples/cpp/*"), *ROOT.glob("src/mjsense/**/*_test.cc")]
     compiled = "".join(squeezed(f.read_text()) for f in files if f.is_file())
     for line, code in blocks(page, "cpp", "cmake"):
@@ -126,7 +126,7 @@ def test_command_lines(page, tmp_path):
             run(line, tmp_path)
 
 
-def test_figures_are_those_of_the_performance_notes(monkeypatch):
+def test_figures_equal_the_performance_notes(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "bench")
     import figures
 
@@ -137,5 +137,5 @@ def test_figures_are_those_of_the_performance_notes(monkeypatch):
         assert text == figures.rewritten(text, lambda name, _: figures.table(name, notes)), "python bench/page.py renews it"
 
 
-def test_models_of_the_pages_are_there():
+def test_models_of_the_pages_exist():
     assert "robots/quadruped.xml" in mjs.embedded_models()

@@ -79,7 +79,7 @@ def test_shapes_are_plain_data(sim):
     assert repr(shapes) == "<shapes of world 1: 26 arrow, 8 line, 7 sphere>"
 
 
-def test_draw_fills_a_scene_of_mujocos(sim):
+def test_draw_fills_an_mjvscene(sim):
     scene = mujoco.MjvScene(sim.model, maxgeom=100)
     assert sim.draw(scene, world=1) == 0
     assert scene.ngeom == COUNT
@@ -97,7 +97,7 @@ def test_draw_fills_a_scene_of_mujocos(sim):
     assert scene.geoms[0].label == "scan_hit_0"
 
 
-def test_a_full_scene_says_how_many_found_no_room(sim):
+def test_full_scene_reports_the_number_of_omitted_shapes(sim):
     scene = mujoco.MjvScene(sim.model, maxgeom=10)
     assert sim.draw(scene) == COUNT - 10
     assert scene.ngeom == 10

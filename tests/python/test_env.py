@@ -19,7 +19,7 @@ def make(**kwargs):
 @pytest.mark.filterwarnings("ignore:.*not having a spec")
 @pytest.mark.filterwarnings("ignore:.*(minimum|maximum) value is")  # positions of joints are unbounded
 @pytest.mark.filterwarnings("ignore:.*symmetric and normalized")  # actions are what actuators take
-def test_gymnasiums_checker_is_content(task):
+def test_gymnasium_checker_passes(task):
     env = mjs.make(task, cameras=[], render_mode=None)
     assert isinstance(env, gymnasium.Env)
     check_env(env)
@@ -44,7 +44,7 @@ def test_a_single_environment_is_the_first_of_many():
         mjs.make(Cart(), num_envs=3)
 
 
-def test_pictures_of_a_single_environment():
+def test_images_of_a_single_environment():
     env = mjs.make(Cart(), width=16, height=8, render_mode="rgb_array", observations=["side"])
     env.reset()
     assert env.render().shape == (8, 16, 3)
@@ -123,7 +123,7 @@ def test_seeds():
     fresh.close()
 
 
-def test_a_chunk_is_its_steps():
+def test_chunk_equals_its_steps():
     single, chunked = make(horizon=10), make(horizon=10)
     single.reset(seed=0)
     chunked.reset(seed=0)

@@ -86,7 +86,7 @@ def test_names_of_gymnasium(monkeypatch):
     assert not any("lab:cart" in known.lower() for known in gymnasium.envs.registration.registry)
 
 
-def test_sensors_of_text_are_observed_where_they_are_given():
+def test_user_defined_text_sensors_are_observed():
     env = mjs.make_vec(Cart(), num_envs=2, cameras=[], sensors=[Words()])
     observation, _ = env.reset()
     assert env.observation_space.contains(observation)
@@ -96,7 +96,7 @@ def test_sensors_of_text_are_observed_where_they_are_given():
 
 
 @pytest.mark.parametrize(("given", "shape"), [(dict(width=64), (36, 64)), (dict(height=92), (92, 160)), (dict(width=64, height=64), (64, 64))])
-def test_one_side_of_a_picture_keeps_the_ratio(given, shape):
+def test_one_side_of_an_image_keeps_the_aspect_ratio(given, shape):
     env = mjs.make("pick", cameras=["wrist_camera"], **given)  # 640 x 368
     assert env.observation_space["wrist_camera"].shape == (*shape, 3)
     env.close()

@@ -51,7 +51,7 @@ def test_a_copy_raises(sim, call):
     sim.step()  # the original still works
 
 
-def test_reading_what_is_not_current_raises(sim):
+def test_reading_outdated_data_in_a_fork_raises(sim):
     with pytest.raises(RuntimeError, match="was forked"):
         in_fork(lambda: sim.scene["eye"].data)
 

@@ -27,19 +27,19 @@ def test_files_are_as_generated(path, text):
     assert path.read_text() == text, f"{path.relative_to(ROOT)}: run ./dev generate"
 
 
-def test_every_field_says_what_it_is():
+def test_every_field_has_a_description():
     for name, struct in SCHEMA["structs"].items():
         for field in struct["fields"]:
             assert field["doc"].endswith(".") and len(field["doc"]) > 4, (name, field["name"])
 
 
-def test_words_are_types_and_are_shown_by_help():
+def test_enum_values_are_types_and_are_shown_by_help():
     assert "Literal" in str(inspect.signature(mjs.ContactSensorCfg).parameters["reduce"])
     assert "maxforce" in str(mjs.ContactSensorCfg.__doc__)
     assert "discrete" in str(mjs.MujocoCfg.__doc__)
 
 
-def test_an_option_reaches_every_reader():
+def test_options_and_defaults_are_the_same_everywhere():
     record, make_vec = inspect.signature(mjs.record).parameters, inspect.signature(mjs.make_vec).parameters
     assert {"crf", "preset", "ffmpeg", "molmospaces_depth", "worlds", "action_noise"} <= set(record)
     for name in set(record) & set(make_vec) - {"policy", "action_noise", "out"}:

@@ -49,6 +49,6 @@ def pinch(name: str, finger: str, half_width: float) -> float:
 
 
 @pytest.mark.parametrize("half_width", [0.012, 0.03])
-def test_yam_presses_as_its_driver_lets_it(half_width):
+def test_yam_gripper_force_is_within_the_driver_limit(half_width):
     # At most 50 N between the fingers, and not much less on things as wide as its hand is.
     assert 20 < pinch("i2rt_yam", "left_pad1", half_width) < 50.5

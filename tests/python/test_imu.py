@@ -22,7 +22,7 @@ def test_specific_force_in_site_axes():
     np.testing.assert_allclose(s["imu"].data.quat, [[0.5**0.5, 0.5**0.5, 0, 0]] * 2, atol=1e-6)
 
 
-def test_presets_and_own_models_and_the_clean_value():
+def test_presets_user_defined_models_and_the_clean_value():
     own = mjs.ImuModel(gyroscope=mjs.ImuAxis(noise_density=0.01))
     for kwargs in ({"preset": "mpu6050"}, {"preset": "", "model": own}):
         s = scene(**kwargs)

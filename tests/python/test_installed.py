@@ -23,7 +23,7 @@ def test_public_headers_include_public_headers_only():
         assert libraries <= {"mujoco"}, f"{header} includes a library that users need not have: {libraries}"
 
 
-def test_the_umbrella_is_every_public_header():
+def test_umbrella_header_includes_every_public_header():
     assert ["mjsense/mjsense.h", *includes("mjsense/mjsense.h")] == PUBLIC
 
 

@@ -74,7 +74,7 @@ def installed(assets, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("scene", ["libero/kitchen", "gymnasium_robotics/kitchen"])
-def test_what_opens_in_kitchens_of_others_is_found_and_opened(installed, scene):
+def test_articulations_of_third_party_kitchens_are_opened(installed, scene):
     env = mjs.make_vec("open", "franka", scene=scene, num_envs=3, policy="planner", cameras=[], seed=1, autoreset_mode="disabled",
                        observations=["obj_start"], horizon=250)  # fmt: skip
     env.reset()
@@ -90,20 +90,20 @@ def test_what_opens_in_kitchens_of_others_is_found_and_opened(installed, scene):
 
 
 @pytest.mark.parametrize("scene", ["libero/kitchen", "libero/table", "libero/coffee_table"])
-def test_things_of_libero_stand_free(installed, scene):
+def test_libero_objects_start_without_collision(installed, scene):
     env = mjs.make_vec("pick", "franka", scene=scene, num_envs=8, cameras=[], observations=["obj_start"], seed=2)
     env.reset()
     _, _, _, truncated, info = env.step(env.action_space.sample() * 0)
     assert not truncated.any(), info
 
 
-def test_things_of_libero_are_picked(installed, tmp_path):
+def test_libero_objects_are_picked(installed, tmp_path):
     made = mjs.record("pick", "franka", scene="libero/kitchen", out=tmp_path / "data", episodes=4, max_attempts=4, keep_failures=True, worlds=4,
                       cameras=[])  # fmt: skip
     assert made.succeeded >= 3, made.failures
 
 
-def test_a_package_that_is_not_there_is_named(monkeypatch, tmp_path):
+def test_missing_package_is_named(monkeypatch, tmp_path):
     monkeypatch.setenv("MJSENSE_PACKAGES", str(tmp_path))
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)
     with pytest.raises(ValueError, match="pip install gymnasium-robotics"):

@@ -13,12 +13,12 @@ import pytest
 from mjsense import _core, _libmujoco
 
 
-def test_the_structs_are_those_of_the_headers():
+def test_structs_equal_the_headers():
     assert _core.mujoco_layout_difference() == ""
     _libmujoco.check(_core)
 
 
-def test_the_extension_names_no_file():
+def test_extension_does_not_link_libmujoco():
     needed = subprocess.run(["readelf", "-d", _core.__file__], capture_output=True, text=True, check=True).stdout
     assert "libc.so" in needed
     assert "libmujoco" not in needed
@@ -46,7 +46,7 @@ def installed(monkeypatch, **versions):
         ({"mujoco": "3.17.0"}, "pip uninstall -y mujoco && pip install 'mujoco-core>=4.0,<4.1'"),
     ],
 )
-def test_another_series_is_an_error_that_says_how_to_mend_it(monkeypatch, versions, mend):
+def test_other_mujoco_series_is_an_error_with_a_remedy(monkeypatch, versions, mend):
     monkeypatch.setattr(mujoco, "mj_versionString", lambda: "4.1.0")
     installed(monkeypatch, **versions)
     with pytest.raises(ImportError, match=r"needs MuJoCo 4\.0 .*; found 4\.1\.0 in ") as error:
@@ -65,7 +65,7 @@ def test_another_series_is_an_error_that_says_how_to_mend_it(monkeypatch, versio
         ("def mj_versionString(): return '4.0.9'", "found 4.0.9, but no libmujoco in "),
     ],
 )
-def test_in_an_interpreter_of_its_own(tmp_path, init, found):
+def test_in_a_new_interpreter(tmp_path, init, found):
     (tmp_path / "mujoco").mkdir()
     (tmp_path / "mujoco/__init__.py").write_text(init)
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])

@@ -101,7 +101,7 @@ def test_interrupt(sim, request):
     assert time.process_time() - at[0] < 0.5
 
 
-def test_no_log_file_is_dropped(sim, tmp_path, monkeypatch):
+def test_no_log_file_is_written(sim, tmp_path, monkeypatch):
     """MuJoCo warns of a world that diverges, on the terminal, and writes no file into the user's folder."""
     monkeypatch.chdir(tmp_path)
     sim.qpos[1].flat[0] = np.nan
@@ -137,7 +137,7 @@ def fields_of_mjxmacro():
     return {name: kind for kind, name in re.findall(r"^\s*X\w*\s*\(\s*(\w+)\s*,\s*(\w+)\s*,", text, re.MULTILINE)}
 
 
-def test_lists_of_fields_are_mujocos():
+def test_lists_of_fields_equal_mujoco():
     from mjsense import simulation
 
     fields = fields_of_mjxmacro()
@@ -180,6 +180,6 @@ def test_fields_that_crashed(sim, field):
     ("geom_type", 7, "cannot be given here"),
     ("geom_dataid", 5, "ids of meshes"),
 ])
-def test_values_that_name_nothing(sim, field, value, message):
+def test_invalid_values_are_rejected(sim, field, value, message):
     with pytest.raises(ValueError, match=message):
         sim.randomize(field, value)

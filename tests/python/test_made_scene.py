@@ -32,7 +32,7 @@ def scene(**fields):
     return mjs.SceneFileCfg(name="bench", models=bench, regions=[TOP], **fields)
 
 
-def test_a_task_of_ours_is_played_in_it(tmp_path):
+def test_built_in_task_runs_in_the_scene(tmp_path):
     made = mjs.record("pick", scene=scene(count=(2, 3)), out=tmp_path, episodes=2, worlds=2, **SMALL)
     assert made.kept == 2, made.failures
     with h5py.File(made.path / "trajectories_batch_1_of_1.h5") as file:
@@ -40,7 +40,7 @@ def test_a_task_of_ours_is_played_in_it(tmp_path):
     assert text in {"Pick up the mug", "Pick up the soup can", "Pick up the blue cube"}
 
 
-def test_objects_stand_on_its_regions():
+def test_objects_are_placed_in_the_regions():
     env = mjs.make_vec("pick", scene=scene(), num_envs=4, cameras=[])
     env.reset(seed=3)
     model, heights = env.sim.model, {}
@@ -50,7 +50,7 @@ def test_objects_stand_on_its_regions():
     env.close()
 
 
-def test_a_function_alone_will_do(tmp_path):
+def test_scene_may_be_a_function(tmp_path):
     """Without regions objects keep the poses of their models. Here two overlap, which is reported as an error."""
     made = mjs.record("pick", scene=bench, out=tmp_path, episodes=1, max_attempts=1, cameras=[])
     assert made.kept == 0 and "scene 'bench': 'mug' starts 42.0 mm inside" in next(iter(made.failures))
@@ -65,12 +65,12 @@ def test_a_function_alone_will_do(tmp_path):
         (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
     ],
 )
-def test_faults_are_said(what, message):
+def test_errors_name_the_scene(what, message):
     with pytest.raises(Exception, match=message):
         mjs.make_vec("pick", scene=what, cameras=[])
 
 
-def test_a_task_with_a_scene_of_its_own_takes_no_other():
+def test_task_with_its_own_scene_accepts_no_other():
     class Mine(mjs.Task):
         def scene(self):
             return bench()
@@ -94,7 +94,7 @@ def camera_rows(path, key="traj_0"):
         return rows, json.loads(file[f"{key}/obs_scene"][()])
 
 
-def test_frozen_cameras_stand_where_they_stood(tmp_path):
+def test_frozen_cameras_have_the_recorded_poses(tmp_path):
     first = mjs.record("pick", camera_system="omni_purpose", out=tmp_path / "a", episodes=1, worlds=1, seed=5, **SMALL)
     rows, scene = camera_rows(first.path)
     frozen = tmp_path / "cameras.json"
@@ -107,7 +107,7 @@ def test_frozen_cameras_stand_where_they_stood(tmp_path):
             np.testing.assert_allclose(a, b, atol=1e-5, err_msg=name)  # poses are float32 on their way
 
 
-def test_what_frozen_cameras_lack_is_said(tmp_path):
+def test_errors_of_frozen_cameras(tmp_path):
     file = tmp_path / "cameras.json"
     for text, message in (("[]", "must be a JSON object of cameras by name"), ('{"eye": {"pos": [1, 2]}}', "'eye': 'pos' must be 3 numbers"),
                           ('{"eye": {"pos": [1, 2, 3], "fovy": 4, "quat": [1, 0, 0, 0], "body": "desk"}}', "body 'desk' does not belong to a robot")):  # fmt: skip
@@ -116,7 +116,7 @@ def test_what_frozen_cameras_lack_is_said(tmp_path):
             mjs.make_vec("pick", camera_system=str(file))
 
 
-def test_a_policy_says_what_it_is(tmp_path):
+def test_policy_info_is_recorded(tmp_path):
     class Still(mjs.Policy):
         def act(self, obs):
             return {"done": np.ones(self.num_worlds, bool)}
@@ -130,7 +130,7 @@ def test_a_policy_says_what_it_is(tmp_path):
 
 
 @pytest.mark.parametrize("task", ["pick_and_place", "open", "door_opening", "nav_to_obj"])
-def test_every_task_of_ours_takes_it(task):
+def test_every_built_in_task_accepts_the_scene(task):
     """An error about something missing names this scene: no other scene is used instead."""
     empty = mjs.SceneFileCfg(name="nothing_there", models=lambda: mjs.SceneCfg(entities={"bench": mjs.EntityCfg(model=BENCH)}))
     with pytest.raises(Exception, match="nothing_there"):

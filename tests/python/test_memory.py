@@ -35,7 +35,7 @@ def test_too_little_memory_is_an_error(tmp_path, megabytes):
 
 
 # A std::bad_alloc inside libmujoco, which no C++ code outside of it can catch.
-def test_a_size_beyond_all_memory_is_an_error(tmp_path):
+def test_size_larger_than_memory_is_an_error(tmp_path):
     assert "scene: MuJoCo ran out of memory, or a size in the model is too large" in run(tmp_path, HOSTILE, 3_000_000_000)
 
 

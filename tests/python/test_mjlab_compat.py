@@ -210,7 +210,7 @@ def box():
     return spec
 
 
-def test_a_scene_of_ones_own():
+def test_user_defined_scene():
     match = ml.ContactMatch("geom", "g.*", "box")
     touch = ml.ContactSensorCfg("touch", match, ml.ContactMatch("body", "terrain"), reduce="netforce")
     cfg = SceneCfg(
@@ -236,7 +236,7 @@ def test_a_scene_of_ones_own():
         scene["tuch"]
 
 
-def test_light_and_colours_of_the_ground_are_those_given():
+def test_light_and_colours_of_the_ground_are_kept():
     class Lamp:
         def edit_spec(self, spec):
             spec.worldbody.add_light(name="lamp")

@@ -92,7 +92,7 @@ def array(value):
     return np.asarray(value)
 
 
-def test_a_sensor_of_ones_own_in_compat():
+def test_user_defined_sensor_in_compat():
     Cfg, PeakSpeed = sensor_classes(Sensor, SensorCfg)
     scene, sim = compat(Cfg("peak", scale=2.0), BuiltinSensorCfg("speed", "framelinvel", ObjRef("body", "box", "box")))
     sensor = scene["peak"]
@@ -182,7 +182,7 @@ def test_wrong_sensors_in_compat():
         NoValue().data
 
 
-def test_an_own_subclass_of_a_sensor_of_mjlabs():
+def test_user_defined_subclass_of_an_mjlab_sensor():
     class Strongest(ContactSensor):
         def _compute_data(self):
             return super()._compute_data().force[..., 2].max()
@@ -201,7 +201,7 @@ def test_an_own_subclass_of_a_sensor_of_mjlabs():
 
 
 @pytest.mark.parametrize("slots", [1, 4])
-def test_netforce_fills_the_first_slot_alone(slots):
+def test_netforce_fills_the_first_slot_only(slots):
     """mjlab's page says that num_slots has no effect; its code and MuJoCo's sensor keep the columns, as here."""
     touch = ContactSensorCfg("touch", ContactMatch("geom", "geom", "box"), ContactMatch("body", "terrain"), fields=("found", "force"),
                              reduce="netforce", num_slots=slots)  # fmt: skip
@@ -215,7 +215,7 @@ def test_netforce_fills_the_first_slot_alone(slots):
     assert (found[:, 0] == 4).all() and (force[:, 0, 2] < 0).all() and not found[:, 1:].any() and not force[:, 1:].any()
 
 
-def test_values_after_a_plain_step_are_of_the_state_before_it():
+def test_values_after_a_plain_step_are_those_of_the_state_before_it():
     """As in mjlab: poses, sensors and rays follow with forward()."""
     scene, sim = compat(BuiltinSensorCfg("place", "framepos", ObjRef("body", "box", "box")))
     sim.data.qvel[:, 0] = 1

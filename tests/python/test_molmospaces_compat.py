@@ -126,7 +126,7 @@ class Reach(PlannerPolicy):
         return {"arm": observation["qpos"]["arm"], "gripper": [0.0 if self.calls < 3 else 255.0], "done": self.calls == 6}
 
 
-def test_a_policy_of_one_world_plays_many(tmp_path):
+def test_policy_written_for_one_world_runs_in_many(tmp_path):
     task = MyTask()
     task.register_policy(Reach())
     summary = mjs.record(task, out=tmp_path, cameras=[], episodes=3, worlds=3, keep_failures=True)
@@ -144,7 +144,7 @@ def test_rows_of_text():
         dict_to_byte_array({"a": 123}, 4)
 
 
-def test_a_suite_that_is_none():
+def test_invalid_suite_is_rejected():
     class Wrong(BaseMujocoTask):
         def _create_sensor_suite_from_config(self, config):
             return get_core_sensors(config)

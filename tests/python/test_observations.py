@@ -27,7 +27,7 @@ def test_delay_and_partial_reset():
     assert pipeline(frames(4)[3])[:, 0].tolist() == [1, 13]
 
 
-def test_reset_of_none_is_reset_of_all():
+def test_reset_with_none_resets_all():
     pipeline = mjs.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
     for f in frames(3):
         pipeline(f)
@@ -50,7 +50,7 @@ def test_noise_is_seeded():
         mjs.ObservationPipeline(1, operation="mul")
 
 
-def test_biases_and_leaving_them_out():
+def test_biases_and_disabling_them():
     settings = dict(noise=0.25, bias=1.0, episode_bias=mjs.effects.EpisodeBias(mjs.effects.Constant(10.0)))
     assert mjs.ObservationPipeline(1, **settings)([[0.5, 1.5]]).tolist() == [[11.75, 12.75]]
     assert mjs.ObservationPipeline(1, enable_corruption=False, **settings)([[0.5, 1.5]]).tolist() == [[0.5, 1.5]]

@@ -35,7 +35,7 @@ def test_most_episodes_succeed(task):
     assert {2.0, 3.0, 4.0, 5.0} <= phases
 
 
-def test_worlds_beside_it_change_nothing():
+def test_other_worlds_change_nothing():
     alone, _ = play("close", 1, 3, horizon=60)
     beside, _ = play("close", 3, 3, horizon=60)
     for episode in range(3):
@@ -52,7 +52,7 @@ def test_the_suite():
     assert np.linalg.norm(start - end) > 0.01
 
 
-def test_starts_differ_and_the_camera_over_the_shoulder_sees_the_target():
+def test_starts_differ_and_the_shoulder_camera_sees_the_target():
     seen, bases, targets, lights = 0, [], [], []
     env = mjs.make_vec("open", "franka", num_envs=12, camera_system="droid", width=160, height=96, seed=5,
                        observations=["exo_camera_1", "object_image_points", "obj_start", "robot_base_pose"])  # fmt: skip

@@ -31,7 +31,7 @@ def test_a_function_is_a_policy(tmp_path):
     assert '"policy":"hold"' in settings
 
 
-def test_it_sees_what_the_environment_shows():
+def test_policy_receives_the_observations_of_the_environment():
     seen = []
 
     class Look(mjs.Policy):
@@ -58,7 +58,7 @@ def test_it_sees_what_the_environment_shows():
     env.close()
 
 
-def test_it_may_choose_what_it_sees():
+def test_policy_selects_its_observations():
     class Look(mjs.Policy):
         observation = ("qpos/arm", "tcp_pose")
 
@@ -75,7 +75,7 @@ def test_it_may_choose_what_it_sees():
         pick(Look)
 
 
-def test_layout_and_life():
+def test_action_layout_and_life_cycle():
     calls = []
 
     class Note(mjs.Policy):
@@ -100,7 +100,7 @@ def test_layout_and_life():
     env.close()
 
 
-def test_groups_that_are_left_out_hold():
+def test_groups_without_a_command_hold():
     class Close(mjs.Policy):
         def act(self, obs):
             return {"gripper": np.full((3, 1), 255.0), "success": [False, True, False]}
@@ -143,7 +143,7 @@ def test_done_ends_an_episode(tmp_path):
     env.close()
 
 
-def test_chunks_are_asked_for_when_they_end(tmp_path):
+def test_next_chunk_is_requested_when_one_ends(tmp_path):
     class Ramp(mjs.Policy):
         """Four commands at a time."""
 
@@ -173,7 +173,7 @@ def test_chunks_are_asked_for_when_they_end(tmp_path):
     env.close()
 
 
-def test_phases_are_on_disk(tmp_path):
+def test_phases_are_recorded(tmp_path):
     class Staged(mjs.Policy):
         phases = {"wait": 0, "go": 7}
 
@@ -188,7 +188,7 @@ def test_phases_are_on_disk(tmp_path):
     assert b'"policy_phases":{"wait":0,"go":7}' in rows["obs_scene"]
 
 
-def test_random_numbers_are_of_the_episode(tmp_path):
+def test_random_numbers_depend_on_the_episode(tmp_path):
     class Chance(mjs.Policy):
         def act(self, obs):
             return np.array([[self.rng(w).uniform(-1, 1)] for w in range(self.num_worlds)])
@@ -199,7 +199,7 @@ def test_random_numbers_are_of_the_episode(tmp_path):
     assert not np.array_equal(runs[0][0]["actions/commanded_action"], runs[0][1]["actions/commanded_action"])
 
 
-def test_its_sensors(tmp_path):
+def test_sensors_of_a_policy(tmp_path):
     class Thinker(Driver):
         def sensors(self):
             policy = self
@@ -243,7 +243,7 @@ def test_errors_say_what_was_expected(value, error, text):
     env.close()
 
 
-def test_errors_of_its_code_are_named(tmp_path):
+def test_errors_of_user_code_name_the_method(tmp_path):
     class Broken(mjs.Policy):
         def act(self, obs):
             raise ArithmeticError("no")
@@ -267,7 +267,7 @@ def test_by_name(tmp_path):
         mjs.record("pick", policy=3, out=tmp_path)
 
 
-def test_a_constant_costs_little():
+def test_python_policy_costs_little():
     """Cost that a Python policy adds to a step of 64 worlds: the call, and reading its result."""
     command = np.tile(HOLD, (64, 1))
 
@@ -289,7 +289,7 @@ def test_a_constant_costs_little():
     assert np.median(times) < 200e-6  # 50 on an idle machine
 
 
-def test_chunks_of_worlds_that_do_not_begin_together_do_not_mix(tmp_path):
+def test_chunks_that_start_at_different_times_do_not_mix(tmp_path):
     """Commands of a chunk, and groups without a command, are those of the chunk's world."""
 
     class Chunks(mjs.Policy):

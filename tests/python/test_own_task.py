@@ -37,7 +37,7 @@ def json_rows(rows):
     return [json.loads(row.tobytes().rstrip(b"\0")) for row in rows]
 
 
-def test_a_recording_of_it(tmp_path):
+def test_recording_of_a_user_defined_task(tmp_path):
     task = Cart()
     summary = record(tmp_path, task)
     assert summary.kept == 3 and summary.enough
@@ -55,7 +55,7 @@ def test_a_recording_of_it(tmp_path):
     assert first["obs/extra/obj_start"].shape == (21, 7) and "env_states/actors/ball" in first
 
 
-def test_python_is_called_once_a_step_for_all_worlds(tmp_path):
+def test_python_is_called_once_per_step_for_all_worlds(tmp_path):
     task = Cart()
     policy = Driver(task)
     summary = record(tmp_path, task, policy=policy, episodes=4, worlds=4)
@@ -72,7 +72,7 @@ def test_an_episode_does_not_depend_on_its_world(tmp_path):
                 np.testing.assert_array_equal(one[key], other[key], err_msg=key)
 
 
-def test_terminated_is_what_the_task_says():
+def test_terminated_is_the_value_of_the_task():
     env = make(horizon=100)
     env.reset(seed=0)
     seen = np.zeros(3, bool)
@@ -96,13 +96,13 @@ class OverAtOnce(Cart):
 
 
 @pytest.mark.parametrize("worlds", [1, 4])
-def test_episodes_that_are_over_at_once_end_no_recording(tmp_path, worlds):
+def test_episodes_without_steps_do_not_end_a_recording(tmp_path, worlds):
     summary = record(tmp_path, OverAtOnce(), episodes=4, worlds=worlds, max_attempts=40)
     assert summary.kept == 4 and summary.enough and not summary.interrupted
     assert summary.failures["no success"] >= 1, "the case that this is about"
 
 
-def test_a_reward_that_is_no_number_ends_the_episode_and_says_so(tmp_path):
+def test_reward_that_is_not_finite_ends_the_episode(tmp_path):
     class Lost(Cart):
         def evaluate(self, sim):
             found = super().evaluate(sim)
@@ -114,7 +114,7 @@ def test_a_reward_that_is_no_number_ends_the_episode_and_says_so(tmp_path):
     assert all(np.isfinite(rows["rewards"]).all() for rows in trajectories(summary))
 
 
-def test_success_terminates_if_asked():
+def test_success_terminates_on_request():
     for asked in (False, True):
         task = Cart()
         env = make(task, terminate_upon_success=asked, horizon=60)
@@ -183,7 +183,7 @@ def test_a_robot_by_name_joins_the_scene():
         make(Methodical)
 
 
-def test_cpp_planner_on_a_task_written_here(tmp_path):
+def test_cpp_planner_on_a_python_task(tmp_path):
     class Lift(mjs.Task):
         """Lift the can."""
 
@@ -228,7 +228,7 @@ def test_cpp_planner_on_a_task_written_here(tmp_path):
     assert json_rows(rows["obs/extra/grasp_state_pickup_obj"])[-1] == {"gripper": {"held": True, "touching": True}}
 
 
-def test_sensors_and_the_suite_are_the_tasks_to_choose(tmp_path):
+def test_task_chooses_sensors_and_edits_the_suite(tmp_path):
     class Marked(Cart):
         def sensors(self):
             task = self
@@ -268,7 +268,7 @@ def test_sensors_and_the_suite_are_the_tasks_to_choose(tmp_path):
         make(Wrong)
 
 
-def test_without_sensors_there_are_those_of_the_caller():
+def test_without_task_sensors_only_those_of_the_caller_remain():
     class Height(mjs.Sensor):
         uuid = "x"
         observation_space = gymnasium.spaces.Box(-2, 2, (1,), np.float64)
@@ -337,7 +337,7 @@ def test_errors_name_the_task_and_the_method(methods, error, text, note):
     assert note is None or note in caught.value.__notes__
 
 
-def test_its_code_may_not_move_the_worlds(tmp_path):
+def test_task_code_cannot_change_the_state(tmp_path):
     class Meddler(Cart):
         def evaluate(self, sim):
             sim.step()
@@ -347,7 +347,7 @@ def test_its_code_may_not_move_the_worlds(tmp_path):
             play()
 
 
-def test_it_makes_its_scene_itself():
+def test_task_that_makes_its_scene_accepts_no_other():
     with pytest.raises(ValueError, match="task 'cart' makes its scene itself: it cannot take the scene 'table'"):
         make(scene="table")
 
@@ -364,7 +364,7 @@ def test_by_name():
         mjs.make_vec(3)
 
 
-def test_one_task_plays_in_one_place_at_a_time(tmp_path):
+def test_task_is_used_by_one_environment_at_a_time(tmp_path):
     task = Cart()
     env = make(task)
     with pytest.raises(RuntimeError, match="task 'cart' is played already"):
@@ -407,7 +407,7 @@ def test_get_info():
     env.close()
 
 
-def test_evaluate_is_told_whom_it_judges():
+def test_evaluate_receives_the_ids_of_the_evaluated_worlds():
     judged = []
 
     class Told(Cart):

@@ -22,7 +22,7 @@ def test_everything_public_is_exported():
     assert public | {"effects", "observations", "__version__"} == set(mjs.__all__)
 
 
-def test_every_public_class_and_function_says_what_it_is():
+def test_every_public_class_and_function_has_a_docstring():
     for name in mjs.__all__:
         value = getattr(mjs, name)
         if isinstance(value, (type, types.FunctionType)):
@@ -58,7 +58,7 @@ def test_import_loads_nothing_heavy():
     assert "mjsense.configs" in loaded and not heavy & loaded, heavy & loaded
 
 
-def test_methods_of_configurations_are_written_when_wanted():
+def test_methods_of_configurations_are_created_on_first_use():
     program = """
 import mjsense as mjs
 from mjsense._dataclass import _Method

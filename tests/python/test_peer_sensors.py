@@ -209,7 +209,7 @@ def test_rows_are_right(recorded):
         assert b'"action":null' in bytes(streams["about_task"][0]) and b'"action":{' in bytes(streams["about_task"][1])
 
 
-def test_an_environment_gives_what_a_recording_holds(recorded):
+def test_environment_observations_equal_the_recording(recorded):
     env = mjs.make_vec(num_envs=3, policy="planner", cameras=[], action_noise=True, sensors=sensors(), **SMALL)
     env.reset()
     rows = {w: {name: [env.rows[name][w].copy()] for name in env.rows if name in NAMES} for w in range(3)}
@@ -251,7 +251,7 @@ def test_a_suite_of_the_environments_simulation(recorded):
     env.close()
 
 
-def test_mj_datas_are_the_worlds():
+def test_mj_datas_equal_the_worlds():
     # A scene that is the same in every world, as the model of `fresh` is.
     env = mjs.make_vec(num_envs=2, scene="table", policy="planner", cameras=[], **SMALL)
     env.reset()
@@ -341,7 +341,7 @@ def test_with_a_task_written_in_python(tmp_path):
         assert len(np.unique(one[:, 0])) == 1 and one[0, 2] == 0 and one[5, 2] != 0 and len(np.unique(one[:, 1])) > 5
 
 
-def test_a_plain_simulation_says_that_it_knows_no_robot():
+def test_plain_simulation_has_no_robot_view():
     from scenes import ball_scene
 
     sim = mjs.Simulation(ball_scene(), num_worlds=2)
@@ -384,7 +384,7 @@ class Failing(Counter):
     ("shape", r"shape \(2,\) is not \(1,\)"),
     ("bounds", r"-1.0 at \[0\] is outside the observation_space's \[0.0, 1000000.0\]"),
 ])  # fmt: skip
-def test_an_error_refuses_its_episode_alone(tmp_path, recorded, how, text):
+def test_error_rejects_only_its_episode(tmp_path, recorded, how, text):
     import json
     import re
 
@@ -408,7 +408,7 @@ def test_an_error_refuses_its_episode_alone(tmp_path, recorded, how, text):
             np.testing.assert_array_equal(rows, recorded[1][episode][name])
 
 
-def test_a_job_that_never_works_ends_and_blocks_nobody(tmp_path):
+def test_recording_that_always_fails_ends(tmp_path):
     class Broken(Counter):
         def get_observation(self, env, task, batch_index=0):
             raise ArithmeticError("no")
@@ -430,7 +430,7 @@ def test_a_job_that_never_works_ends_and_blocks_nobody(tmp_path):
     assert summary.kept == 2
 
 
-def test_what_cannot_be_a_sensor(tmp_path):
+def test_invalid_sensors_are_rejected(tmp_path):
     for thing, text in ((3, "not a sensor: 3 is not a mjsense.Sensor"), (Counter, "not a sensor but a class")):
         with pytest.raises(TypeError, match=text):
             mjs.record(out=tmp_path, sensors=[thing])
@@ -449,7 +449,7 @@ def test_what_cannot_be_a_sensor(tmp_path):
     mjs.make_vec(num_envs=1, cameras=[], sensors=[Locked()], **SMALL).close()
 
 
-def test_an_environment_says_why_an_episode_ended():
+def test_environment_reports_why_an_episode_ended():
     class AtStep(Counter):
         def get_observation(self, env, task, batch_index=0):
             if task.episode_step_count == 2 and batch_index == 1 and env.current_batch_index == 1:

@@ -17,7 +17,7 @@ def run(*words, **env):
     )
 
 
-def test_it_is_the_program():
+def test_entry_point_runs_the_program():
     version = run("--version")
     assert (version.returncode, version.stderr) == (0, "")
     assert version.stdout.startswith("mjsense ")
@@ -26,7 +26,7 @@ def test_it_is_the_program():
     assert (wrong.returncode, wrong.stderr) == (2, "mjsense: no command 'sensrs'; did you mean 'sensors'?\n")
 
 
-def test_other_words_run_programs_of_the_path(tmp_path):
+def test_unknown_commands_run_programs_from_path(tmp_path):
     program = tmp_path / "mjsense-hello"
     program.write_text('#!/bin/sh\necho "hello $1"\nexit 7\n')
     program.chmod(0o755)
@@ -70,7 +70,7 @@ def test_a_named_ffmpeg_is_kept(imageio, monkeypatch):
     assert os.environ["MJSENSE_FFMPEG"] == "/opt/ffmpeg"
 
 
-def test_what_there_is_by_name():
+def test_lists_of_tasks_robots_and_scenes():
     for word, one in (("tasks", "open"), ("robots", "franka"), ("scenes", "libero/kitchen")):
         assert one in run(word).stdout.splitlines()
         lines = json.loads(run(word, "--json").stdout)
@@ -82,7 +82,7 @@ def test_what_there_is_by_name():
 SHORT = ["--episodes", "1", "--max-attempts", "2", "--keep-failures", "--horizon", "2", "--width", "32", "--height", "24", "--no-sheet", "--worlds", "1"]
 
 
-def test_without_a_robot_the_task_has_its_own(tmp_path):
+def test_default_robot_is_that_of_the_task(tmp_path):
     tasks = json.loads(run("tasks", "--json").stdout)
     for task, robot, scene in (("door_opening", "rby1", "room_with_door"), ("nav_to_obj", "rby1", "floor"), ("pick", "franka", "varied_table")):
         made = run("record", task, *SHORT, "--out", tmp_path / task)
@@ -91,7 +91,7 @@ def test_without_a_robot_the_task_has_its_own(tmp_path):
     assert "(the task's robot)" not in run("record", "pick", "--robot", "franka", *SHORT, "--out", tmp_path / "named").stderr
 
 
-def test_a_recording_knows_the_robot_that_played(tmp_path):
+def test_recording_contains_the_robot(tmp_path):
     for out, first, then in (("a", (), ("--robot", "franka")), ("b", ("--robot", "franka"), ())):
         assert run("record", "pick", *first, *SHORT, "--out", tmp_path / out).returncode == 0
         again = run("record", "pick", *then, *SHORT, "--resume", "--out", tmp_path / out)

@@ -22,14 +22,14 @@ def check_prose():
     "Safe with files of strangers.", "The job goes on without it.", "The policy is asked once a step.", "where to? give --out DIR",
     "What cannot be placed is put back.",
 ])  # fmt: skip
-def test_finds(check_prose, tmp_path, text):
+def test_finds_unidiomatic_text(check_prose, tmp_path, text):
     for name, content in (("a.md", text), ("b.md", f"- {text}"), ("c.md", f"| x | {text} |"), ("a.h", f"// {text}"),
                           ("b.cc", f'  throw ValueError("{text}");'), ("a.py", f'"""{text}"""'), ("b.py", f"x = 1  # {text}")):  # fmt: skip
         (tmp_path / name).write_text(content + "\n")
         assert list(check_prose.findings(tmp_path / name)), (name, text)
 
 
-def test_finds_a_phrase_that_is_broken_over_two_lines(check_prose, tmp_path):
+def test_finds_a_phrase_across_two_lines(check_prose, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("First line.\n\nThe job goes\non without it.\n")
     assert [line.split(": ", 1)[0] for line in check_prose.findings(page)] == [f"{page}:3"]
@@ -42,12 +42,12 @@ def test_finds_a_phrase_that_is_broken_over_two_lines(check_prose, tmp_path):
     ("a.h", "int nobody = 0;  // metres"),
     ("a.py", "nobody = beside"),
 ])  # fmt: skip
-def test_passes(check_prose, tmp_path, name, text):
+def test_plain_text_passes(check_prose, tmp_path, name, text):
     (tmp_path / name).write_text(text + "\n")
     assert not list(check_prose.findings(tmp_path / name))
 
 
-def test_the_rewritten_files_have_none(check_prose):
+def test_rewritten_files_have_no_findings(check_prose):
     paths = list(check_prose.files(check_prose.CHECKED))
     assert len(paths) > 40
     assert [finding for path in paths for finding in check_prose.findings(path)] == []

@@ -109,7 +109,7 @@ def test_randomized_world(renderer, field, where, value, part, old, new):
         np.testing.assert_array_equal(got, want)
 
 
-def test_mesh_that_no_geom_had():
+def test_mesh_that_is_unused_in_the_compiled_model():
     """A world may give a geom a mesh that the compiled model shows nowhere."""
     xml = XML.format(**PARTS).replace("</asset>", '<mesh name="big" vertex="0 0 0  .8 0 0  0 .8 0  0 0 .8"/></asset>')
     camera = mjs.CameraSensorCfg("image", camera_name="eye", width=64, height=48, data_types=("rgb", "segmentation"))

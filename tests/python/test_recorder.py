@@ -31,7 +31,7 @@ def read(recorder, *keys):
         return [file[key][()] for key in keys]
 
 
-def test_a_loop_of_ones_own(tmp_path):
+def test_user_defined_loop(tmp_path):
     sim = simulation()
     heights = []
     with mjs.Recorder(tmp_path, sim, [*sim.scene.sensors.values(), Height()], episodes=2, settings={"gravity": 9.81}) as recorder:
@@ -59,7 +59,7 @@ def test_a_loop_of_ones_own(tmp_path):
     assert recorder.stats["rows"] == 12
 
 
-def test_nothing_that_a_camera_has_is_missing(tmp_path):
+def test_all_camera_fields_are_recorded(tmp_path):
     camera = mjs.CameraSensorCfg(
         name="eye", pos=(0, -2, 0.5), quat=(0.7, 0.7, 0, 0), width=16, height=8, data_types=("rgb", "segmentation", "normals")
     )
@@ -77,7 +77,7 @@ def test_nothing_that_a_camera_has_is_missing(tmp_path):
             np.testing.assert_array_equal(file[f"traj_0/obs/extra/eye_{field}"][0], value)
 
 
-def test_what_is_unfinished_can_be_resumed(tmp_path):
+def test_unfinished_recording_can_be_resumed(tmp_path):
     sim = simulation()
     sensors = [Height()]
     recorder = mjs.Recorder(tmp_path, sim, sensors, episodes=2)

@@ -41,7 +41,7 @@ def test_summary_and_progress(recording):
     assert summary.steps == sum(n - 1 for n in summary.lengths)
 
 
-def test_own_sensor_is_on_disk(recording):
+def test_user_defined_sensor_is_recorded(recording):
     files = list(recording[0].path.rglob("*.h5"))
     assert len(files) == 1
     with h5py.File(files[0]) as file:
@@ -99,7 +99,7 @@ def test_the_program_writes_the_same_bytes(tmp_path):
         assert (tmp_path / "a/house_0" / name).read_bytes() == (tmp_path / "b/house_0" / name).read_bytes(), name
 
 
-def test_meshes_are_chosen(tmp_path, monkeypatch):
+def test_meshes_option(tmp_path, monkeypatch):
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES", raising=False)
     monkeypatch.setattr("mjsense.assets.installed_meshes", lambda texts: {})
     with pytest.raises(ValueError, match="robot 'franka': its real meshes were not found"):

@@ -14,7 +14,7 @@ import resolve
 
 
 @pytest.mark.parametrize("name", ["gymnasium-robotics", "mujoco-warp"])  # packaging/matrix.sh installs all of them
-def test_one_mujoco_beside(name):
+def test_exactly_one_mujoco_is_installed(name):
     try:
         found = resolve.resolve(resolve.ENVIRONMENTS[name])
     except resolve.Unavailable as error:
@@ -26,13 +26,13 @@ def test_one_mujoco_beside(name):
         assert requirement.split(">")[0] in found
 
 
-def test_every_extra_is_asked_for():
+def test_every_extra_is_resolved():
     asked = resolve.ENVIRONMENTS["all extras"]
     assert {"torch>=2.2", "imageio-ffmpeg>=0.5", "mujoco>=4.0,<4.1"} <= set(asked)
     assert len(asked) == sum(map(len, resolve.EXTRAS.values()))
 
 
-def test_an_extra_brings_what_scenes_and_robots_need():
+def test_extras_contain_the_packages_of_scenes_and_robots():
     """Packages that scenes and robots name are in one of the extras, so that one command brings them."""
     models = Path(__file__).parents[2] / "models"
     named = {name for file in models.rglob("*.toml") for name in re.findall(r'"package:(\w+)/', file.read_text())}

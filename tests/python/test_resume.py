@@ -225,7 +225,7 @@ FILES = {
 }  # fmt: skip
 
 
-def test_every_change_is_refused_by_name(lab):
+def test_every_change_is_rejected_and_named(lab):
     options = options_of(lab)
     interrupted(**options)
     wrong = []
@@ -257,7 +257,7 @@ def test_every_change_is_refused_by_name(lab):
     assert done.kept == 40 and done.enough and len(done.lengths) < 40
 
 
-def test_what_cannot_be_compared_is_said(tmp_path):
+def test_settings_that_cannot_be_compared_are_named(tmp_path):
     import threading
 
     class Locked(Still):

@@ -64,7 +64,7 @@ def test_numbers():
     env.close()
 
 
-def test_actions_are_around_a_middle():
+def test_actions_are_scaled_around_a_mean():
     space = gymnasium.spaces.Box(np.float32([-1, 0, -np.inf]), np.float32([3, 1, np.inf]))
     np.testing.assert_array_equal(Actions(space, None, None).commands(np.array([[-1.0, 1, 5], [0, -9, 0]])), [[-1, 1, 5], [1, 0, 0]])
     np.testing.assert_array_equal(Actions(space, 0.5, [1, 2, 3]).commands(np.ones((1, 3))), [[1.5, 1, 3.5]])
@@ -72,7 +72,7 @@ def test_actions_are_around_a_middle():
         Actions(space, [1, 2], None)
 
 
-def test_environments_that_will_not_do():
+def test_unsuitable_environments_are_rejected():
     with pytest.raises(TypeError, match=r"env must be what mjsense\.make_vec"):
         checked_env(3, "SB3VecEnv")
     env = mjs.make_vec("pick", **OPTIONS)

@@ -86,7 +86,7 @@ def test_sensors_of_a_file(robot):
     env.close()
 
 
-def test_they_come_before_the_policys_and_are_on_disk(robot, tmp_path):
+def test_robot_sensors_precede_policy_sensors_and_are_recorded(robot, tmp_path):
     summary = mjs.record("pick", robot=robot(TABLES + PYTHON), out=tmp_path / "out", cameras=[], horizon=4, keep_failures=True)
     with h5py.File(next(summary.path.glob("*.h5"))) as file:
         extra = file["traj_0/obs/extra"]
@@ -122,7 +122,7 @@ def test_sensors_of_an_object():
         mjs.make_vec("pick", 3)
 
 
-def test_the_program_refuses_what_python_computes(robot, tmp_path):
+def test_program_rejects_python_sensors(robot, tmp_path):
     file = robot(PYTHON)
     done = subprocess.run(
         [sys.executable, "-m", "mjsense", "record", "pick", "--robot", str(file), "--cameras", "none", "--out", str(tmp_path / "out")],

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("name", mjs.robot_names())
-def test_what_a_robot_is(name):
+def test_robot_attributes(name):
     robot = mjs.Robot(name)
     assert robot.name == name and robot.description.endswith(".") and repr(robot).startswith(f"<robot '{name}'")
     assert robot.policy_dt >= robot.ctrl_dt >= robot.sim_dt > 0
@@ -60,7 +60,7 @@ def test_wrong_input_is_one_clear_line():
 
 
 @pytest.mark.parametrize("name", mjs.robot_names())
-def test_every_robot_plays(name):
+def test_every_robot_runs_an_episode(name):
     """In the room of the pick task: its suite's names, shapes and dtypes, and a step with every group commanded."""
     robot = mjs.Robot(name)
     with contextlib.closing(mjs.make_vec("pick", robot=name, num_envs=2, cameras=[])) as env:

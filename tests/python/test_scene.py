@@ -48,7 +48,7 @@ def test_spec_fn_edits_the_scene_itself():
     assert scene.model.site("marker").pos.tolist() == [1, 2, 3]
 
 
-def test_errors_of_spec_fn_come_through():
+def test_errors_of_spec_fn_are_propagated():
     def broken(spec):
         raise LookupError("no such thing")
 
@@ -115,7 +115,7 @@ TWO_BALLS = """
 """
 
 
-def test_base_is_a_whole_model_as_it_is(tmp_path):
+def test_base_is_used_unchanged(tmp_path):
     path = tmp_path / "two.xml"
     path.write_text(TWO_BALLS)
     for base in (TWO_BALLS, path):

@@ -26,7 +26,7 @@ def test_live_views(sim):
     assert before is sim.qpos and before[0, 2] < 1
 
 
-def test_step_is_mujocos(sim):
+def test_step_equals_mujoco(sim):
     model = sim.scene.model
     data = mujoco.MjData(model)
     sim.step(3)
@@ -120,7 +120,7 @@ def test_set_state(sim):
     np.testing.assert_array_equal(sim.data.qpos, before)
 
 
-def test_randomize_says_what_is_wrong(sim):
+def test_randomize_errors_name_the_field(sim):
     for call, error, text in [
         (lambda: sim.randomize("bodymass", 1), AttributeError, "did you mean 'body_mass'"),
         (lambda: sim.randomize("body_mass", np.ones((4, 99))), ValueError, r"body_mass: values must be of shape \(4, "),
@@ -203,7 +203,7 @@ def test_arrays_keep_their_memory():
     assert qpos[:, 2].tolist() == [7] * 3 and acc.shape == (3, 3) and len(other) == 3
 
 
-def test_threads_take_turns(sim):
+def test_calls_from_several_threads_are_serialised(sim):
     errors = []
 
     def work():
@@ -228,7 +228,7 @@ def test_data_before_simulation():
         ball_scene()["ball/acc"].data
 
 
-def test_raw_step_lags_and_forward_catches_up():
+def test_raw_step_leaves_outdated_fields_until_forward():
     scene = ball_scene(mjs.BuiltinSensorCfg(name="pos", sensor_type="framepos", obj=mjs.ObjRef("site", "imu", "ball")))
     sim = mjs.Simulation(scene)
     sim.qvel[0, 2] = 5

@@ -26,7 +26,7 @@ def test_counts_and_reasons(tmp_path):
     ]  # fmt: skip
 
 
-def test_failures_are_failures(tmp_path):
+def test_failures_are_reported(tmp_path):
     done = summary(tmp_path, '<testcase name="f"><failure message="1 is not 2"/></testcase>')
     assert done.returncode == 1 and "C++: 1 passed, 1 failed" in done.stdout
 

@@ -140,7 +140,7 @@ def test_against_plain_mujoco(task, robot, steps, num_envs):
 
 
 @pytest.mark.parametrize("task,robot", [(task, robot) for task, robot, _ in TASKS if task not in ("pick", "open")])
-def test_worlds_beside_it_change_nothing(task, robot):
+def test_other_worlds_change_nothing(task, robot):
     def play(num_envs):
         env = mjs.make_vec(task, robot, num_envs=num_envs, policy="planner", cameras=[], seed=4, autoreset_mode="disabled")
         rows = []

@@ -21,7 +21,7 @@ TABLE = load(Path(__file__).parents[2] / "tools" / "task_table.py")
 PLAYED = [case for case in TABLE.CASES if not case[2].startswith("libero/") and not case[2].endswith(":*")]
 
 
-def test_every_task_and_robot_of_ours_has_a_row():
+def test_every_built_in_task_and_robot_has_a_row():
     assert {task for task, _, _ in TABLE.CASES} == set(_core.task_names())
     assert {robot for _, robot, _ in TABLE.CASES} == set(_core.robot_names()) - {"franka_hand"}
 

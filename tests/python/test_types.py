@@ -13,7 +13,7 @@ import mjsense as mjs
 CAMERA = mjs.CameraSensorCfg(name="front", parent_body="ball/ball", width=8, height=8)
 
 
-def test_sensors_by_their_kind():
+def test_typed_access_to_sensors():
     scene = ball_scene(feet_cfg(fields=("found",)), CAMERA)
     sim = mjs.Simulation(scene, 2)
     assert_type(scene.camera("front"), mjs.CameraSensor)
@@ -40,7 +40,7 @@ class Height(mjs.Sensor[NDArray[np.float32]]):
         return sim.qpos[:, 2:3].astype(np.float32)
 
 
-def test_a_sensor_of_ones_own():
+def test_user_defined_sensor():
     sensor = Height("height")
     sim = mjs.Simulation(ball_scene(sensor), 2)
     assert_type(sensor.data, NDArray[np.float32])

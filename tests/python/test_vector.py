@@ -104,7 +104,7 @@ def test_expert_solves_the_task():
 
 
 @pytest.mark.parametrize("robot", ["rby1", "floating_rum", "mobile_franka"])
-def test_what_an_expert_leaves_out_stays_as_it_is(robot):
+def test_groups_that_an_expert_omits_are_unchanged(robot):
     """RB-Y1 stoops as no height of its torso would make it."""
     env = mjs.make_vec("pick", robot=robot, policy="planner", num_envs=1, cameras=[])
     env.reset(seed=1)
@@ -119,7 +119,7 @@ def test_what_an_expert_leaves_out_stays_as_it_is(robot):
     env.close()
 
 
-def test_a_world_that_fails_has_no_reward():
+def test_failed_world_has_no_reward():
     class Failing(mjs.Sensor):
         uuid, observation_space = "failing", gymnasium.spaces.Box(-1, 1, (1,))
 
@@ -173,7 +173,7 @@ def test_bad_use(env):
             call()
 
 
-def test_a_step_and_the_simulation_take_turns():
+def test_step_excludes_other_changes_of_the_simulation():
     """A sensor's code may not change the worlds while the environment steps them, as it may not while the simulation does."""
     env = make()
     said = []
@@ -203,12 +203,12 @@ def test_a_step_and_the_simulation_take_turns():
      ("pick", "rby1", "needs a gripper that only the joints of an arm move; robot 'rby1' has none"),
      ("pick", "floating_rum", "robot 'floating_rum' has none")],
 )  # fmt: skip
-def test_the_planner_from_above_says_what_it_cannot(task, robot, text):
+def test_errors_of_the_top_down_planner(task, robot, text):
     with pytest.raises(ValueError, match=text):
         mjs.make_vec(task, robot=robot, policy="top_down_planner", num_envs=1, cameras=[])
 
 
-def test_the_planner_from_above_comes_from_above():
+def test_top_down_planner_grasps_from_above():
     env = mjs.make_vec("pick", policy="top_down_planner", num_envs=4, cameras=[], observations=["grasp_pose"], seed=1)
     env.reset()
     w, x, y, z = env.rows["grasp_pose"][:, 3:].T

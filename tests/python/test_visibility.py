@@ -72,7 +72,7 @@ def check(env, w, body):
 
 @pytest.mark.parametrize("num_envs", [1, 8])
 @pytest.mark.parametrize("task,scene", [("pick", "tableware"), ("pick", "shelf"), ("open", "kitchen")])
-def test_points_are_counted_in_the_segmentation(task, scene, num_envs, tmp_path):
+def test_image_points_agree_with_the_segmentation(task, scene, num_envs, tmp_path):
     (tmp_path / "cameras.toml").write_text(CAMERAS)
     env = mjs.make_vec(task, "franka", scene=scene, num_envs=num_envs, camera_system=str(tmp_path / "cameras.toml"), seed=7, policy="planner",
                        observations=OBSERVED, autoreset_mode="disabled")  # fmt: skip

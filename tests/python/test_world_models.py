@@ -65,7 +65,7 @@ def sim():
     return sim
 
 
-def test_plain_rays_are_the_sensors(sim):
+def test_plain_rays_equal_the_sensors(sim):
     env = sim.env
     distances = sim.scene["rays"].data.distances
     hits = sim.scene["rays"].data.hit_pos_w
@@ -95,7 +95,7 @@ def test_contacts_and_lights(sim):
     assert counts[1] > counts[0]
 
 
-def test_copies_stay_in_step(sim):
+def test_copies_stay_synchronised(sim):
     models = [sim.model_of(world) for world in range(3)]
     assert sim.env.mj_models[1] is models[1] and len(sim.env.mj_models) == 3
     assert sim.env.mj_models[-1] is models[2] and sim.env.mj_models[:2] == models[:2]
@@ -114,7 +114,7 @@ def test_copies_stay_in_step(sim):
         sim.env.mj_models[3]
 
 
-def test_peer_sensors_receive_their_worlds_model(sim):
+def test_peer_sensors_receive_the_model_of_their_world(sim):
     peer = Peer()
     found = []
     for world in range(3):
@@ -126,7 +126,7 @@ def test_peer_sensors_receive_their_worlds_model(sim):
 
 
 @pytest.mark.parametrize("task", ["pick", "open"])
-def test_an_episodes_model_is_the_one_that_is_simulated(task):
+def test_model_of_an_episode_is_the_simulated_one(task):
     """Sizes, furniture and lights of a task's worlds, midphase on: plain MuJoCo finds the world's contacts and poses."""
     env = mjs.make_vec(task, num_envs=3, cameras=[], seed=5, policy="planner")
     sim = env.sim
@@ -151,7 +151,7 @@ def test_an_episodes_model_is_the_one_that_is_simulated(task):
     env.close()
 
 
-def test_the_simulated_model_knows_every_size():
+def test_simulated_model_bounds_every_size():
     """Collisions are looked for in boxes that hold an object in all of its sizes. They are in sim.model, too: with a world's fields
     plain MuJoCo finds the same contacts as without those boxes."""
     env = mjs.make_vec("pick", num_envs=2, cameras=[], seed=5, policy="planner")

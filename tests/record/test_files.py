@@ -33,7 +33,7 @@ def test_names(house, files):
     assert {p.name for p in house.iterdir()} == videos | {f.name for f in files}
 
 
-def test_peers_scripts_accept_every_trajectory(files):
+def test_molmospaces_scripts_accept_every_trajectory(files):
     for path in files:
         assert not list(readers.missing_video_names(path))
         assert readers.validate(path, visible=[("wrist_camera", "pickup_obj")]) == [[]] * 4
@@ -152,7 +152,7 @@ def test_videos(house, files):
 
 
 @pytest.mark.parametrize("size", [(33, 17), (640, 362)])
-def test_no_picture_is_rescaled(record_fake, tmp_path, size):
+def test_images_are_not_rescaled(record_fake, tmp_path, size):
     record_fake(tmp_path, "--episodes", 1, "--worlds", 1, "--steps", 3, "--width", size[0], "--height", size[1])
     for path in tmp_path.rglob("*.m*"):
         stream = readers.probe(path)
@@ -222,7 +222,7 @@ def peer_file(tmp_path):
     return house / "trajectories_batch_1_of_1.h5", noise
 
 
-def test_the_peers_files_are_understood(record_fake, peer_file):
+def test_molmospaces_files_are_understood(record_fake, peer_file):
     path, noise = peer_file
     done = record_fake("verify", path.parent)
     assert "names no video of camera 'wrist_camera'" in done.stdout and "intact: 1 files, 1 episodes, 40 steps" in done.stdout

@@ -53,7 +53,7 @@ def test_every_native_name_is_in_the_reference(documented):
     assert wanted and wanted <= documented, sorted(wanted - documented)
 
 
-def test_signatures_of_configurations_are_those_of_their_fields(site):
+def test_signatures_of_configurations_equal_their_fields(site):
     page = re.sub(r"<[^>]+>", "", (site / "reference/sensor_configs.html").read_text())
     assert re.search(r"ContactMatch\(\s*mode: Literal\[.*?\],\s*pattern:", page, re.DOTALL)
 
@@ -64,7 +64,7 @@ def test_search_finds(site, word):
     assert any(word in (entry["title"] + entry["text"]).lower() for entry in index["docs"])
 
 
-def test_nothing_is_loaded_from_other_servers(site):
+def test_pages_load_nothing_from_other_servers(site):
     loads = re.compile(r"""<(?:script|img|iframe|source|video)[^>]*\bsrc="?(?:https?:)?//|<link[^>]*rel="?(?:stylesheet|preconnect|icon)[^>]*//""")
     for page in site.rglob("*.html"):
         assert not loads.search(page.read_text()), page
@@ -84,11 +84,11 @@ def test_tables_fit_their_column_at_1280_pixels(measured):
     assert {page: found["wide"] for page, found in measured.items() if found["wide"]} == {}
 
 
-def test_the_browser_asks_no_other_server(measured):
+def test_browser_requests_no_other_server(measured):
     assert {page: found["foreign"] for page, found in measured.items() if found["foreign"]} == {}
 
 
-def test_search_works_from_the_disk(site):
+def test_search_works_without_a_server(site):
     if browser.chromium() is None:
         pytest.skip("needs Chromium (apt-get install chromium)")
     assert "time.html" in browser.search_from_disk(site, "freshness")

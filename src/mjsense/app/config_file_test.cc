@@ -168,7 +168,7 @@ TEST(Options, Sizes) {
   EXPECT_EQ(rollout.height, 368);
 }
 
-TEST(Texts, OfTimesAndSizes) {
+TEST(Texts, FormatTimesAndSizes) {
   EXPECT_EQ(clock_text(61.4), "1:01");
   EXPECT_EQ(clock_text(3 * 3600 + 59), "3:00:59");
   EXPECT_EQ(bytes_text(999), "999 B");

@@ -217,7 +217,7 @@ TEST(Visibility, BallCoversItsDisc) {
   }
 }
 
-TEST(Visibility, ABodyIsVisibleThroughTheGeomsOfItsChildren) {
+TEST(Visibility, BodyIsVisibleThroughTheGeomsOfItsChildren) {
   Bench bench(CameraSystemCfg{});
   std::vector<double> shares;
   const int bodies[] = {bench.body("stand"), bench.body("holder"), bench.body("ball")};
@@ -305,7 +305,7 @@ TEST(CameraSystem, ErrorsNameTheCamera) {
 }
 
 // A camera that asks for visible objects keeps its pose where it shows them and is moved where it does not.
-TEST(CameraSystem, ACameraThatDoesNotShowTheObjectIsMoved) {
+TEST(CameraSystem, CameraThatDoesNotShowTheObjectIsMoved) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("sees", MountKind::kFixed), mount("blocked", MountKind::kFixed),
                  mount("turned", MountKind::kLookAt)};
@@ -332,7 +332,7 @@ TEST(CameraSystem, ACameraThatDoesNotShowTheObjectIsMoved) {
 }
 
 // From inside a box a camera would see out through its walls.
-TEST(Visibility, ACameraInsideAGeomIsFound) {
+TEST(Visibility, CameraInsideAGeomIsDetected) {
   Bench bench(CameraSystemCfg{});
   Hooks hooks([&](const World& w) {
     bench.sim->rays().update(w);

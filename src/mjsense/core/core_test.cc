@@ -56,7 +56,7 @@ TEST(Array, RowsAreDenseAlignedAndZero) {
 }
 
 // A candidate is suggested if at most a third of the letters differ, or one of a short name.
-TEST(Errors, SuggestOnlyWhatIsNear) {
+TEST(Errors, SuggestOnlySimilarNames) {
   const auto near = [](const char* name, const char* candidate) {
     return !nearest_names(name, std::vector<std::string>{candidate}).empty();
   };

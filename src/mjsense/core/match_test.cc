@@ -38,7 +38,7 @@ std::string fault(const std::vector<std::string>& patterns) {
   return "";
 }
 
-TEST(Match, SaysWhatIsWrong) {
+TEST(Match, ErrorsNameThePattern) {
   EXPECT_EQ(fault({"foot"}),
             "sensor 'feet': Not all regular expressions are matched: 'foot' matches no name; did "
             "you mean 'FR_foot', 'FL_foot' or "

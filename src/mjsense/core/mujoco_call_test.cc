@@ -39,7 +39,7 @@ TEST(MujocoCall, AnErrorOfMujocoIsThrown) {
             "outer");
 }
 
-TEST(MujocoCall, MessagesThatAreNoErrorsReachTheHandlerOfTheProcess) {
+TEST(MujocoCall, NonErrorMessagesReachTheHandlerOfTheProcess) {
   static std::string seen;
   const mjfLogHandler previous =
       mju_setLogHandler([](const mjLogMessage* message) { seen = message->subject; });

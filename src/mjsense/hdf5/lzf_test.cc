@@ -26,14 +26,14 @@ TEST(Lzf, RunsAndRepetitions) {
   EXPECT_EQ(unpacked({0, 'a', 0xe0, 1, 0}), "aaaaaaaaaaa");  // 7 + 1 + 2
 }
 
-TEST(Lzf, RepetitionsOfWhatIsBeforeTheOutputAreRefused) {
+TEST(Lzf, ReferencesBeforeTheOutputAreRefused) {
   EXPECT_EQ(unpacked({0x20, 0}), "refused");
   EXPECT_EQ(unpacked({0, 'a', 0x20, 1}), "refused");
   EXPECT_EQ(unpacked({1, 'a', 'b', 0x20, 2}), "refused");
   EXPECT_EQ(unpacked({1, 'a', 'b', 0x3f, 0xff}), "refused");
 }
 
-TEST(Lzf, WhatEndsTooEarlyOrIsTooLargeIsRefused) {
+TEST(Lzf, TruncatedOrTooLargeDataIsRefused) {
   EXPECT_EQ(unpacked({2, 'a', 'b'}), "refused");
   EXPECT_EQ(unpacked({0, 'a', 0x20}), "refused");
   EXPECT_EQ(unpacked({0, 'a', 0xe0}), "refused");

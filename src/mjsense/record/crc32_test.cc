@@ -18,7 +18,7 @@ std::vector<std::uint8_t> some_bytes(std::size_t count) {
 }
 
 // The check value of CRC-32/ISO-HDLC in the catalogue of parametrised CRC algorithms.
-TEST(Crc32, IsThatOfTheCatalogue) {
+TEST(Crc32, EqualsTheCatalogueValue) {
   const std::string_view digits = "123456789";
   EXPECT_EQ(crc32_of(0, digits.data(), digits.size()), 0xCBF43926);
   EXPECT_EQ(crc32_of(0, nullptr, 0), 0U);
@@ -40,7 +40,7 @@ std::vector<detail::Crc32> all_ways() {
 }
 
 // Every length, alignment and initial value gives the same result as the bitwise algorithm.
-TEST(Crc32, EveryLengthAndPlace) {
+TEST(Crc32, EveryLengthAndAlignment) {
   const std::vector<std::uint8_t> bytes = some_bytes(1400);
   for (const std::size_t begin : {0, 1, 7, 15, 33, 63}) {
     for (std::size_t count = 0; begin + count <= bytes.size(); ++count) {
@@ -52,7 +52,7 @@ TEST(Crc32, EveryLengthAndPlace) {
   }
 }
 
-TEST(Crc32, PiecesAreTheWhole) {
+TEST(Crc32, PiecewiseEqualsOneCall) {
   const std::vector<std::uint8_t> bytes = some_bytes(1'000'003);
   const std::uint32_t all = bit_by_bit(0, bytes.data(), bytes.size());
   for (const detail::Crc32 way : all_ways()) {

@@ -114,7 +114,7 @@ TEST(Layout, EveryFieldHasAPath) {
 }
 
 // An actor's row depends on its own flag; an actor without a flag is always present.
-TEST(Layout, FlagsOfPresenceBelongToTheirActors) {
+TEST(Layout, PresenceFlagsHaveTheirActors) {
   struct States final : Sensor {
     States() : Sensor("env_states") {
       for (const char* actor : {"actors/cup", "actors/mug"})
@@ -150,7 +150,7 @@ TEST(Layout, StreamsCannotShareAPath) {
   EXPECT_THAT(error_of([&] { plan({&rgb, &flat}); }), HasSubstr("'obs/sensor_data/a_b'"));
 }
 
-TEST(Layout, BadStreamsAreRefused) {
+TEST(Layout, InvalidStreamsAreRefused) {
   const Plain empty("a//b", spec(DType::kFloat32, {})), dot("./a", spec(DType::kFloat32, {}));
   EXPECT_THAT(error_of([&] { plan({&empty}); }), HasSubstr("'a//b'"));
   EXPECT_THAT(error_of([&] { plan({&dot}); }), HasSubstr("'./a'"));

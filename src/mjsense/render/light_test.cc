@@ -23,7 +23,7 @@ int byte(double value) { return static_cast<int>(255 * std::clamp(value, 0.0, 1.
 //         /   \      Seen from straight above: at (x, y) the unit sphere's normal is
 //        |     |     (x, y, sqrt(1 - x^2 - y^2)); the brightness is the cosine to the light.
 //         \ _ /
-TEST(Light, AMatteSphereHasLambertsCosine) {
+TEST(Light, MatteSphereHasLambertsCosine) {
   Studio s(std::string(kDark) +
            R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
     <light type="directional" dir=".766044443 0 -.642787610" diffuse="1 1 1" specular="0 0 0" castshadow="false"/>

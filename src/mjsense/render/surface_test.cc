@@ -236,7 +236,7 @@ TEST(Surface, OwnColourOverridesTheMaterials) {
 }
 
 // From below a plane is drawn as a veil of alpha 0.3, blended twice: its weight is 1 - 0.7^2.
-TEST(Surface, APlaneFromBelowIsAVeil) {
+TEST(Surface, PlaneFromBelowIsTranslucent) {
   Studio s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom size=".5" pos="2 0 2" rgba="0 0 1 1"/></worldbody>)");
   const int veil = static_cast<int>(255 * (1 - 0.7 * 0.7) + 0.5);

@@ -198,7 +198,7 @@ TEST(ContactSheet, DepthIsColouredFromNearToFar) {
   EXPECT_GT(colours.size(), 50u);
 }
 
-TEST(ContactSheet, ReportsWhatCannotBeShown) {
+TEST(ContactSheet, ErrorsAreReported) {
   TempDir dir;
   record(dir.path, 1, {.worlds = 1});
   const fs::path png = dir.path / "sheet.png";

@@ -63,7 +63,7 @@ TEST(Replay, EpisodesReadBackAsWritten) {
   }
 }
 
-TEST(Replay, DiscardedAttemptsLeaveNoTrace) {
+TEST(Replay, DiscardedAttemptsAreNotStored) {
   TempDir dir;
   record(dir.path, 4, {.worlds = 3, .discard_every = 2}, true);
   const InspectResult result = inspect(dir.path);

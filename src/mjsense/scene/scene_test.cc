@@ -75,7 +75,7 @@ std::string fault(const std::string& name, EntityCfg entity) {
 constexpr const char* kBall =
     "<mujoco><worldbody><body name='b'><freejoint/><geom size='.1'/></body></worldbody></mujoco>";
 
-TEST(Scene, SaysWhatIsWrongWithAnEntity) {
+TEST(Scene, ErrorsNameTheEntity) {
   EXPECT_EQ(fault("a", {.model = {.path = "/nowhere/a.xml"}}),
             "entity 'a': no file '/nowhere/a.xml'");
   EXPECT_THAT(fault("a", {.model = {.path = "embedded:robots/franka/fr4.xml"}}),
@@ -147,7 +147,7 @@ TEST(Scene, RejectsInvalidNumbers) {
               ElementsAre(HasSubstr("a timestep of 10 s is long")));
 }
 
-TEST(Scene, SaysWhatIsWrongWithAnOption) {
+TEST(Scene, ErrorsNameTheOption) {
   const auto option_fault = [](const std::function<void(OptionsCfg&)>& edit) {
     SceneCfg cfg;
     edit(cfg.options);
@@ -388,7 +388,7 @@ TEST(Scene, AMocapKeyframeMovesWithItsEntity) {
 }
 
 // Frames about the root, by quaternion and by Euler angles: pos and quat are of the root in the world.
-TEST(Scene, ARootInAFrameStandsWhereItIsPut) {
+TEST(Scene, RootInAFrameHasTheConfiguredPose) {
   const char* framed =
       "<mujoco><worldbody><frame pos='1 0 0' euler='0 0 90'><frame pos='0 0 2'>"
       "<body name='root' pos='.5 0 0' euler='90 0 0'><freejoint/><geom size='.1'/></body>"

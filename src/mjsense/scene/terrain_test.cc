@@ -155,7 +155,7 @@ TEST(Terrain, IsDeterministicAndDistributesColumns) {
   EXPECT_EQ(one.scene().env_origins(160), two.scene().env_origins(160));
 }
 
-TEST(Terrain, SaysWhatIsWrong) {
+TEST(Terrain, ErrorsNameTheSetting) {
   const auto fault = [](TerrainCfg cfg) -> std::string {
     try {
       SceneCfg scene;
@@ -177,7 +177,7 @@ TEST(Terrain, SaysWhatIsWrong) {
 }
 
 // Colours need a light, a sky and a textured ground. Existing ones are kept.
-TEST(Terrain, DaylightAddsWhatIsMissing) {
+TEST(Terrain, DaylightAddsMissingElements) {
   const auto count = [](const mjModel* m, mjtTexture type) {
     return std::count(m->tex_type, m->tex_type + m->ntex, type);
   };

@@ -368,7 +368,7 @@ TEST(ShiftColour, RotatesHueAndScalesValue) {
   EXPECT_NEAR(brown[2], .2, 1e-6);
 }
 
-TEST(EpisodeScene, FaultsNameWhatIsWrong) {
+TEST(EpisodeScene, FaultsNameTheSetting) {
   const auto fault = [](const std::function<void(SceneFileCfg&)>& change) {
     Files files;
     change(files.cfg);

@@ -54,7 +54,7 @@ TEST(Layout, RestartsIfThereIsNoRoom) {
   EXPECT_GT(crowded, 5);  // some first layouts had overlaps
 }
 
-TEST(Layout, WhatIsWantedStandsInRegionsForTargets) {
+TEST(Layout, TargetsArePlacedInRegionsForTargets) {
   const ObjectShape shape = disc(0.02);
   const Quat upright{};
   const std::vector<Resting> objects(3, Resting{&shape, {&upright, 1}});

@@ -283,7 +283,7 @@ TEST(ObjectSizes, ObjectsMoveWithFurniture) {
   EXPECT_GT(most - least, .08);
 }
 
-TEST(ObjectSizes, FaultsNameWhatIsWrong) {
+TEST(ObjectSizes, FaultsNameTheSetting) {
   const auto fault = [](auto change) {
     Files files;
     change(files);

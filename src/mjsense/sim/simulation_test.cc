@@ -307,7 +307,7 @@ TEST(Simulation, OnlyFailedRowsAreRecomputed) {
   EXPECT_THAT(second->casts, ElementsAre(2, 1, 2, 1));
 }
 
-TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
+TEST(Simulation, RayCastsFollowComputationAndFiltersFollowRayCasts) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto camera = add(sim, "camera", Stage::kCast);
   auto points = std::make_shared<Height>("points", Stage::kPostCast);
@@ -326,7 +326,7 @@ TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
 }
 
 // Whatever its own stage, a sensor is computed after the casts of its inputs, and casts after those.
-TEST(Simulation, ASensorIsComputedAfterTheCastsThatItReads) {
+TEST(Simulation, SensorIsComputedAfterTheRayCastsThatItReads) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto camera = add(sim, "camera", Stage::kCast);
   auto reader = std::make_shared<Height>("reader", Stage::kRow);

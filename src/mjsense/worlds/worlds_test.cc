@@ -170,7 +170,7 @@ TEST_P(Integrators, EqualTheNaiveLoop) {
 }
 
 // MuJoCo's own histories and delays take a sample of their sensor at every physics step.
-TEST(Worlds, HistoriesAreThoseOfTheNaiveLoop) {
+TEST(Worlds, HistoriesEqualTheNaiveLoop) {
   const ModelPtr m = load_text(R"(<mujoco><option timestep="0.004"/><worldbody><body>
     <joint name="hinge" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .4 0 0" size=".04"/><site name="tip" pos=".4 0 0"/>
     </body></worldbody><sensor><jointpos joint="hinge" nsample="4"/><accelerometer site="tip" nsample="5" delay=".008"/></sensor></mujoco>)");
@@ -968,7 +968,7 @@ TEST(Worlds, RejectsInvalidArguments) {
 }
 
 // A held box stays in the air, bit for bit, however the world is stepped; a reset lets it go.
-TEST(Hold, KeepsABodyWhereItIsUntilTheReset) {
+TEST(Hold, KeepsABodyInPlaceUntilTheReset) {
   for (const char* integrator : {"Euler", "RK4", "implicitfast"}) {
     const ModelPtr m = load(integrator);
     const int joint[] = {static_cast<int>(m->njnt) - 1}, hinge[] = {0};

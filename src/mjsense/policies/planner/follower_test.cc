@@ -283,7 +283,7 @@ TEST(TaskPlanner, PlansTheNextStageAndEndsOnce) {
   EXPECT_EQ(planner.num_retries(0), 0);
 }
 
-TEST(TaskPlanner, AStageWithoutAPlanIsRetriedThenGivenUp) {
+TEST(TaskPlanner, StageWithoutAPlanIsRetriedThenGivenUp) {
   TableStage stage("franka");
   TwoStages planner(1);
   planner.initialize(*stage.task);

@@ -52,7 +52,7 @@ TEST(Motion, AvoidsAWallAndDependsOnlyOnTheRng) {
   }
 }
 
-TEST(Motion, TheStraightLineWhereItIsFree) {
+TEST(Motion, UsesTheStraightLineIfItIsFree) {
   const double start[2] = {-1, -1}, goal[2] = {-1, 1};
   Rng rng(0, 0, 0, 0);
   EXPECT_EQ(find_path(square(), start, goal, wall(), rng), (std::vector<double>{-1, -1, -1, 1}));
@@ -109,7 +109,7 @@ TEST(Motion, TimesAreWithinTheLimits) {
 }
 
 // A line of 2 rad at 1 rad/s and 2 rad/s^2 takes 2 / 1 + 1 / 2 s.
-TEST(Motion, ALineTakesTheTimeOfATrapezoid) {
+TEST(Motion, LineTakesTheTimeOfATrapezoidalProfile) {
   const JointSpace one{{-2}, {2}, {1.0}, {2.0}};
   const FreeSpace all{[](Config) { return true; }, [](Config, Config) { return true; }};
   const CommandPath timed = time_path(one, 0, std::vector<double>{-1, 1}, all);

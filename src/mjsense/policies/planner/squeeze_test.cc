@@ -27,7 +27,7 @@ Squeeze at_height(double z) {
   return squeeze(bar(), {0, 0, z}, {0, 1, 0}, {1, 0, 0}, {0, 0, -1}, kHalfWidth, kHalfLength);
 }
 
-TEST(Squeeze, AtTheMiddleTheWidthIsTheBarsAndTheSlopeIsZero) {
+TEST(Squeeze, AtTheCentreTheWidthEqualsTheBarAndTheSlopeIsZero) {
   const Squeeze s = at_height(0);
   EXPECT_NEAR(s.high - s.low, 2 * kRadius, 1e-4);
   EXPECT_NEAR(s.slope, 0, 0.05);

@@ -283,7 +283,7 @@ TEST(Controllers, ErrorsNameTheRequirements) {
 
 // A base that nothing can move: its present pose is accepted, any other pose is an error that says
 // how to make it movable.
-TEST(Bases, AFixedBaseCannotBePlacedElsewhere) {
+TEST(Bases, FixedBaseCannotBePlacedElsewhere) {
   RobotCfg cfg;
   cfg.name = "small";
   cfg.base_body = "base";

@@ -272,7 +272,7 @@ TEST(BuiltinSensor, DeclaresUnitAndFrame) {
 }
 
 // Bounds of the values. The policy's space and the checks of recordings use them.
-TEST(BuiltinSensor, DeclaresItsBounds) {
+TEST(BuiltinSensor, DeclaresBounds) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   struct Case {
     const char* type;

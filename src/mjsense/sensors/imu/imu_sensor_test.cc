@@ -129,7 +129,7 @@ TEST(Imu, ResetClearsTheFiltersOfItsWorldsOnly) {
 }
 
 // Each axis has the tolerance given by its data sheet.
-TEST(Imu, EveryAxisHasItsOwnTolerance) {
+TEST(Imu, EveryAxisHasASeparateTolerance) {
   ImuSensorCfg cfg = imu("");
   cfg.model.accelerometer.bias_tolerance = {0.3, 1.5, 6.0};
   auto scene = make_scene(cfg);
@@ -150,7 +150,7 @@ TEST(Imu, EveryAxisHasItsOwnTolerance) {
 }
 
 // An axis sees of another one the sine of the angle between the axis and where it should be; the tolerance is three standard deviations.
-TEST(Imu, AnAxisSeesPartOfTheOthers) {
+TEST(Imu, CrossAxisSensitivityMixesAxes) {
   ImuSensorCfg cfg = imu("");
   cfg.model.accelerometer.cross_axis_tolerance = 0.06;
   auto scene = make_scene(cfg);

@@ -152,7 +152,7 @@ TEST(Lidar, UsesTheGivenElevations) {
   }
 }
 
-TEST(Lidar, FrameOnTheWorldBodySeesTheWorld) {
+TEST(Lidar, RaysOfAFrameOnTheWorldBodyHitTheWorld) {
   Lab lab;
   lab.cfg->frame = {{"body", "world", ""}};
   lab.start();

@@ -34,7 +34,7 @@ struct Played : PlayedTask<DoorOpeningTask> {
   }
 };
 
-TEST(DoorOpening, ALatchHoldsUntilTheLeverIsPressed) {
+TEST(DoorOpening, LatchHoldsUntilTheLeverIsPressed) {
   for (const char* house : {"room_with_door:0", "room_with_door:2"}) {
     Played p(house);
     p.start(0);
@@ -46,7 +46,7 @@ TEST(DoorOpening, ALatchHoldsUntilTheLeverIsPressed) {
   }
 }
 
-TEST(DoorOpening, SuccessIsTheFractionNowWhicheverWayTheHingeTurns) {
+TEST(DoorOpening, SuccessUsesTheCurrentFractionForBothHingeDirections) {
   int negative = 0;
   for (const char* house : {"room_with_door:0", "room_with_door:2"}) {
     Played p(house);
@@ -68,7 +68,7 @@ TEST(DoorOpening, SuccessIsTheFractionNowWhicheverWayTheHingeTurns) {
   EXPECT_EQ(negative, 1) << "one of the two houses has its hinge on the other side";
 }
 
-TEST(DoorOpening, TheRobotStartsFreeBeforeTheDoorOnEitherSide) {
+TEST(DoorOpening, RobotStartsWithoutCollisionOnEitherSideOfTheDoor) {
   Played p;
   int pushes = 0;
   for (int episode = 0; episode < 30; ++episode) {
@@ -88,7 +88,7 @@ TEST(DoorOpening, TheRobotStartsFreeBeforeTheDoorOnEitherSide) {
   EXPECT_LT(pushes, 25);
 }
 
-TEST(DoorOpening, TheStateOfTheDoorIsThatOfNow) {
+TEST(DoorOpening, DoorStateIsCurrent) {
   Played p;
   p.start(1);
   const auto sensor = door_state_sensor(p.task);
@@ -118,7 +118,7 @@ TEST(DoorOpening, TheStateOfTheDoorIsThatOfNow) {
   }
 }
 
-TEST(DoorOpening, ASceneWithoutADoorIsRefused) {
+TEST(DoorOpening, SceneWithoutADoorIsRejected) {
   DoorOpeningTask task(task_cfg("rby1", "table"));
   Scene scene(task.whole_scene_cfg());
   try {

@@ -40,7 +40,7 @@ std::unique_ptr<MultiTask> door_or_pick() {
   return std::make_unique<MultiTask>("door_or_pick", cfg("room_with_door"), std::move(children));
 }
 
-TEST(MultiTask, AnyOfThemIsSuccessAndTheGreatestRewardCounts) {
+TEST(MultiTask, AnySuccessCountsAndTheRewardIsTheMaximum) {
   const auto task = door_or_pick();
   Scene scene(task->whole_scene_cfg());
   const mjModel* model = scene.model();
@@ -96,7 +96,7 @@ struct Counting final : Policy {
   const Task* of = nullptr;
 };
 
-TEST(MultiTask, PartsHaveTheRobotThePolicyAndTheEpisodeOfTheWhole) {
+TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
   const auto task = door_or_pick();
   Scene scene(task->whole_scene_cfg());
   task->initialize(scene.model(), 1);
@@ -128,7 +128,7 @@ TEST(MultiTask, PartsHaveTheRobotThePolicyAndTheEpisodeOfTheWhole) {
   EXPECT_TRUE(task->evaluate(w).terminal);
 }
 
-TEST(MultiTask, TheFirstsRolesAndSensorsAndWhatItLacks) {
+TEST(MultiTask, CombinesRolesSensorsAndLacks) {
   const auto task = door_or_pick();
   Scene scene(task->whole_scene_cfg());
   task->initialize(scene.model(), 1);
@@ -153,7 +153,7 @@ TEST(MultiTask, TheFirstsRolesAndSensorsAndWhatItLacks) {
   EXPECT_THROW(task->start_pose(0, "nothing"), KeyError);
 }
 
-TEST(MultiTask, TheFirstPlaysTheEpisodeThatItPlaysAlone) {
+TEST(MultiTask, FirstTaskSamplesTheSameEpisodeAsAlone) {
   std::vector<std::vector<double>> starts;
   for (const bool alone : {true, false}) {
     std::unique_ptr<Task> task = std::make_unique<PickTask>(cfg("table"));
@@ -172,7 +172,7 @@ TEST(MultiTask, TheFirstPlaysTheEpisodeThatItPlaysAlone) {
   EXPECT_EQ(starts[0], starts[1]);
 }
 
-TEST(MultiTask, TheOthersChooseGoalsWhereTheFirstHasPutThings) {
+TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
   std::vector<std::unique_ptr<Task>> children;
   children.push_back(std::make_unique<NavToObjTask>(cfg("floor")));
   children.push_back(std::make_unique<PickTask>(cfg("floor")));
@@ -193,7 +193,7 @@ TEST(MultiTask, TheOthersChooseGoalsWhereTheFirstHasPutThings) {
   EXPECT_GT(bodies.size(), 2u);
 }
 
-TEST(MultiTask, SaysWhatCannotBe) {
+TEST(MultiTask, InvalidCombinationsThrow) {
   const auto message = [](std::vector<std::unique_ptr<Task>> children) -> std::string {
     try {
       MultiTask task("multi_task", cfg("floor"), std::move(children));
@@ -210,7 +210,7 @@ TEST(MultiTask, SaysWhatCannotBe) {
   EXPECT_THAT(message(std::move(two)), HasSubstr("has scene 'table'"));
 }
 
-TEST(MultiTask, ATaskThatMovesThingsMustBeTheFirst) {
+TEST(MultiTask, TaskThatChangesTheSceneMustBeFirst) {
   std::vector<std::unique_ptr<Task>> children;
   children.push_back(std::make_unique<PickTask>(cfg("kitchen")));
   children.push_back(std::make_unique<OpeningTask>(cfg("kitchen"), OpeningKind::kOpen));

@@ -39,7 +39,7 @@ struct Nav : testing::Test, PlayedTask<NavToObjTask> {
   }
 };
 
-TEST_F(Nav, RewardFallsWithTheDistanceOfWhatIsSeen) {
+TEST_F(Nav, RewardDecreasesWithTheDistanceOfTheVisibleObject) {
   int tested = 0;
   for (int episode = 0; episode < 16 && tested < 3; ++episode) {
     start(episode);
@@ -58,7 +58,7 @@ TEST_F(Nav, RewardFallsWithTheDistanceOfWhatIsSeen) {
 }
 
 // A start is rejected if the target is not visible from any base pose.
-TEST_F(Nav, WhatIsSeenFromNowhereIsNoTarget) {
+TEST_F(Nav, StartWithoutAViewOfTheTargetIsRejected) {
   start(0);
   EXPECT_EQ(task.start_fault(world), "");
   const int body = task.objects(0)[0].body;
@@ -69,7 +69,7 @@ TEST_F(Nav, WhatIsSeenFromNowhereIsNoTarget) {
                                          " in scene 'floor' from any base pose that it can reach");
 }
 
-TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {
+TEST_F(Nav, OccludedObjectsAreNotVisible) {
   start(0);
   ASSERT_TRUE(stand(1.2, 0));
   const int body = task.objects(0)[0].body;
@@ -90,7 +90,7 @@ TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {
 
 // The text, the labels and the evaluation refer to one body, and no other object of the episode has
 // its name. The floor scene has two mugs, which are both present in some episodes.
-TEST_F(Nav, TheTargetIsTheOnlyObjectOfItsKind) {
+TEST_F(Nav, TargetHasAUniqueName) {
   int pairs = 0;
   std::set<std::string> named;
   for (int episode = 0; episode < 40; ++episode) {
@@ -116,7 +116,7 @@ TEST_F(Nav, TheTargetIsTheOnlyObjectOfItsKind) {
 }
 
 // The labelled object is evaluated even if another object is closer and visible.
-TEST_F(Nav, AnotherObjectInFrontOfTheRobotIsNoSuccess) {
+TEST_F(Nav, OtherObjectInFrontOfTheRobotIsNotSuccess) {
   start(0);
   ASSERT_TRUE(stand(1.2, 0));
   ASSERT_TRUE(task.evaluate(world).success);
@@ -132,7 +132,7 @@ TEST_F(Nav, AnotherObjectInFrontOfTheRobotIsNoSuccess) {
   EXPECT_FALSE(task.evaluate(world).success);
 }
 
-TEST_F(Nav, AnEpisodeDependsOnItsNumberAlone) {
+TEST_F(Nav, EpisodeDependsOnItsNumberOnly) {
   start(5);
   const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
   start(6);
@@ -144,7 +144,7 @@ TEST_F(Nav, AnEpisodeDependsOnItsNumberAlone) {
 
 // The follower camera, like the discs of the robot's footprint, is clear of walls: no wall is
 // between the middle of the robot and the camera, which is less than 0.35 m away horizontally.
-TEST_F(Nav, TheFollowerIsInsideTheHouse) {
+TEST_F(Nav, FollowerCameraIsInsideTheHouse) {
   const int camera = mj_name2id(model, mjOBJ_CAMERA, "robot_0/camera_follower");
   ASSERT_GE(camera, 0);
   for (int episode = 0; episode < 40; ++episode) {

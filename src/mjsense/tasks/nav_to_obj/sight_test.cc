@@ -42,7 +42,7 @@ struct Sighting : testing::Test {
   Sight sight;
 };
 
-TEST_F(Sighting, EndsAtEverySideOfThePicture) {
+TEST_F(Sighting, EndsAtEveryBorderOfTheImage) {
   const double wide = std::atan(4.0 / 3 * std::tan(30 * kDeg)) / kDeg;
   EXPECT_TRUE(sees(0, 0));
   for (const int sign : {1, -1}) {
@@ -54,7 +54,7 @@ TEST_F(Sighting, EndsAtEverySideOfThePicture) {
   EXPECT_FALSE(sees_at({-2, 0, 0})) << "behind the camera";
 }
 
-TEST_F(Sighting, EndsAtWhatStandsBefore) {
+TEST_F(Sighting, EndsAtOccludingGeoms) {
   write_vec({1, 0, 0}, data->qpos + 7);
   EXPECT_FALSE(sees(0, 0));
   EXPECT_TRUE(sees(20, 0)) << "beside the screen";

@@ -20,7 +20,7 @@ using std::numbers::pi;
 //        B'
 //        |
 //   H    +---- B
-TEST(Drive, WithAShareOfOneTheBaseGoesAroundTheHinge) {
+TEST(Drive, WithAShareOfOneTheBaseRotatesAboutTheHinge) {
   Articulation one;
   const HandleMotion motion{&one, 0, -pi / 2, {0, 0, -1}, {1, 2, 0}};
   const BasePose end = driven({2, 2, 0.1}, {.share = 1}, motion, {}, 1);
@@ -38,7 +38,7 @@ TEST(Drive, WithAShareOfOneTheBaseGoesAroundTheHinge) {
 }
 
 // For a drawer, or a lid with a horizontal hinge, the base follows the handle's horizontal motion.
-TEST(Drive, OtherwiseItGoesWithTheHandle) {
+TEST(Drive, OtherwiseTheBaseFollowsTheHandle) {
   Articulation drawer;
   drawer.slide = true;
   const HandleMotion out{&drawer, 0, 0.3, {-1, 0, 0}, {}};
@@ -55,7 +55,7 @@ TEST(Drive, OtherwiseItGoesWithTheHandle) {
 
 // RB-Y1 opens the fridge farther than its arms alone can. The gripper stays on the handle to the
 // accuracy of inverse kinematics, and no other part of the robot touches anything.
-TEST(Drive, BaseAndArmKeepTheHandOnItsWay) {
+TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
   TaskCfg cfg;
   cfg.robot = robot_cfg("rby1");
   OpeningTask task(cfg, OpeningKind::kOpen);
@@ -116,7 +116,7 @@ TEST(Drive, BaseAndArmKeepTheHandOnItsWay) {
   EXPECT_EQ(touching, 0) << "the hand is open";
 }
 
-TEST(Opening, WhatIsOpenIsTheRobotsMatter) {
+TEST(Opening, OpenedFractionDependsOnTheRobot) {
   for (const auto& [name, opened] : {std::pair{"franka", 0.15}, {"rby1", 0.67}}) {
     TaskCfg cfg;
     cfg.robot = robot_cfg(name);

@@ -84,7 +84,7 @@ std::string box_with_bar(const std::string& name, const std::string& joint,
          more + "</body>";
 }
 
-TEST(Articulations, ABarBeforeTheFrontIsTheHandle) {
+TEST(Articulations, BarInFrontOfThePanelIsTheHandle) {
   const ModelPtr m = compiled(
       box_with_bar("drawer", "<joint type='slide' axis='-1 0 0' range='0 .3' limited='true'/>"));
   const auto found = find_articulations(m.get(), "");
@@ -100,7 +100,7 @@ TEST(Articulations, ABarBeforeTheFrontIsTheHandle) {
   EXPECT_NEAR(one.handle.half_along, .078, 1e-3);
 }
 
-TEST(Articulations, WhatDoesNotOpenIsNone) {
+TEST(Articulations, BodiesThatDoNotOpenAreSkipped) {
   const std::string slide = "<joint type='slide' axis='-1 0 0' range='0 .3' limited='true'/>";
   const struct {
     const char* why;
@@ -120,7 +120,7 @@ TEST(Articulations, WhatDoesNotOpenIsNone) {
   EXPECT_TRUE(find_articulations(compiled(box_with_bar("robot/x", slide)).get(), "robot/").empty());
 }
 
-TEST(Articulations, NamesSayWhatItIs) {
+TEST(Articulations, CategoryFollowsFromTheName) {
   const std::string hinge =
       "<joint type='hinge' axis='0 0 1' pos='0 .2 0' range='-100 0' limited='true'/>";
   const std::string aside = "<joint type='slide' axis='0 1 0' range='0 .3' limited='true'/>";
@@ -144,7 +144,7 @@ TEST(Articulations, NamesSayWhatItIs) {
   EXPECT_NEAR(found[0].fraction(-.155), 0.5, 1e-12);
 }
 
-TEST(Articulations, MotionIsThatOfMuJoCo) {
+TEST(Articulations, MotionEqualsMuJoCo) {
   for (const char* joint :
        {"<joint type='hinge' axis='.2 .1 1' pos='0 .2 0' range='-100 0' limited='true'/>",
         "<joint type='slide' axis='-1 .3 0' range='0 .3' limited='true'/>"}) {
@@ -167,7 +167,7 @@ TEST(Articulations, MotionIsThatOfMuJoCo) {
   }
 }
 
-TEST(Opening, AKitchenHasWhatKitchensHave) {
+TEST(Opening, KitchensHaveAllCategories) {
   for (const char* scene : {"kitchen", "kitchen:1", "kitchen:2"}) {
     const Stage stage(franka(scene), OpeningKind::kOpen);
     std::map<std::string, int> count;
@@ -182,7 +182,7 @@ TEST(Opening, AKitchenHasWhatKitchensHave) {
   }
 }
 
-TEST(Opening, AnEpisodeDependsOnItsNumberAlone) {
+TEST(Opening, EpisodeDependsOnItsNumberOnly) {
   Stage stage(franka(), OpeningKind::kClose), other(franka(), OpeningKind::kClose, 1);
   stage.start(0, 5);
   std::vector<double> qpos(stage.data->qpos, stage.data->qpos + stage.model->nq);
@@ -196,7 +196,7 @@ TEST(Opening, AnEpisodeDependsOnItsNumberAlone) {
   EXPECT_EQ(what, stage.task.description(2));
 }
 
-TEST(Opening, StartsCanBePlayedAndDiffer) {
+TEST(Opening, StartsAreFeasibleAndDiffer) {
   Stage stage(franka(), OpeningKind::kOpen);
   std::set<std::string> texts;
   std::set<double> places;
@@ -217,7 +217,7 @@ TEST(Opening, StartsCanBePlayedAndDiffer) {
 
 // The reward of `open` is the maximum over all articulations of the category. The Franka needs 0.15
 // of the range.
-TEST(Opening, OpenCountsEveryThingOfTheKind) {
+TEST(Opening, OpenCountsEveryArticulationOfTheCategory) {
   Stage stage(franka(), OpeningKind::kOpen);
   const World w = stage.start(1, 3);
   const Articulation& target = stage.task.target(1);
@@ -235,7 +235,7 @@ TEST(Opening, OpenCountsEveryThingOfTheKind) {
   EXPECT_NEAR(stage.task.evaluate(w).reward, 0.02, 1e-12);
 }
 
-TEST(Opening, CloseCountsTheTargetAlone) {
+TEST(Opening, CloseCountsOnlyTheTarget) {
   Stage stage(franka(), OpeningKind::kClose);
   for (int episode = 0; episode < 4; ++episode) {
     const World w = stage.start(1, episode);
@@ -265,7 +265,7 @@ TEST(Opening, CloseCountsTheTargetAlone) {
   }
 }
 
-TEST(Opening, ARobotDoesNotStandInACupboard) {
+TEST(Opening, RobotDoesNotStartInsideFurniture) {
   Stage stage(franka(), OpeningKind::kOpen);
   const World w = stage.start(0, 0);
   const auto start = stage.task.reach().start_of(w);
@@ -286,7 +286,7 @@ TEST(Opening, ARobotDoesNotStandInACupboard) {
 // The arm is interpolated linearly in joint space between the points of the path. The gripper must
 // stay on the handle there, too. A path must be found again from the pose of an arm that deviates
 // slightly.
-TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
+TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
   Stage stage(franka(), OpeningKind::kClose);
   const HandleReach& reach = stage.task.reach();
   const Robot& robot = stage.task.robot();
@@ -321,7 +321,7 @@ TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
 
 // The tool of a floating gripper moves with the handle about the door's hinge. At the start, it
 // floats in front of the handle without touching anything.
-TEST(Opening, AHandThatFloatsGoesOnAScrew) {
+TEST(Opening, FloatingGripperMovesOnAScrew) {
   TaskCfg cfg;
   cfg.robot = robot_cfg("floating_rum");
   Stage stage(cfg, OpeningKind::kOpen, 1);
@@ -354,7 +354,7 @@ TEST(Opening, AHandThatFloatsGoesOnAScrew) {
 }
 
 // An obstacle 5 mm from the arm blocks the path. Its pose is taken from the world's own model.
-TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
+TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
   Stage stage(franka(), OpeningKind::kOpen);
   const World w = stage.start(0, 0);
   const mjModel* m = stage.model;
@@ -413,7 +413,7 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
   EXPECT_GE(moved, 5);
 }
 
-TEST(Opening, ErrorsSayWhatIsMissing) {
+TEST(Opening, ErrorsNameWhatIsMissing) {
   try {
     Stage stage(franka("table"), OpeningKind::kOpen);
     FAIL() << "a table has nothing to open";

@@ -48,7 +48,7 @@ struct Pick : testing::Test {
   void SetUp() override { task.initialize(model, 3); }
 };
 
-TEST_F(Pick, AnEpisodeDependsOnItsNumberAlone) {
+TEST_F(Pick, EpisodeDependsOnItsNumberOnly) {
   start(0, 5);
   const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
   const std::string what = task.description(0);
@@ -59,7 +59,7 @@ TEST_F(Pick, AnEpisodeDependsOnItsNumberAlone) {
   EXPECT_EQ(what, task.description(2));
 }
 
-TEST_F(Pick, ObjectsStandFreeOnTheTable) {
+TEST_F(Pick, ObjectsStartOnTheTableWithoutCollision) {
   std::set<std::string> targets;
   for (int episode = 0; episode < 100; ++episode) {
     start(0, episode);
@@ -87,7 +87,7 @@ TEST_F(Pick, ObjectsStandFreeOnTheTable) {
   EXPECT_EQ(targets.size(), task.all_objects().size()) << "every kind is a target in 100 episodes";
 }
 
-TEST_F(Pick, ObjectsRestWhereTheyStart) {
+TEST_F(Pick, ObjectsStayWhereTheyStart) {
   for (int episode = 0; episode < 3; ++episode) {
     start(0, episode);
     const std::vector<double> before(data->xpos, data->xpos + 3 * model->nbody);
@@ -100,7 +100,7 @@ TEST_F(Pick, ObjectsRestWhereTheyStart) {
   }
 }
 
-TEST_F(Pick, LiftedByNothingIsNoSuccess) {
+TEST_F(Pick, LiftWithoutTheRobotIsNotSuccess) {
   start(0, 1);
   Evaluation e = task.evaluate(w);
   EXPECT_EQ(e.reward, 0);
@@ -112,7 +112,7 @@ TEST_F(Pick, LiftedByNothingIsNoSuccess) {
   EXPECT_FALSE(e.success);            // but the robot does not touch it
 }
 
-TEST_F(Pick, LyingOnAnotherObjectIsNoSuccess) {
+TEST_F(Pick, LyingOnAnotherObjectIsNotSuccess) {
   start(0, 1);
   // On top of another object: high enough, but not held by the robot.
   const int target = task.target(0);
@@ -130,7 +130,7 @@ TEST_F(Pick, LyingOnAnotherObjectIsNoSuccess) {
 }
 
 // An object counts as lifted only if the robot touches it and nothing else does.
-TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
+TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
   start(0, 1);
   const int target = task.target(0);
   // Move the object onto a colliding part of the gripper.
@@ -164,7 +164,7 @@ TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
 }
 
 // Success begins at a lift of one centimeter.
-TEST_F(Pick, SuccessIsOneCentimetreUp) {
+TEST_F(Pick, SuccessStartsAtALiftOfOneCentimetre) {
   start(0, 1);
   const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   write_vec(vec3(data->xpos + 3 * gripper), object_qpos());
@@ -181,7 +181,7 @@ TEST_F(Pick, SuccessIsOneCentimetreUp) {
 }
 
 // The target has 7 cm of free space around it for an open gripper; other objects are 2 cm apart.
-TEST_F(Pick, TheTargetStandsClear) {
+TEST_F(Pick, TargetHasFreeSpaceAroundIt) {
   double least_target = 1, least_other = 1;
   int tight = 0;
   constexpr int kEpisodes = 200;
@@ -222,7 +222,7 @@ TEST_F(Pick, TheTargetStandsClear) {
 }
 
 // Blocks rest on each of their three kinds of faces equally often.
-TEST_F(Pick, BlocksRestInEveryWay) {
+TEST_F(Pick, BlocksRestOnEveryKindOfFace) {
   int ways[3] = {};
   for (int episode = 0; episode < 150; ++episode) {
     start(0, episode);
@@ -236,7 +236,7 @@ TEST_F(Pick, BlocksRestInEveryWay) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(ways[k], 50, 25) << k;
 }
 
-TEST_F(Pick, EndsWithTheHorizonOrADoneAction) {
+TEST_F(Pick, EndsAtTheHorizonOrWithADoneAction) {
   start(0, 0);
   Action action;
   for (int i = 0; i < task.cfg().horizon - 1; ++i) task.apply(w, action, state_row(data.get()));
@@ -254,7 +254,7 @@ TEST_F(Pick, EndsWithTheHorizonOrADoneAction) {
 
 // Action noise differs between episodes and between steps, but not between worlds: the same state
 // and command in another world gives the same noise.
-TEST_F(Pick, ActionNoiseBelongsToTheEpisodeAndTheStep) {
+TEST_F(Pick, ActionNoiseDependsOnEpisodeAndStep) {
   start(0, 5);
   const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
   const int arm = task.robot().arm();
@@ -277,7 +277,7 @@ TEST_F(Pick, ActionNoiseBelongsToTheEpisodeAndTheStep) {
   EXPECT_NE(ctrl, noisy(0, 5, 1));
 }
 
-TEST_F(Pick, TellsWhatItIs) {
+TEST_F(Pick, ObsSceneDescribesTheTask) {
   start(1, 3);
   const auto obs = nlohmann::json::parse(task.obs_scene(1));
   EXPECT_EQ(obs["task_type"], "pick");
@@ -302,7 +302,7 @@ TEST_F(Pick, TellsWhatItIs) {
   EXPECT_EQ(info["episode_step"], 0);
 }
 
-TEST_F(Pick, GoalIsFiveCentimetresUp) {
+TEST_F(Pick, GoalIsFiveCentimetresAboveTheStart) {
   start(0, 2);
   const Pose start_pose = task.start_pose(0, "pickup_obj");
   EXPECT_NEAR(start_pose.p.z, data->xpos[3 * body() + 2], 1e-12);
@@ -310,7 +310,7 @@ TEST_F(Pick, GoalIsFiveCentimetresUp) {
   EXPECT_THROW(task.start_pose(0, "place_receptacle"), KeyError);
 }
 
-TEST_F(Pick, SensorsInTheirOrder) {
+TEST_F(Pick, SensorsAreInThePublishedOrder) {
   std::vector<std::string> names;
   for (const auto& sensor : task.create_task_sensors()) names.push_back(sensor->name());
   EXPECT_THAT(names, testing::ElementsAre("obj_start", "grasp_state_pickup_obj", "obj_end"));
@@ -319,7 +319,7 @@ TEST_F(Pick, SensorsInTheirOrder) {
   EXPECT_EQ(robot_sensors[0]->name(), "tcp_pose");
 }
 
-TEST(Task, BadConfigurationsAreErrors) {
+TEST(Task, InvalidConfigurationsThrow) {
   TaskCfg cfg = franka();
   cfg.policy_dt_ms = 65;
   EXPECT_THROW(PickTask{cfg}, ValueError);

@@ -90,7 +90,7 @@ struct Table {
   World world;
 };
 
-TEST(PickAndPlace, AnEpisodeDependsOnItsNumberAlone) {
+TEST(PickAndPlace, EpisodeDependsOnItsNumberOnly) {
   Table table(PlaceKind::kInOrOn);
   table.start(0, 5);
   const std::vector<double> qpos(table.data->qpos, table.data->qpos + table.world.model->nq);
@@ -101,7 +101,7 @@ TEST(PickAndPlace, AnEpisodeDependsOnItsNumberAlone) {
   EXPECT_EQ(scene, table.task.obs_scene(2));
 }
 
-TEST(PickAndPlace, StartsFreeAndWithinReach) {
+TEST(PickAndPlace, StartsAreReachableAndWithoutCollision) {
   Table table(PlaceKind::kInOrOn);
   for (int episode = 0; episode < 30; ++episode) {
     table.start(0, episode);
@@ -116,7 +116,7 @@ TEST(PickAndPlace, StartsFreeAndWithinReach) {
   }
 }
 
-TEST(PickAndPlace, LyingInABowlIsSuccessLyingOnTheTableIsNot) {
+TEST(PickAndPlace, ObjectInTheBowlIsSuccessOnTheTableIsNot) {
   Table table(PlaceKind::kInOrOn);
   table.start_with("red bowl");
   Evaluation e = table.task.evaluate(table.world);
@@ -131,7 +131,7 @@ TEST(PickAndPlace, LyingInABowlIsSuccessLyingOnTheTableIsNot) {
   EXPECT_GT(e.reward, 0.93);
 }
 
-TEST(PickAndPlace, TheReceptacleMayMoveALittleAndTurnButNotTilt) {
+TEST(PickAndPlace, ReceptacleMayMoveALittleAndTurnButNotTilt) {
   Table table(PlaceKind::kInOrOn);
   table.start_with("green plate");
   table.drop();
@@ -153,7 +153,7 @@ TEST(PickAndPlace, TheReceptacleMayMoveALittleAndTurnButNotTilt) {
 
 // Bounding boxes cannot detect support in a bowl. An earlier supported pose is carried forward
 // within 5 mm: support is still assumed 4 mm higher, but not 6 mm higher.
-TEST(PickAndPlace, WhatWasCarriedIsCarriedForward) {
+TEST(PickAndPlace, SupportIsKeptWithinFiveMillimetres) {
   Table table(PlaceKind::kInOrOn);
   table.start_with("red bowl");
   EXPECT_EQ(table.task.evaluate(table.world).success, false);
@@ -172,7 +172,7 @@ TEST(PickAndPlace, WhatWasCarriedIsCarriedForward) {
   }
 }
 
-TEST(PickAndPlace, TheRobotMustHaveLetGo) {
+TEST(PickAndPlace, RobotMustReleaseTheObject) {
   Table table(PlaceKind::kInOrOn);
   table.start(0, 0);
   const int gripper = resolve(table.world.model, mjOBJ_BODY, "robot_0/gripper/base", "test");
@@ -181,7 +181,7 @@ TEST(PickAndPlace, TheRobotMustHaveLetGo) {
   EXPECT_TRUE(table.info()["robot_contact"].get<bool>());
 }
 
-TEST(PickAndPlace, NextToIsBesideOnTheSameTable) {
+TEST(PickAndPlace, NextToRequiresTheSameSupport) {
   Table table(PlaceKind::kNextTo);
   table.start(0, 1);
   EXPECT_THAT(table.task.description(0), HasSubstr("next to the"));
@@ -209,7 +209,7 @@ TEST(PickAndPlace, NextToIsBesideOnTheSameTable) {
 }
 
 // The robot's pedestal begins at the table's edge, 2 cm below the table top.
-TEST(PickAndPlace, NextToHasNoPlaceBeyondTheTable) {
+TEST(PickAndPlace, NextToPlacesAreOnTheTable) {
   Table table(PlaceKind::kNextTo);
   table.start(0, 1);
   const int top = resolve(table.world.model, mjOBJ_GEOM, "room/table_top", "test");
@@ -233,7 +233,7 @@ TEST(PickAndPlace, NextToHasNoPlaceBeyondTheTable) {
   EXPECT_GT(far.size(), near.size()) << "on the robot's side, too";
 }
 
-TEST(PickAndPlace, WhatStandsThereAlreadyIsNoStart) {
+TEST(PickAndPlace, StartThatIsAlreadySolvedIsRejected) {
   Table table(PlaceKind::kNextTo);
   int there = 0;
   for (int episode = 0; episode < 60; ++episode) {
@@ -247,7 +247,7 @@ TEST(PickAndPlace, WhatStandsThereAlreadyIsNoStart) {
   EXPECT_GT(there, 0) << "none to tell";
 }
 
-TEST(PickAndPlace, AColourTellsOneOfTwo) {
+TEST(PickAndPlace, ColourDistinguishesTwoReceptacles) {
   Table table(PlaceKind::kColor);
   for (int episode = 0; episode < 20; ++episode) {
     table.start(0, episode);
@@ -263,7 +263,7 @@ TEST(PickAndPlace, AColourTellsOneOfTwo) {
   }
 }
 
-TEST(PickAndPlace, PackingIsIntoABox) {
+TEST(PickAndPlace, PackingChoosesABox) {
   Table table(PlaceKind::kPacking);
   table.start(0, 3);
   EXPECT_THAT(table.task.description(0), HasSubstr("into the cardboard box"));
@@ -274,7 +274,7 @@ TEST(PickAndPlace, PackingIsIntoABox) {
   EXPECT_TRUE(scene["referral_expressions"].contains("place_name"));
 }
 
-TEST(PickAndPlace, RecordsWhatTheSpecificationNames) {
+TEST(PickAndPlace, SensorsAreThoseOfTheSpecification) {
   Table table(PlaceKind::kInOrOn);
   std::vector<std::string> names;
   for (const auto& sensor : table.task.create_task_sensors()) names.push_back(sensor->name());
@@ -282,7 +282,7 @@ TEST(PickAndPlace, RecordsWhatTheSpecificationNames) {
                                              "grasp_state_place_receptacle"}));
 }
 
-TEST(PickAndPlace, ASceneWithoutReceptaclesIsAnError) {
+TEST(PickAndPlace, SceneWithoutReceptaclesThrows) {
   try {
     Table table(PlaceKind::kInOrOn, "table");
     FAIL();

@@ -47,7 +47,7 @@ struct Support : testing::Test {
 
 // A block with half extents of 2 x 3 x 4 cm, rotated by 90 and by 30 degrees. The half extents of
 // its axis-aligned box are |R| times these.
-TEST_F(Support, ABoxAroundWhatIsTurned) {
+TEST_F(Support, BoundingBoxOfARotatedBlock) {
   put(0.5, 0, 0.2, 0, 0);
   for (int i = 0; i < 3; ++i)
     model->geom_aabb[6 * model->body_geomadr[kBlock] + 3 + i] = 0.02 + 0.01 * i;
@@ -61,7 +61,7 @@ TEST_F(Support, ABoxAroundWhatIsTurned) {
   }
 }
 
-TEST_F(Support, ATrayBearsTheWeightOfABlock) {
+TEST_F(Support, TraySupportsABlock) {
   put(0, 0, 0.05);
   const Vec3 force = contact_force(world, kTray, kBlock);
   EXPECT_NEAR(force.z, 0.2 * 9.81, 0.02);
@@ -76,7 +76,7 @@ TEST_F(Support, ATrayBearsTheWeightOfABlock) {
   EXPECT_FALSE(touched_by(world, kBlock, kTable));
 }
 
-TEST_F(Support, BesideTheTrayTheTableBears) {
+TEST_F(Support, TableSupportsABlockNextToTheTray) {
   put(0.2, 0, 0.03);
   EXPECT_FALSE(carries(world, kTray, kBlock));
   EXPECT_TRUE(carries(world, kTable, kBlock));
@@ -84,7 +84,7 @@ TEST_F(Support, BesideTheTrayTheTableBears) {
 }
 
 // The block is pressed against a wall and held by friction. The wall's force is not vertical.
-TEST_F(Support, AWallDoesNotBear) {
+TEST_F(Support, WallDoesNotSupport) {
   put(-0.459, 0, 0.2, -60);
   const Vec3 force = contact_force(world, kWall, kBlock);
   ASSERT_GT(force.x, 30);
@@ -95,7 +95,7 @@ TEST_F(Support, AWallDoesNotBear) {
 
 // A force supports the block if it is within 30 degrees of up and at least half of the block's
 // weight.
-TEST_F(Support, ForcesAreJudgedByAngleAndSize) {
+TEST_F(Support, ForcesAreTestedByAngleAndSize) {
   put(0.5, 0, 0.2, 0, 0);
   const auto force = [](double degrees, double size) {
     const double a = degrees * M_PI / 180;
@@ -111,7 +111,7 @@ TEST_F(Support, ForcesAreJudgedByAngleAndSize) {
 }
 
 // The block lies on the table, which is tilted about y.
-TEST_F(Support, WithoutForcesTheNormalIsWithinThirtyDegreesOfUp) {
+TEST_F(Support, WithoutForcesTheNormalMustBeWithinThirtyDegreesOfUp) {
   for (const double degrees : {29.0, 31.0}) {
     const Quat tilt = axis_angle({0, 1, 0}, degrees * M_PI / 180);
     write_quat(tilt, model->body_quat + 4 * kTable);
@@ -125,7 +125,7 @@ TEST_F(Support, WithoutForcesTheNormalIsWithinThirtyDegreesOfUp) {
 }
 
 // No contact forces have been computed, or there is a small gap between the two.
-TEST_F(Support, WithoutForcesTheBoxesDecide) {
+TEST_F(Support, WithoutForcesBoundingBoxesAreUsed) {
   put(0, 0, 0.02 + 0.03 + 0.005, 0, 0);
   EXPECT_EQ(norm(contact_force(world, kTray, kBlock)), 0);
   EXPECT_TRUE(seems_to_carry(world, kTray, kBlock));
@@ -137,7 +137,7 @@ TEST_F(Support, WithoutForcesTheBoxesDecide) {
   EXPECT_FALSE(seems_to_carry(world, kTray, kBlock));
 }
 
-TEST_F(Support, BoxesAndGaps) {
+TEST_F(Support, GapsBetweenBoxes) {
   put(0.2, 0.05, 0.03, 0, 0);
   const WorldBox a = world_box(world, kTray), b = world_box(world, kBlock);
   EXPECT_NEAR(b.low.x, 0.17, 1e-12);
@@ -150,7 +150,7 @@ TEST_F(Support, BoxesAndGaps) {
 }
 
 // Objects of 6 cm on the table, over its edge at x = 1, on the tray, and partly on the tray.
-TEST_F(Support, ASurfaceAllUnderIt) {
+TEST_F(Support, SurfaceMustBeUnderTheWholeObject) {
   put(0.5, 0, 0.03);
   const Vec3 half{0.03, 0.03, 0.03};
   const auto carried = [&](Vec3 at, int carrier) {
