@@ -34,8 +34,8 @@ class CameraData(SensorData):
     point_cloud: np.ndarray | None = None
     """float32 [B, H, W, 3] m. Point in the camera frame (x right, y up, looking along -z); NaN where nothing is seen."""
     flow: np.ndarray | None = None
-    """float32 [B, H, W, 2] pixels. Where what a pixel sees was in the previous image, minus where it is (u right, v
-    down); NaN where nothing rigid is seen."""
+    """float32 [B, H, W, 2] pixels. Previous image point of the visible surface point minus its current one (u right, v
+    down); NaN where no rigid surface is visible."""
     intrinsics: np.ndarray | None = None
     """float32 [B, 3, 3] pixels. K: image point (u right, v down) of a direction (x right, y down, z forward)."""
     pose: np.ndarray | None = None

@@ -229,7 +229,7 @@ def test_molmospaces_files_are_understood(record_fake, peer_file):
     listing = record_fake("inspect", path).stdout
     line = next(row for row in listing.splitlines() if "tcp_pose" in row)
     assert f"{noise.mean():.4g}" in line and f"{noise.std():.4g}" in line
-    assert "added 1 names of videos" in record_fake("repair", path.parent).stdout
+    assert "added 1 video names" in record_fake("repair", path.parent).stdout
     assert readers.validate(path) == [[]]
     assert record_fake("repair", path.parent).stdout == "nothing to repair\n"
     assert "1 videos" in record_fake("verify", path.parent).stdout

@@ -275,7 +275,7 @@ int run(int argc, char** argv) {
   // Set last, because subcommands inherit the footer.
   program.footer(
       "Use `mjsense COMMAND --help` for the options of a command.\n"
-      "Any other word runs the program mjsense-<word> from PATH.");
+      "An unknown COMMAND runs the program mjsense-COMMAND from PATH.");
 
   std::vector<std::string> known;
   for (const CLI::App* app : program.get_subcommands({}))

@@ -208,7 +208,7 @@ RepairResult repair(const fs::path& path) {
     attempt(file.path, [&] {
       if (const int added = name_videos(file.path); added > 0)
         result.actions.push_back(
-            fmt::format("{}: added {} names of videos", file.path.string(), added));
+            fmt::format("{}: added {} video names", file.path.string(), added));
     });
   }
   return result;

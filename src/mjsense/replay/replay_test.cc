@@ -177,7 +177,7 @@ class RepairNames : public ::testing::Test {
 TEST_F(RepairNames, BelongToTheirBatch) {
   std::string is;
   EXPECT_EQ(was, "episode_00000001_wrist_camera_batch_2_of_2.mp4");
-  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
   in_videos(false, [&](hid_t videos) { is = read_file_name(videos, "wrist_camera"); });
   EXPECT_EQ(is, was);
   EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
@@ -215,7 +215,7 @@ TEST_F(RepairNames, ByOneProcessAtATime) {
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is repairing"));
     EXPECT_TRUE(read_file(path) == bytes);
   }
-  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
 }
 
 // "trajectories_batch_1_of_2.h5.bak" is a user's backup.

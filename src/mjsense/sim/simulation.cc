@@ -380,7 +380,7 @@ void Simulation::step(int control_steps, WorldIds ids) {
 
 void Simulation::set_control(int every, Control control) {
   if (every < 1)
-    throw ValueError(fmt::format("control every {} substeps: must be at least 1", every));
+    throw ValueError(fmt::format("set_control: every is {}: must be at least 1", every));
   control_ = std::move(control);
   control_every_ = control_ ? every : 0;
 }

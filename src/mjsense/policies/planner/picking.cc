@@ -171,7 +171,7 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
         continue;
       }
       if (to_place && !placing_->reaches(world, hand, at)) {
-        refusal = {"with the place out of reach"};
+        refusal = {"with the goal out of reach"};
         if (++misplaced == kMostMisplaced) return say_why(), std::nullopt;
         continue;
       }

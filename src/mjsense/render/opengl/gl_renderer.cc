@@ -185,7 +185,8 @@ class MujocoGl final : public GlRenderer {
  private:
   void take() {
     if (!egl_.take())
-      throw RuntimeError(fmt::format("{}: OpenGL: another thread holds the context", place_));
+      throw RuntimeError(
+          fmt::format("{}: OpenGL: the context is in use by another thread", place_));
   }
 
   // mjrContext keeps its own copies of the materials' texture fields.

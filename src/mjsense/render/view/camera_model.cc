@@ -86,7 +86,7 @@ double undo_fisheye(double r, std::span<const double> k) {
   if (lens == Lens::kBrownConrady)
     throw ValueError(fmt::format(
         "{}: the distortion has no inverse at pixel ({}, {}): with these coefficients the image "
-        "folds over before it; a longer focal length (fx {:.4g} now) or smaller coefficients",
+        "folds over before it; use a longer focal length (fx {:.4g} now) or smaller coefficients",
         place, x, y, 1 / grid.dx));
   const double corner =
       std::max(std::hypot(grid.left, grid.top),
@@ -98,9 +98,9 @@ double undo_fisheye(double r, std::span<const double> k) {
         "radius {:.4g}",
         place, x, y, reach));
   throw ValueError(
-      fmt::format("{}: the distortion has no inverse at pixel ({}, {}): the lens would see more "
-                  "than 89 degrees "
-                  "off its axis there; a longer focal length (fx {:.4g} now, {:.4g} or more)",
+      fmt::format("{}: the distortion has no inverse at pixel ({}, {}): the direction would be "
+                  "more than 89 degrees from the optical axis; use a longer focal length (fx "
+                  "{:.4g} now, {:.4g} or more)",
                   place, x, y, 1 / grid.dx, std::ceil(corner / (grid.dx * reach))));
 }
 

@@ -116,7 +116,7 @@ SensorSpec describe_builtin(const mjModel* m, int id) {
   if (type.type == mjSENS_INSIDESITE && m->sensor_intprm[id * mjNSENS] != 0) {
     spec.unit = "m";
     spec.description =
-        "how far the object juts out of the site; <= 0: enclosed, with that clearance";
+        "distance by which the object protrudes from the site; <= 0: enclosed, with that clearance";
   }
   if (type.type == mjSENS_RANGEFINDER) spec.description = describe_range(m, id, type.description);
   return spec;

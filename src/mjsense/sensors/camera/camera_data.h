@@ -15,7 +15,7 @@ inline constexpr DataField kCameraDataFields[] = {
   {"entity_segmentation", DType::kInt32, "B, H, W, 1", "", "Entity of each pixel, by its place in the scene; -1 where there is none."},
   {"normals", DType::kFloat32, "B, H, W, 3", "", "Unit surface normal in the camera frame; 0 where nothing is seen."},
   {"point_cloud", DType::kFloat32, "B, H, W, 3", "m", "Point in the camera frame (x right, y up, looking along -z); NaN where nothing is seen."},
-  {"flow", DType::kFloat32, "B, H, W, 2", "pixels", "Where what a pixel sees was in the previous image, minus where it is (u right, v down); NaN where nothing rigid is seen."},
+  {"flow", DType::kFloat32, "B, H, W, 2", "pixels", "Previous image point of the visible surface point minus its current one (u right, v down); NaN where no rigid surface is visible."},
   {"intrinsics", DType::kFloat32, "B, 3, 3", "pixels", "K: image point (u right, v down) of a direction (x right, y down, z forward)."},
   {"pose", DType::kFloat32, "B, 4, 4", "m", "X_WC of the image; the camera looks along its -z axis, y is up in the image."},
 };

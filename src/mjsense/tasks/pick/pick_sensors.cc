@@ -11,7 +11,7 @@ std::vector<std::shared_ptr<Sensor>> PickTask::create_task_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors{start_pose_sensor(*this, "obj_start", role)};
   if (auto grasped = grasp_state_sensor(*this, role)) sensors.push_back(std::move(grasped));
   sensors.push_back(std::make_shared<FunctionSensor<float>>(
-      "obj_end", pose_spec("world", "Pose to which the task wants the object lifted."),
+      "obj_end", pose_spec("world", "Goal pose of the lifted object."),
       [this](const World& world, std::span<float> row) {
         write_pose(*goal_pose(world.id, kRole), row.data());
       }));

@@ -194,7 +194,7 @@ std::string_view PickAndPlaceTask::lacks_beside(const World& world, const Judgem
   const int object = episode.objects[0].body, other = episode.objects[1].body;
   const WorldBox a = world_box(world, object), b = world_box(world, other);
   const double gap = gap_from_above(a, b);
-  if (gap < 0 || gap > kBeside) return "the object is not beside the other";
+  if (gap < 0 || gap > kBeside) return "the object is not next to the other one";
   if (norm(now.moved) > kMovedBeside || now.turned > kTurned) return "the other object has moved";
   const int under = bearer(world, object), under_other = bearer(world, other);
   const bool together = under >= 0 && under_other >= 0 ? under == under_other

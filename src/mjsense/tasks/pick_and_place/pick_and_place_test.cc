@@ -201,7 +201,7 @@ TEST(PickAndPlace, NextToRequiresTheSameSupport) {
   };
   EXPECT_EQ(beside(0.03), "");
   EXPECT_EQ(beside(0.055), "");
-  EXPECT_EQ(beside(0.065), "the object is not beside the other");
+  EXPECT_EQ(beside(0.065), "the object is not next to the other one");
   EXPECT_EQ(beside(0.03, {0.06, 0, 0}), "the other object has moved");
   table.put(1, other);
   table.put(0, {start.p + Vec3{0, 0, 0.3}, start.q});
