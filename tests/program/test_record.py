@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense record: what is on disk, that it depends on nothing but the seed, and that it stops cleanly."""
+"""Tests of `mjsense record`: contents of the files, reproducibility from the seed, and clean termination."""
 
 import json
 import pathlib
@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 
-# Small pictures, a few steps: enough for everything but success.
+# Small images and few steps: sufficient for every test that does not need a successful episode.
 QUICK = ["record", "pick", "--size", "64x48", "--horizon", "6", "--keep-failures", "-q"]
 
 
@@ -22,7 +22,7 @@ def rows(dataset):
 
 
 def contents(folder):
-    """{path below folder: bytes} of what a recording is made of."""
+    """{path relative to the folder: bytes} of the files of a recording."""
     folder = pathlib.Path(folder)
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
@@ -46,13 +46,13 @@ def check_cameras(traj, house, start, T):
         assert (video["width"], video["height"], video["r_frame_rate"]) == (160, 96, "500/33")
         points = traj[f"obs/extra/object_image_points/pickup_obj/{camera}/points"]
         assert points.shape == (T, 10, 2) and points.dtype == np.float32
-        if camera == "exo_camera_1":  # the object is seen where its pose is projected
+        if camera == "exo_camera_1":  # the object is visible at the projection of its pose
             p = E @ [*start[:3], 1.0]
             assert np.abs(np.nanmean(points[0], axis=0) - (K @ p)[:2] / p[2] / (160, 96)).max() < 0.05
 
 
 def check_actions(traj, T):
-    """Row t is the action that led to observation t; the last is the done sentinel."""
+    """Row t is the action that led to observation t; the last row is the done sentinel."""
     actions = {k: rows(v) for k, v in traj["actions"].items()}
     assert all(len(v) == T for v in actions.values())
     assert actions["commanded_action"][0] == {} and actions["commanded_action"][-1] != {}
@@ -67,7 +67,7 @@ def check_actions(traj, T):
     np.testing.assert_allclose(panda[5, :7], qpos[5]["arm"], atol=1e-6)
 
 
-def test_a_pick_as_molmospaces_readers_know_it(mjsense):
+def test_pick_has_the_layout_of_molmospaces(mjsense):
     done = mjsense("record", "pick", "--robot", "franka", "--episodes", 2, "--worlds", 2, "--size", "160x96",
                    "--out", "data", "--json", "-q")
     summary = json.loads(done.stdout)
@@ -97,7 +97,7 @@ def test_a_pick_as_molmospaces_readers_know_it(mjsense):
 
 
 def test_absent_objects_are_marked(mjsense):
-    """`floor` has 12 objects, 6 to 10 of them in an episode: the others are NaN in the file, and not present."""
+    """`floor` has 12 objects, of which an episode uses 6 to 10. The others are NaN in the file and marked as absent."""
     mjsense("record", "nav_to_obj", "--episodes", 2, "--horizon", 3, "--keep-failures", "--cameras", "none", "--no-sheet", "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
         for traj in file.values():
@@ -118,7 +118,7 @@ def test_absent_objects_are_marked(mjsense):
     assert actors and all(np.max(stream["max"]) < 50 for stream in actors if stream["count"] > 0)
 
 
-def test_task_info_is_json_by_the_standard(mjsense):
+def test_task_info_is_standard_json(mjsense):
     mjsense("record", "pick_and_place", "--episodes", 2, "--horizon", 3, "--keep-failures", "--cameras", "none", "--no-sheet", "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
         for traj in file.values():
@@ -129,7 +129,7 @@ def test_task_info_is_json_by_the_standard(mjsense):
             assert set(roles) == {"pickup_obj", "place_receptacle"} and all({"body", "actor"} == set(r) for r in roles.values())
 
 
-def test_the_same_bytes_with_other_worlds_and_threads(mjsense):
+def test_bytes_do_not_depend_on_worlds_and_threads(mjsense):
     common = [*QUICK, "--episodes", 3, "--no-sheet"]
     mjsense(*common, "--seed", 5, "--worlds", 1, "--threads", 1, "--out", "a")
     mjsense(*common, "--seed", 5, "--worlds", 3, "--threads", 2, "--out", "b")
@@ -177,7 +177,7 @@ def test_without_cameras(mjsense):
     assert [p.name for p in (mjsense.folder / "data/house_0").iterdir()] == ["trajectories_batch_1_of_1.h5"]
 
 
-def test_failures_are_dropped_unless_asked_for(mjsense):
+def test_failures_are_dropped_by_default(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--max-attempts", 3, "--out", "data", "-q",
                    "--json", rc=1)
     summary = json.loads(done.stdout)
@@ -185,7 +185,7 @@ def test_failures_are_dropped_unless_asked_for(mjsense):
     assert "stopped after 3 attempts" in done.stderr
 
 
-def test_why_an_episode_failed_is_in_the_recording(mjsense):
+def test_recording_contains_the_reason_of_failures(mjsense):
     args = ("record", "pick", "--scene", "shelf", "--cameras", "none", "--episodes", 3, "--max-attempts", 3, "--keep-failures", "-q")
     mjsense(*args, "--horizon", 60, "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
@@ -193,7 +193,7 @@ def test_why_an_episode_failed_is_in_the_recording(mjsense):
         assert {name for name, outcome in outcomes.items() if outcome == "success"} == {
             name for name, traj in file.items() if traj["success"][-1]}  # fmt: skip
     failed = {name: outcome for name, outcome in outcomes.items() if outcome != "success"}
-    # Details of one episode stand in parentheses; outcomes are counted without them.
+    # Parentheses contain details of one episode; outcomes are counted without them.
     counted = {name: outcome.split(" (")[0] for name, outcome in outcomes.items()}
     reasons = {counted[name] for name in failed}
     assert failed and reasons <= {"horizon reached: the object is not lifted", "the policy gave up: found no plan"}
@@ -237,7 +237,7 @@ def interrupt(mjsense, args, signals):
 
 @pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT, signal.SIGINT], [signal.SIGKILL]],
                          ids=["once", "twice", "killed"])
-def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals):
+def test_resumed_recording_equals_an_uninterrupted_one(mjsense, signals):
     args = ["record", "pick", "--size", "64x48", "--horizon", 30, "--keep-failures", "--no-sheet", "--episodes", 4]
     code, err = interrupt(mjsense, [*args, "--worlds", 2, "--out", "data"], signals)
     if signals == [signal.SIGKILL]:
@@ -249,7 +249,7 @@ def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
 
 
-def test_a_scene_that_was_changed_is_another_recording(mjsense):
+def test_resume_rejects_a_changed_scene(mjsense):
     scene = mjsense.folder / "scene.toml"
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
     args = ["record", "pick", "--scene", scene, "--cameras", "none", "--horizon", 3, "--keep-failures", "--episodes", 2, "--out", "data", "-q"]
@@ -257,10 +257,10 @@ def test_a_scene_that_was_changed_is_another_recording(mjsense):
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.03\n')
     assert "'settings/scene_file/gap' was" in mjsense(*args, "--resume", rc=2).stderr
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
-    assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # the same again: nothing else is wrong
+    assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # with the original scene the recording is accepted again
 
 
-def test_progress_is_plain_lines_where_nobody_watches(mjsense):
+def test_progress_without_a_terminal_is_plain_lines(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--keep-failures", "--out", "data")
     assert "1/1 episodes" in done.stderr and "\r" not in done.stderr and "\033" not in done.stderr
     assert "trajectories_batch_1_of_1.h5" in done.stdout

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stdin, stdout and stderr that are closed or full, as a daemon, a lost terminal or a full disk leave them."""
+"""Tests with stdin, stdout and stderr closed or full, as with a daemon, a lost terminal or a full disk."""
 
 import os
 import subprocess
@@ -19,12 +19,12 @@ def run(mjsense, *args, **kwargs):
 
 
 @pytest.mark.parametrize("streams", [(2,), (0, 2), (1, 2), (0, 1, 2)])
-def test_errors_that_nobody_can_read_are_exit_codes(mjsense, streams):
+def test_exit_code_with_closed_streams(mjsense, streams):
     assert run(mjsense, "verify", "missing", preexec_fn=closing(*streams)) == 2
 
 
-def test_words_that_cannot_be_written_end_nothing(mjsense):
-    """A recording goes on when the terminal of its progress is gone, and its files hold no words of stderr."""
+def test_recording_continues_if_progress_cannot_be_written(mjsense):
+    """A recording continues if stderr is closed or full, and text for stderr is never written into its files."""
     with open("/dev/full", "w") as full:
         assert run(mjsense, "verify", "missing", stderr=full) == 2
         assert run(mjsense, "record", "pick", "--out", "full", "--cameras", "none", "--seed", "1", stderr=full, stdout=subprocess.DEVNULL) == 0
@@ -33,4 +33,4 @@ def test_words_that_cannot_be_written_end_nothing(mjsense):
     assert (mjsense.folder / "closed" / name).read_bytes() == (mjsense.folder / "full" / name).read_bytes()
     for word in ("verify", "inspect"):
         assert run(mjsense, word, "closed", stdout=subprocess.DEVNULL, preexec_fn=closing(0, 2)) == 0
-        assert run(mjsense, word, "closed", preexec_fn=closing(1)) == 2  # its answer is lost
+        assert run(mjsense, word, "closed", preexec_fn=closing(1)) == 2  # its result cannot be written

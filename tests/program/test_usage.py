@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The other words of mjsense, and wrong input: one clear line, exit code 2, nothing half-written."""
+"""Tests of the other commands of mjsense, and of invalid input: one line of error, exit code 2, and no incomplete files."""
 
 import json
 import os
@@ -93,7 +93,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("record packing --out x --scene table", "scene 'table' has no receptacle"),
     ("record pick --out x --cameras none extra", "extra"),
 ])
-def test_wrong_input_is_one_clear_line(mjsense, args, line):
+def test_invalid_input_is_a_one_line_error(mjsense, args, line):
     (mjsense.folder / "scene.xml").write_text(SCENE)
     (mjsense.folder / "file").write_text("mine")
     (mjsense.folder / "folder").mkdir()
@@ -112,14 +112,15 @@ def test_wrong_input_is_one_clear_line(mjsense, args, line):
 
 
 def numbers_of_record(mjsense):
-    """(name, kind) of every option of record that takes a number."""
+    """(name, kind) of every numeric option of `record`."""
     fields = json.loads(mjsense("schema").stdout)["structs"]["RecordJobCfg"]["fields"]
     kinds = [(f["option"], f["type"].get("element", f["type"])["kind"]) for f in fields]
     return [(name, kind) for name, kind in kinds if kind in ("int", "unsigned", "number")]
 
 
-def test_numbers_that_do_not_fit_are_refused_wherever_they_are_given(mjsense):
-    """No integer is cut to 32 bits (4294967297 would be 1), and no number is NaN: in experiments, as an option, by --set."""
+def test_numbers_out_of_range_are_rejected_in_all_inputs(mjsense):
+    """Integers beyond 32 bits are rejected, not truncated (4294967297 would become 1), and so is NaN: in experiment files, as
+    options, by --set."""
     wrong = {"int": (2**32 + 1, 1 - 2**32, 2**31, 2**64 + 1, -1, "2.0", '"2"'), "unsigned": (-1, 2**64 + 1, "1.5"), "number": ("nan", "-inf")}
     numbers = numbers_of_record(mjsense)
     assert len(numbers) > 15
@@ -138,7 +139,7 @@ def test_numbers_that_do_not_fit_are_refused_wherever_they_are_given(mjsense):
 
 @pytest.mark.parametrize("args", ("''", "inspect ''", "verify ''", "repair ''", "sensors ''", "scan '' --frame site:s --out x.ply",
                                   "record '' --out x", "record pick --out ''", "record pick --out x --config ''"))  # fmt: skip
-def test_an_empty_word_is_one_clear_line(mjsense, args):
+def test_an_empty_argument_is_a_one_line_error(mjsense, args):
     done = mjsense(*shlex.split(args), rc=2)
     assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1 and not done.stdout
     assert not list(mjsense.folder.iterdir())
@@ -149,7 +150,7 @@ WORDS = ("tasks", "robots", "scenes", "schema", "--help", "--version", "record -
          "record pick --out more --cameras none --horizon 2 --keep-failures -q")  # fmt: skip
 
 
-def test_stdout_that_cannot_be_written_is_an_error_of_every_word(mjsense):
+def test_every_command_fails_if_stdout_cannot_be_written(mjsense):
     (mjsense.folder / "scene.xml").write_text(SCENE)
     mjsense("record", "pick", "--cameras", "none", "--horizon", 2, "--keep-failures", "-q", "--out", "data")
     for word in WORDS:
@@ -158,26 +159,26 @@ def test_stdout_that_cannot_be_written_is_an_error_of_every_word(mjsense):
         assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: No space left on device\n"), word
 
 
-def test_no_word_at_all_shows_the_words(mjsense):
+def test_without_a_command_the_commands_are_listed(mjsense):
     done = mjsense(rc=2)
     assert "record" in done.stderr and "verify" in done.stderr
 
 
-def test_a_folder_that_cannot_be_written(mjsense):
+def test_output_folder_that_cannot_be_created(mjsense):
     (mjsense.folder / "file").write_text("")
     done = mjsense("record", "pick", "--cameras", "none", "--out", "file", rc=2)
     assert "file" in done.stderr and done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", ("file:a:b", "-y", "a b%d", "tcp://x"))
-def test_folders_are_folders_whatever_they_are_called(mjsense, name):
-    """Nothing of a name is an option or an address for ffmpeg."""
+def test_unusual_folder_names(mjsense, name):
+    """ffmpeg must not interpret any part of the folder's name as an option or a protocol."""
     mjsense("record", "pick", "--size", "32x24", "--horizon", 2, "--keep-failures", "-q", f"--out={name}")
     assert "whole: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
     assert sorted(p.name for p in (mjsense.folder / name).iterdir()) == ["contact_sheet.png", "house_0"]
 
 
-def test_another_recording_is_not_written_over(mjsense):
+def test_an_existing_recording_is_not_overwritten(mjsense):
     quick = ["record", "pick", "--cameras", "none", "--horizon", 3, "--keep-failures", "-q", "--out", "data"]
     mjsense(*quick)
     before = (mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5").read_bytes()
@@ -193,7 +194,7 @@ def test_help_and_version(mjsense):
         assert "Usage" in mjsense(word, "--help").stdout
 
 
-def test_other_words_run_programs_of_the_path(mjsense):
+def test_unknown_commands_run_programs_in_path(mjsense):
     tool = mjsense.folder / "bin/mjsense-hello"
     tool.parent.mkdir()
     tool.write_text('#!/bin/sh\necho "hello $*"\nexit 7\n')
@@ -265,7 +266,7 @@ def test_help_is_wrapped_and_shows_two_examples(mjsense, command, columns):
     assert not any(line.endswith(" ") for line in text.splitlines())
 
 
-def test_flags_say_what_they_do(mjsense):
+def test_help_of_flags(mjsense):
     text = unwrapped(mjsense("record", "--help").stdout)
     assert "--no-shadows Do not draw shadows." in text
     assert "--meshes auto|shapes|real" in text
@@ -286,7 +287,7 @@ def test_completion(mjsense, words, expected):
 
 
 def test_completion_in_bash(mjsense):
-    """As bash does it: the script is sourced, the function is called with the words, and leaves what it found in COMPREPLY."""
+    """Completes like bash: sources the script, calls the function with COMP_WORDS, and reads the candidates from COMPREPLY."""
     script = '''source <("$1" completion bash); PATH="$2:$PATH"; COMP_WORDS=(mjsense record --policy p); COMP_CWORD=3; _mjsense
     printf '%s\n' "${COMPREPLY[@]}"'''
     done = subprocess.run(["bash", "-c", script, "bash", mjsense.program, os.path.dirname(mjsense.program)], capture_output=True, text=True)
@@ -305,7 +306,7 @@ BALL = """<mujoco><option timestep="{timestep}"/><worldbody><geom type="plane" s
 
 
 @pytest.mark.parametrize("command", (["sensors"], ["scan", "--frame", "site:imu", "--out", "x.ply"]))
-def test_scenes_in_which_nothing_can_be_measured(mjsense, command):
+def test_invalid_scenes_are_rejected(mjsense, command):
     def run(rc, **values):
         (mjsense.folder / "ball.xml").write_text(BALL.format(**{"timestep": 0.002, "x": 0, **values}))
         return mjsense(command[0], "ball.xml", *command[1:], rc=rc)
@@ -322,9 +323,9 @@ def test_physics_that_fails_prints_no_table(mjsense):
     (mjsense.folder / "ball.xml").write_text(stiff)
     done = mjsense("sensors", "ball.xml", rc=2)
     assert "ball.xml: the physics failed: " in done.stderr and not done.stdout
-    assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # MuJoCo would leave its log
+    assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # without MuJoCo's log file
 
 
-def test_a_recording_says_what_its_sheet_shows(mjsense):
+def test_record_prints_what_the_contact_sheet_shows(mjsense):
     text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "-q", "--out", "d").stdout
     assert "contact sheet, every camera over time (4 of 5 episodes): d/contact_sheet.png" in text
