@@ -68,7 +68,7 @@ TEST(Occupancy, MarksObstaclesOnly) {
   EXPECT_FALSE(free(-1, 1)) << "the cylinder";
   EXPECT_TRUE(free(1, 1)) << "under the lamp";
   EXPECT_TRUE(free(1, -1)) << "on the rug";
-  EXPECT_TRUE(free(-1, -1)) << "what nobody touches";
+  EXPECT_TRUE(free(-1, -1)) << "geoms without collisions";
   EXPECT_EQ(o.clearance(50, 0), 0) << "off the grid";
   // Analytic distances, within one cell.
   EXPECT_NEAR(o.clearance(1, 0), 0.95, 0.06)
