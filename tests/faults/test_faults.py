@@ -61,7 +61,7 @@ def test_damage_to_an_unfinished_recording(lab):
     check(faults.staged(lab))
 
 
-def test_faulty_encoders(lab):
+def test_faulty_and_hanging_encoders(lab):
     check(faults.encoders(lab))
 
 

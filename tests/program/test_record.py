@@ -67,7 +67,7 @@ def check_actions(traj, T):
     np.testing.assert_allclose(panda[5, :7], qpos[5]["arm"], atol=1e-6)
 
 
-def test_pick_has_the_layout_of_molmospaces(mjsense):
+def test_molmospaces_readers_accept_a_pick(mjsense):
     done = mjsense("record", "pick", "--robot", "franka", "--episodes", 2, "--worlds", 2, "--size", "160x96",
                    "--out", "data", "--json", "-q")
     summary = json.loads(done.stdout)
@@ -177,7 +177,7 @@ def test_without_cameras(mjsense):
     assert [p.name for p in (mjsense.folder / "data/house_0").iterdir()] == ["trajectories_batch_1_of_1.h5"]
 
 
-def test_failures_are_dropped_by_default(mjsense):
+def test_failures_are_kept_only_on_request(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--max-attempts", 3, "--out", "data", "-q",
                    "--json", rc=1)
     summary = json.loads(done.stdout)
@@ -185,7 +185,7 @@ def test_failures_are_dropped_by_default(mjsense):
     assert "stopped after 3 attempts" in done.stderr
 
 
-def test_recording_contains_the_reason_of_failures(mjsense):
+def test_recording_contains_the_reason_of_a_failure(mjsense):
     args = ("record", "pick", "--scene", "shelf", "--cameras", "none", "--episodes", 3, "--max-attempts", 3, "--keep-failures", "-q")
     mjsense(*args, "--horizon", 60, "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
@@ -249,7 +249,7 @@ def test_resumed_recording_equals_an_uninterrupted_one(mjsense, signals):
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
 
 
-def test_resume_rejects_a_changed_scene(mjsense):
+def test_recording_with_a_changed_scene_cannot_be_resumed(mjsense):
     scene = mjsense.folder / "scene.toml"
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
     args = ["record", "pick", "--scene", scene, "--cameras", "none", "--horizon", 3, "--keep-failures", "--episodes", 2, "--out", "data", "-q"]

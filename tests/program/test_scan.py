@@ -26,7 +26,7 @@ def points(path):
     return cloud
 
 
-def test_cloud_of_a_wall_and_a_floor(mjsense, room):
+def test_point_cloud_of_a_wall_and_a_floor(mjsense, room):
     done = mjsense("scan", room, "--frame", "site:head", "--out", "cloud.ply")
     cloud = points(mjsense.folder / "cloud.ply")
     assert f"{len(cloud)} of 5760 rays returned" in done.stdout

@@ -19,11 +19,11 @@ def run(mjsense, *args, **kwargs):
 
 
 @pytest.mark.parametrize("streams", [(2,), (0, 2), (1, 2), (0, 1, 2)])
-def test_exit_code_with_closed_streams(mjsense, streams):
+def test_exit_code_if_the_streams_are_closed(mjsense, streams):
     assert run(mjsense, "verify", "missing", preexec_fn=closing(*streams)) == 2
 
 
-def test_recording_continues_if_progress_cannot_be_written(mjsense):
+def test_recording_continues_if_messages_cannot_be_written(mjsense):
     """A recording continues if stderr is closed or full, and text for stderr is never written into its files."""
     with open("/dev/full", "w") as full:
         assert run(mjsense, "verify", "missing", stderr=full) == 2

@@ -118,7 +118,7 @@ def numbers_of_record(mjsense):
     return [(name, kind) for name, kind in kinds if kind in ("int", "unsigned", "number")]
 
 
-def test_numbers_out_of_range_are_rejected_in_all_inputs(mjsense):
+def test_numbers_out_of_range_are_rejected_everywhere(mjsense):
     """Integers beyond 32 bits are rejected, not truncated (4294967297 would become 1), and so is NaN: in experiment files, as
     options, by --set."""
     wrong = {"int": (2**32 + 1, 1 - 2**32, 2**31, 2**64 + 1, -1, "2.0", '"2"'), "unsigned": (-1, 2**64 + 1, "1.5"), "number": ("nan", "-inf")}
@@ -139,7 +139,7 @@ def test_numbers_out_of_range_are_rejected_in_all_inputs(mjsense):
 
 @pytest.mark.parametrize("args", ("''", "inspect ''", "verify ''", "repair ''", "sensors ''", "scan '' --frame site:s --out x.ply",
                                   "record '' --out x", "record pick --out ''", "record pick --out x --config ''"))  # fmt: skip
-def test_an_empty_argument_is_a_one_line_error(mjsense, args):
+def test_empty_argument_is_one_clear_line(mjsense, args):
     done = mjsense(*shlex.split(args), rc=2)
     assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1 and not done.stdout
     assert not list(mjsense.folder.iterdir())
@@ -150,7 +150,7 @@ WORDS = ("tasks", "robots", "scenes", "schema", "--help", "--version", "record -
          "record pick --out more --cameras none --horizon 2 --keep-failures -q")  # fmt: skip
 
 
-def test_every_command_fails_if_stdout_cannot_be_written(mjsense):
+def test_unwritable_stdout_is_an_error_of_every_command(mjsense):
     (mjsense.folder / "scene.xml").write_text(SCENE)
     mjsense("record", "pick", "--cameras", "none", "--horizon", 2, "--keep-failures", "-q", "--out", "data")
     for word in WORDS:
@@ -159,7 +159,7 @@ def test_every_command_fails_if_stdout_cannot_be_written(mjsense):
         assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: No space left on device\n"), word
 
 
-def test_without_a_command_the_commands_are_listed(mjsense):
+def test_no_command_lists_the_commands(mjsense):
     done = mjsense(rc=2)
     assert "record" in done.stderr and "verify" in done.stderr
 
@@ -171,14 +171,14 @@ def test_output_folder_that_cannot_be_created(mjsense):
 
 
 @pytest.mark.parametrize("name", ("file:a:b", "-y", "a b%d", "tcp://x"))
-def test_unusual_folder_names(mjsense, name):
+def test_folder_names_are_never_options_or_addresses(mjsense, name):
     """ffmpeg must not interpret any part of the folder's name as an option or a protocol."""
     mjsense("record", "pick", "--size", "32x24", "--horizon", 2, "--keep-failures", "-q", f"--out={name}")
     assert "whole: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
     assert sorted(p.name for p in (mjsense.folder / name).iterdir()) == ["contact_sheet.png", "house_0"]
 
 
-def test_an_existing_recording_is_not_overwritten(mjsense):
+def test_another_recording_is_not_overwritten(mjsense):
     quick = ["record", "pick", "--cameras", "none", "--horizon", 3, "--keep-failures", "-q", "--out", "data"]
     mjsense(*quick)
     before = (mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5").read_bytes()
@@ -194,7 +194,7 @@ def test_help_and_version(mjsense):
         assert "Usage" in mjsense(word, "--help").stdout
 
 
-def test_unknown_commands_run_programs_in_path(mjsense):
+def test_unknown_commands_run_programs_from_path(mjsense):
     tool = mjsense.folder / "bin/mjsense-hello"
     tool.parent.mkdir()
     tool.write_text('#!/bin/sh\necho "hello $*"\nexit 7\n')
@@ -266,7 +266,7 @@ def test_help_is_wrapped_and_shows_two_examples(mjsense, command, columns):
     assert not any(line.endswith(" ") for line in text.splitlines())
 
 
-def test_help_of_flags(mjsense):
+def test_help_describes_flags(mjsense):
     text = unwrapped(mjsense("record", "--help").stdout)
     assert "--no-shadows Do not draw shadows." in text
     assert "--meshes auto|shapes|real" in text
@@ -306,7 +306,7 @@ BALL = """<mujoco><option timestep="{timestep}"/><worldbody><geom type="plane" s
 
 
 @pytest.mark.parametrize("command", (["sensors"], ["scan", "--frame", "site:imu", "--out", "x.ply"]))
-def test_invalid_scenes_are_rejected(mjsense, command):
+def test_invalid_scenes_are_reported(mjsense, command):
     def run(rc, **values):
         (mjsense.folder / "ball.xml").write_text(BALL.format(**{"timestep": 0.002, "x": 0, **values}))
         return mjsense(command[0], "ball.xml", *command[1:], rc=rc)
@@ -326,6 +326,6 @@ def test_physics_that_fails_prints_no_table(mjsense):
     assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # without MuJoCo's log file
 
 
-def test_record_prints_what_the_contact_sheet_shows(mjsense):
+def test_record_reports_the_contact_sheet(mjsense):
     text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "-q", "--out", "d").stdout
     assert "contact sheet, every camera over time (4 of 5 episodes): d/contact_sheet.png" in text

@@ -22,7 +22,7 @@ def check_prose():
     "Safe with files of strangers.", "The job goes on without it.", "The policy is asked once a step.", "where to? give --out DIR",
     "What cannot be placed is put back.",
 ])  # fmt: skip
-def test_finds(check_prose, tmp_path, text):
+def test_finds_unidiomatic_text(check_prose, tmp_path, text):
     for name, content in (("a.md", text), ("b.md", f"- {text}"), ("c.md", f"| x | {text} |"), ("a.h", f"// {text}"),
                           ("b.cc", f'  throw ValueError("{text}");'), ("a.py", f'"""{text}"""'), ("b.py", f"x = 1  # {text}"),
                           ("a.cmake", f"# {text}"), ("a.sh", f"cat <<'EOF'\n{text}\nEOF"), ("b.sh", f'echo "{text}"'),
@@ -31,7 +31,7 @@ def test_finds(check_prose, tmp_path, text):
         assert list(check_prose.findings(tmp_path / name)), (name, text)
 
 
-def test_finds_a_phrase_that_is_broken_over_two_lines(check_prose, tmp_path):
+def test_finds_a_phrase_across_two_lines(check_prose, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("First line.\n\nThe job goes\non without it.\n")
     assert [line.split(": ", 1)[0] for line in check_prose.findings(page)] == [f"{page}:3"]
@@ -46,12 +46,12 @@ def test_finds_a_phrase_that_is_broken_over_two_lines(check_prose, tmp_path):
     ("a.toml", 'nobody = "beside"'),
     ("a.xml", "<nobody/>"),
 ])  # fmt: skip
-def test_passes(check_prose, tmp_path, name, text):
+def test_plain_text_passes(check_prose, tmp_path, name, text):
     (tmp_path / name).write_text(text + "\n")
     assert not list(check_prose.findings(tmp_path / name))
 
 
-def test_the_repository_has_none(check_prose):
+def test_rewritten_files_have_no_findings(check_prose):
     paths = list(check_prose.files(check_prose.CHECKED))
     assert len(paths) > 1000
     assert [finding for path in paths for finding in check_prose.findings(path)] == []

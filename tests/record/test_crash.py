@@ -59,7 +59,7 @@ def check_readable(record_fake, out, finished):
         assert "\nwhole" in "\n" + record_fake("verify", path).stdout
 
 
-def test_repair_publishes_finished_episodes(record_fake, tmp_path):
+def test_repair_completes_a_killed_recording(record_fake, tmp_path):
     record_fake(tmp_path, *OPTIONS, "--stop-after", 2)
     house = tmp_path / "house_0"
     (house / ".recording/episode_00000099.part.1").mkdir()

@@ -222,7 +222,7 @@ def peer_file(tmp_path):
     return house / "trajectories_batch_1_of_1.h5", noise
 
 
-def test_files_of_molmospaces_can_be_read(record_fake, peer_file):
+def test_molmospaces_files_are_understood(record_fake, peer_file):
     path, noise = peer_file
     done = record_fake("verify", path.parent)
     assert "names no video of camera 'wrist_camera'" in done.stdout and "whole: 1 files, 1 episodes, 40 steps" in done.stdout
