@@ -2,7 +2,7 @@
 """Crafted malicious recordings: each case modifies a valid house (a folder of a recording) so that its contents are inconsistent.
 
 A case is a function of the house's folder; `CASES` maps names to cases. With any of them, no command may crash, hang, use
-excessive memory or access a file outside the folder, and `verify` must not report the recording as whole.
+excessive memory or access a file outside the folder, and `verify` must not report the recording as intact.
 """
 
 import os

@@ -118,7 +118,7 @@ def snapshot(folder: Path) -> dict:
 
 
 def hostile(lab: Lab, names=None) -> Row:
-    """Crafted files: no command may crash, hang or access files outside, and verify must not report any of them as whole."""
+    """Crafted files: no command may crash, hang or access files outside, and verify must not report any of them as intact."""
     row = Row("crafted files, read by verify, inspect, repair and the contact sheet")
     for name, craft in crafted.CASES.items():
         if names is not None and name not in names:

@@ -21,7 +21,8 @@ using ::testing::HasSubstr;
 
 constexpr double kDeg = std::numbers::pi / 180;
 
-// A robot with a camera on a turned body, a ball, a wall east of it, and far away a ball whose parent has no geom.
+// A robot with a camera on a rotated body, a ball, a wall at larger x, and far away another ball,
+// whose parent body has no geom.
 constexpr char kXml[] = R"(
 <mujoco>
   <worldbody>
@@ -302,7 +303,8 @@ TEST(CameraSystem, ErrorsNameTheCamera) {
   EXPECT_THROW(Bench bench(unknown), KeyError);
 }
 
-// A camera that asks for visible objects keeps its pose where it shows them and is moved where it does not.
+// A camera with a requirement on visible objects keeps its pose if it shows them, and is moved
+// otherwise.
 TEST(CameraSystem, ACameraThatDoesNotShowTheObjectIsMoved) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("sees", MountKind::kFixed), mount("blocked", MountKind::kFixed),

@@ -18,7 +18,7 @@ struct GraspObject {
   ObjectShape shape;  // at the size of its model
 };
 
-// Where a task wants its target to be placed.
+// Where a task requires its target to be placed.
 class PlaceScene {
  public:
   virtual ~PlaceScene() = default;

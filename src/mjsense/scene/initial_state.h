@@ -33,8 +33,8 @@ struct Attached {
   Pose moved{};
 };
 
-// Removes and returns the keyframes of a spec, because MuJoCo would make each a keyframe of the whole
-// scene.
+// Removes and returns the keyframes of a spec, because attaching it with MuJoCo would make each of
+// them a keyframe of the whole scene.
 std::vector<Keyframe> take_keyframes(mjSpec* spec);
 
 // Adds the scene's keyframes to the spec with names and times only; `base` holds those of the base.

@@ -183,11 +183,12 @@ TEST(BaseRoute, DifferentialBaseMovesAlongItsHeading) {
   }
 }
 
-// A corridor 1.2 m wide, too narrow for a base of five discs in a row, 1.8 m long, to turn in by 45 degrees:
+// A corridor 1.2 m wide. The base consists of five discs in a row, 1.8 m long, and has no space to
+// turn by 45 degrees:
 //
 //   ---------------------
-//      o o o o o           it wants to be there
-//      o o o o o           it stands here
+//      o o o o o           goal
+//      o o o o o           start
 //   ---------------------
 TEST(BaseRoute, ADifferentialBaseDoesNotSlide) {
   std::string discs;
@@ -212,7 +213,8 @@ TEST(BaseRoute, ADifferentialBaseDoesNotSlide) {
   }
 }
 
-// Of two passages 1.5 m long, 0.7 and 1.2 m wide, a disc of 0.4 m takes the wide one, although the other is nearer.
+// There are two passages 1.5 m long, 0.7 and 1.2 m wide. A disc of 0.4 m takes the wide one, although
+// the narrow one is nearer.
 TEST(BaseRoute, KeepsClearWhereThereIsRoom) {
   for (const int side : {1, -1}) {  // of the wide passage
     const auto wall = [&](double from, double to) {
