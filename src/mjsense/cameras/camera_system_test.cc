@@ -303,8 +303,7 @@ TEST(CameraSystem, ErrorsNameTheCamera) {
   EXPECT_THROW(Bench bench(unknown), KeyError);
 }
 
-// A camera with a requirement on visible objects keeps its pose if it shows them, and is moved
-// otherwise.
+// A camera that asks for visible objects keeps its pose where it shows them and is moved where it does not.
 TEST(CameraSystem, ACameraThatDoesNotShowTheObjectIsMoved) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("sees", MountKind::kFixed), mount("blocked", MountKind::kFixed),

@@ -28,8 +28,8 @@ struct Attached {
   bool fixed_base = false;
   bool wrapped = false;        // attached below "<name>/mocap_base"
   std::vector<Keyframe> keys;  // at most one of an entity
-  // Transform from the root's pose in the entity's own model to its pose in the scene. It is applied
-  // to the root's pose in a keyframe.
+  // Transform from the root's pose in the entity's own model to its pose in the scene, also applied
+  // to the root's pose in keyframes.
   Pose moved{};
 };
 

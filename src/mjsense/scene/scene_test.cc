@@ -353,7 +353,7 @@ TEST(Scene, ABaseKeepsItsKeyframes) {
   check(Scene(std::move(saved)).model());
 }
 
-// Two instances of a model have their configured poses, also in the keyframe.
+// Two instances of a model stand where they were put, in their keyframe too.
 TEST(Scene, AKeyframeMovesWithItsEntity) {
   const char* legged =
       "<mujoco><worldbody><body pos='0 0 .3'><freejoint/><geom size='.1'/></body></worldbody>"
@@ -387,8 +387,7 @@ TEST(Scene, AMocapKeyframeMovesWithItsEntity) {
               ElementsAre(3, 0, 1.5));
 }
 
-// The root is inside frames with quaternions and Euler angles. pos and quat of the configuration
-// are its pose in the world.
+// Frames about the root, by quaternion and by Euler angles: pos and quat are of the root in the world.
 TEST(Scene, ARootInAFrameStandsWhereItIsPut) {
   const char* framed =
       "<mujoco><worldbody><frame pos='1 0 0' euler='0 0 90'><frame pos='0 0 2'>"

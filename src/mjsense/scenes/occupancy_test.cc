@@ -213,8 +213,8 @@ TEST(BaseRoute, ADifferentialBaseDoesNotSlide) {
   }
 }
 
-// There are two passages 1.5 m long, 0.7 and 1.2 m wide. A disc of 0.4 m takes the wide one, although
-// the narrow one is nearer.
+// There are two passages 1.5 m long, 0.7 and 1.2 m wide. A disc of 0.4 m takes the wide one,
+// although the narrow one is nearer.
 TEST(BaseRoute, KeepsClearWhereThereIsRoom) {
   for (const int side : {1, -1}) {  // of the wide passage
     const auto wall = [&](double from, double to) {

@@ -325,7 +325,7 @@ TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
   EXPECT_THAT(camera->cast_ids, ElementsAre(1));
 }
 
-// A sensor of any stage is computed after the casts of its inputs, and its own cast follows.
+// Whatever its own stage, a sensor is computed after the casts of its inputs, and casts after those.
 TEST(Simulation, ASensorIsComputedAfterTheCastsThatItReads) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto camera = add(sim, "camera", Stage::kCast);

@@ -149,8 +149,7 @@ TEST(Imu, EveryAxisHasItsOwnTolerance) {
   }
 }
 
-// A misaligned axis measures another axis with the sine of the misalignment angle as a factor. The
-// tolerance is three standard deviations.
+// An axis sees of another one the sine of the angle between the axis and where it should be; the tolerance is three standard deviations.
 TEST(Imu, AnAxisSeesPartOfTheOthers) {
   ImuSensorCfg cfg = imu("");
   cfg.model.accelerometer.cross_axis_tolerance = 0.06;
