@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a change brings: cameras and rays of this build and of another of ours, in turns in one run.
+"""Compares cameras and rays of this build with those of another build of mjsense. The two builds take turns in one run.
 
     ./dev bench builds --other=../before/build/release
 
-`--other` is a release build of another checkout, of the program mjsense_bench and the Python package. Views as in cameras.py, 640 x 480, one
-thread, everything that a view changes changes before every image; rays as in rays.py, with stand-ins for the robots.
+`--other` is the release build of another checkout, with the program mjsense_bench and the Python package. The views are those of
+cameras.py at 640 x 480 on one thread; everything that a view varies is changed before every image. The rays are those of rays.py,
+with stand-ins for the robots.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ ROUNDS = 5
 
 
 def of_view(name: str) -> dict[str, float]:
-    """CPU ms of an image of each kind, in this process's build."""
+    """CPU milliseconds per image of each kind, measured with the build that this process uses."""
     from camera_rate import Ours, Shot
 
     ours = Ours(VIEWS[name], [Shot(SIZE, *kind) for kind in KINDS.values()], worlds=2, threads=1)
@@ -40,7 +41,7 @@ def measured(build: pathlib.Path, view: str) -> dict[str, float]:
 
 
 def rays(build: pathlib.Path) -> dict[str, float]:
-    """Microseconds of a run of each benchmark."""
+    """Microseconds per iteration of each benchmark."""
     names = "|".join(f"^{name}(/real_time)?$" for name in RAYS)
     command = [build / "mjsense_bench", f"--benchmark_filter={names}", "--benchmark_format=json", "--benchmark_min_time=0.1"]
     text = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
@@ -48,7 +49,7 @@ def rays(build: pathlib.Path) -> dict[str, float]:
 
 
 def medians(builds: list[pathlib.Path], measure) -> list[dict[str, float]]:
-    """Of each build, by what was measured; the builds take turns."""
+    """For each build, the median of every measurement by its name. The builds take turns."""
     rounds = [[measure(build) for build in builds] for _ in range(ROUNDS)]
     return [{key: statistics.median(r[i][key] for r in rounds) for key in rounds[0][i]} for i in range(len(builds))]
 
@@ -56,7 +57,7 @@ def medians(builds: list[pathlib.Path], measure) -> list[dict[str, float]]:
 def main() -> None:
     other = [a.removeprefix("--other=") for a in sys.argv if a.startswith("--other=")]
     if not other:
-        sys.exit("builds: --other=DIR is missing: the build/release of another checkout")
+        sys.exit("builds: pass --other=DIR, the folder build/release of another checkout")
     builds = [ROOT / "build/release", pathlib.Path(other[0]).resolve()]
     rows = []
     for name, view in VIEWS.items():

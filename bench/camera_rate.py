@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Our images a second in a view of camera_scenes.py: what all camera benchmarks compare with their peer."""
+"""Measures the images per second of mjsense in a view of camera_scenes.py. All camera benchmarks compare this rate with their
+peer."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import camera_scenes
-import harness  # noqa: F401  finds mjsense
+import harness  # noqa: F401  adds the measured build to sys.path
 import numpy as np
 from camera_scenes import View
 
@@ -29,8 +30,8 @@ class Shot:
 
 
 class Ours:
-    """Shots of one view in `worlds` worlds; every call of `frame` changes everything that the view changes, then times one shot's images
-    alone."""
+    """Cameras of one view in `worlds` worlds. `frame` changes everything that the view varies, then measures only the rendering
+    of one shot."""
 
     def __init__(self, view: View, shots: Sequence[Shot], worlds: int, threads: int = CPUS) -> None:
         cameras = [
@@ -49,7 +50,7 @@ class Ours:
         self.frames = 0
 
     def frame(self, shot: int = 0) -> tuple[float, float]:
-        """CPU seconds of all threads, and wall seconds."""
+        """CPU seconds of all threads and wall seconds for one image of each world."""
         self.sim.qpos[:] = camera_scenes.poses(self.qpos, self.sim.num_worlds, self.frames)
         for name, values in camera_scenes.model_fields(self.sim.model, self.view, self.sim.num_worlds, self.frames, "w/").items():
             self.sim.randomize(name, values)
@@ -60,19 +61,19 @@ class Ours:
         return time.process_time() - cpu, time.perf_counter() - wall
 
     def rate(self, shot: int = 0) -> float:
-        """Images a CPU second."""
+        """Images per CPU second."""
         self.frame(shot)
         return self.sim.num_worlds / statistics.median(self.frame(shot)[0] for _ in range(RUNS))
 
 
 def of_scene(name: str) -> View:
-    """The camera of a scene where one is enough."""
+    """The view of the main camera of a scene (CAMERAS); only the state changes."""
     return View(name, name, camera_scenes.CAMERAS[name])
 
 
 @dataclasses.dataclass
 class Result:
-    rate: float  # images a CPU second
+    rate: float  # images per CPU second
     first: dict[str, np.ndarray]  # the images of world 0 in frame 0
 
 

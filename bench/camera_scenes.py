@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes for the camera benchmarks and pictures.py. Third-party models come from their PyPI wheels (fetch.py).
 
-The environments of peers import this file too: nothing but MuJoCo and NumPy is needed.
+Programs in the peers' environments import this file too, so it must depend on MuJoCo and NumPy only.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from fetch import wheel
 
 HERE = pathlib.Path(__file__).resolve().parent
-CAMERAS = {"panda": "view", "kitchen": "view", "go1": "head"}  # of each scene, where one is enough
+CAMERAS = {"panda": "view", "kitchen": "view", "go1": "head"}  # the main camera of each scene
 SHOWN_GROUPS = (0, 1, 2)
 
 
 def spec_of(scene: str) -> mujoco.MjSpec:
-    """A scene by the name of its function, with that function's arguments after colons: crowd:1000."""
+    """A scene by the name of its function in this file; the function's arguments follow after colons: crowd:1000."""
     name, *values = scene.split(":")
     return globals()[name](*map(int, values))
 
@@ -29,23 +29,24 @@ def compiled(scene: str) -> mujoco.MjModel:
 
 
 def poses(qpos: np.ndarray, worlds: int, frame: int) -> np.ndarray:
-    """[worlds, nq]: everything moves a little from frame to frame and world to world; frame 0 of world 0 is `qpos`."""
+    """[worlds, nq]: all joints move slightly from frame to frame and differ between worlds; frame 0 of world 0 is `qpos`."""
     return qpos + 1e-3 * (frame + np.arange(worlds)[:, None] / worlds)
 
 
 @dataclasses.dataclass(frozen=True)
 class View:
-    """What a benchmark of cameras looks at, and what differs from image to image and world to world besides the state."""
+    """A scene and camera for benchmarks, and what varies between images and worlds in addition to the state."""
 
     label: str
     scene: str
     camera: str
-    moves: bool = False  # the camera's own place in the model; one that a body carries moves with the state
-    randomised: bool = False  # lights and materials
-    episode: bool = False  # `moves` and `randomised` are of a world's episode, of which all frames are: what differs from frame to frame is the state
+    moves: bool = False  # vary cam_pos and cam_quat; a camera on a moving body moves with the state anyway
+    randomised: bool = False  # vary lights and materials
+    episode: bool = False  # `moves` and `randomised` apply once per episode: from frame to frame only the state changes
 
 
-# What people train with first; a camera that stands still over one scene is the case that a cache of what stands still helps most.
+# Moving cameras and randomised worlds, which are usual in training, come first. Fixed cameras come last: they gain most from
+# caches of static geometry.
 VIEWS = {
     "panda_wrist": View("Panda's wrist camera", "panda", "robot0_eye_in_hand"),
     "panda_moving": View("Panda table, camera moving", "panda", "view", moves=True),
@@ -60,7 +61,7 @@ VIEWS = {
 }
 
 
-# What grows: geoms, triangles, lights.
+# Scenes that grow in the number of geoms, triangles or lights.
 GROWTH = {
     **{f"geoms_{n}": View(f"{n:,} geoms", f"crowd:{n}", "view", moves=True) for n in (100, 1000, 10000)},
     **{f"triangles_{n}": View(f"{n:,} triangles", f"boulder:{n}", "view", moves=True) for n in (10000, 100000, 1000000)},
@@ -69,7 +70,7 @@ GROWTH = {
 
 
 def model_fields(model: mujoco.MjModel, view: View, worlds: int, frame: int, prefix: str = "") -> dict[str, np.ndarray]:
-    """Fields of the model, [worlds, ...], that this frame's images have of their own."""
+    """Model fields, [worlds, ...], that the view varies, with their values in this frame."""
     fields = {}
     frame = 0 if view.episode else frame
     phase = frame + np.arange(worlds) / worlds
@@ -94,7 +95,7 @@ def model_fields(model: mujoco.MjModel, view: View, worlds: int, frame: int, pre
 
 
 def describe(model: mujoco.MjModel) -> str:
-    """The scene's size: what cameras see of it. Planes and primitives have no triangles."""
+    """Numbers of geoms, triangles and lights that cameras see. Planes and primitives have no triangles."""
     alpha = np.where(model.geom_matid >= 0, model.mat_rgba[model.geom_matid, 3], model.geom_rgba[:, 3])
     visible = np.isin(model.geom_group, SHOWN_GROUPS) & (alpha > 0)
     ids = model.geom_dataid
@@ -105,7 +106,7 @@ def describe(model: mujoco.MjModel) -> str:
 
 
 def rest(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Fixes what could fall: one free joint is the most that an entity may have."""
+    """Removes the free joints: an entity may have at most one."""
     for joint in [j for j in spec.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]:
         spec.delete(joint)
     return spec
@@ -116,12 +117,13 @@ def gallery() -> mujoco.MjSpec:
 
 
 def soft() -> mujoco.MjSpec:
-    """Cloth on a ball, a rope on a post, a soft block, a skinned beam."""
+    """A cloth on a ball, a rope on a post, a soft block and a skinned beam."""
     return mujoco.MjSpec.from_file(str(HERE / "soft.xml"))
 
 
 def crowd(count: int, lights: int = 1) -> mujoco.MjSpec:
-    """Boxes and balls, one a square metre, one of which moves; seen from the middle. The sun shines, other lights are lamps."""
+    """Boxes and balls, one per square metre, of which one moves, seen from the middle. The first light is directional; further
+    lights are lamps."""
     rng = np.random.default_rng(0)
     spec = mujoco.MjSpec()
     spec.visual.headlight.active = 0
@@ -145,7 +147,7 @@ def crowd(count: int, lights: int = 1) -> mujoco.MjSpec:
 
 
 def boulder(triangles: int) -> mujoco.MjSpec:
-    """A rough ball of so many triangles that moves over a plane."""
+    """A rough ball with this number of triangles that turns above a plane."""
     spec = crowd(2)
     n = round(np.sqrt(triangles / 2))
     theta, phi = np.meshgrid(np.linspace(0.01, np.pi - 0.01, n + 1), np.linspace(0, 2 * np.pi, n, endpoint=False), indexing="ij")
@@ -163,12 +165,12 @@ def boulder(triangles: int) -> mujoco.MjSpec:
 
 
 def pick() -> mujoco.MjSpec:
-    """Our plain table: the FR3 on its station, with its primitive visuals."""
+    """The scene `table` of mjsense: the FR3 on its station, drawn with primitive shapes."""
     models = HERE.parent / "models"
     spec = mujoco.MjSpec.from_file(str(models / "scenes" / "table" / "room.xml"))
     for name in ("station", "fr3"):
         part = mujoco.MjSpec.from_file(str(models / "robots" / "franka" / f"{name}.xml"))
-        height = 0.58 if name == "fr3" else 0  # of the station's top
+        height = 0.58 if name == "fr3" else 0  # m, top of the station
         spec.attach(part, prefix=f"{name}/", frame=spec.worldbody.add_frame(pos=[0, 0, height]))
     for i, name in enumerate(("red_block", "soup_can", "mug", "pear")):
         item = mujoco.MjSpec.from_file(str(models / "objects" / f"{name}.xml"))
@@ -216,10 +218,10 @@ def panda() -> mujoco.MjSpec:
     hand = next(b for b in spec.bodies if b.name.endswith("right_hand"))
     gripper = mujoco.MjSpec.from_file(str(assets / "grippers/panda_gripper.xml"))
     spec.attach(gripper, prefix="gripper0_", frame=hand.add_frame())
-    for geom in spec.geoms:  # robosuite shows group 1 only: group 0 are collision shapes in the same places
+    for geom in spec.geoms:  # robosuite shows only group 1; group 0 has the collision shapes of the same bodies
         if geom.group == 0:
             geom.group = 4
-    for i, name in enumerate(("can", "milk", "bread", "cereal", "lemon")):  # these have one geom for both
+    for i, name in enumerate(("can", "milk", "bread", "cereal", "lemon")):  # one geom for both display and collision
         item = mujoco.MjSpec.from_file(str(assets / f"objects/{name}.xml"))
         spec.attach(item, prefix=f"{name}_", frame=spec.worldbody.add_frame(pos=[-0.05 + 0.09 * i, 0.28 * (-1) ** i, 0.88]))
     for light in spec.lights:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images a second of CPU time: ours beside MuJoCo's classic renderer (EGL, in software), everything that a view changes changed before
-every image (camera_scenes.VIEWS): moving cameras and randomised worlds first, a camera that stands still as a case of its own.
+"""Images per CPU second of mjsense and of MuJoCo's classic renderer (EGL, in software).
 
-The classic renderer has shadow maps of 4096 (MuJoCo's default), of 1024, or none, and no multisampling (its fastest setting); both
-sides have one thread, and CPU time is counted, so that other work on the machine does not decide. Rendering alone is timed: physics
-and mj_forward are not, updating our ray scene and MuJoCo's mjvScene are. Names of views and sizes as arguments (panda_wrist, 640x480)
-measure these alone.
+Everything that a view varies is changed before every image (camera_scenes.VIEWS): moving cameras and randomised worlds come
+first, fixed cameras are separate cases. The classic renderer has shadow maps of 4096 (MuJoCo's default), of 1024, or none, and no
+multisampling (its fastest setting). Both sides use one thread, and CPU time is measured, so that other work on the machine has
+little influence. Measured is rendering, including the update of the ray scene of mjsense and of MuJoCo's mjvScene, but not
+physics or mj_forward. Arguments are views and sizes to measure (panda_wrist, 640x480); the default is all.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MAPS = {"4096": "classic, shadow maps 4096", "1024": "classic, shadow maps 1024"
 
 
 def main() -> None:
-    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe draws in the thread that calls it
+    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe draws in the calling thread
     wheel("PyOpenGL")
     views = [v for v in VIEWS if v in sys.argv] or list(VIEWS)
     sizes = [s for s in SIZES if f"{s[0]}x{s[1]}" in sys.argv] or list(SIZES)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images a second of CPU time beside Filament, MuJoCo 4's physically based renderer, through Vulkan: Mesa's lavapipe, without a GPU.
+"""Images per CPU second compared with Filament, MuJoCo 4's physically based renderer, through Vulkan (Mesa's lavapipe, without a
+GPU).
 
-rgb with shadows on both sides, without Filament's reflections and multisampling; then depth. Poses change before every image; physics and
-mj_forward are not timed. CPU time is counted, so on a GPU these figures mean nothing. Filament gives a scene another look (its own
-lights, tone mapping): --pictures=FOLDER writes both. A row says on how many pixels the depths are the same.
+First rgb with shadows on both sides, without Filament's reflections and multisampling; then depth. Poses change before every
+image; physics and mj_forward are not measured. CPU time is measured, so the figures are meaningless on a GPU. Scenes look
+different in Filament (its own lights, tone mapping): --pictures=FOLDER writes both images. One row gives the share of pixels with
+equal depth.
 """
 
 from __future__ import annotations
@@ -49,4 +51,4 @@ if __name__ == "__main__":
     try:
         main()
     except Unavailable as error:
-        print(f"cameras_filament left out (it needs a Vulkan driver, mesa-vulkan-drivers): {error}", file=sys.stderr)
+        print(f"cameras_filament skipped (it needs a Vulkan driver, mesa-vulkan-drivers): {error}", file=sys.stderr)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an image costs as scenes grow: by geoms, triangles and lights (camera_scenes.GROWTH). The camera and what can move do before every
-image, all lights cast shadows.
+"""CPU time of an image as scenes grow in geoms, triangles and lights (camera_scenes.GROWTH). The camera and all movable objects
+move before every image; all lights cast shadows.
 
-84 x 84, one thread on both sides, CPU time. Beside it MuJoCo's classic renderer as in cameras.py, with its default shadow maps of 4096
-and with 1024. Names of views as arguments (geoms_1000) measure these alone.
+Images are 84 x 84; both sides use one thread. The peer is MuJoCo's classic renderer as in cameras.py, with its default shadow
+maps of 4096 and with 1024. Arguments are views to measure (geoms_1000); the default is all.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SIZE = (84, 84)
 
 
 def main() -> None:
-    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe draws in the thread that calls it
+    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe draws in the calling thread
     wheel("PyOpenGL")
     rows = []
     for name in [v for v in GROWTH if v in sys.argv] or list(GROWTH):

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an image costs by its pixels, by the number of worlds, and on two threads. All rgb with shadows, poses changed before every image.
+"""Time of an image by its number of pixels, by the number of worlds, and on two threads. All images are rgb with shadows; poses
+change before every image.
 
-Worlds: CPU time of an 84 x 84 image on one thread in 1, 16 and 256 worlds; a ratio of 1 says that worlds cost nothing beyond their rays.
-Pixels: CPU time of a pixel in images of three sizes. Threads: wall time of the same images on one thread and on two, which needs a
-machine that does nothing else; many small images are spread by worlds, a few large ones by their parts.
+Worlds: CPU time of an 84 x 84 image on one thread in 1, 16 and 256 worlds; at a ratio of 1, additional worlds cost only their
+rays. Pixels: CPU time per pixel in images of three sizes. Threads: wall time of the same images on one and on two threads, which
+needs an otherwise idle machine. Many small images are distributed over the threads by world, a few large ones by parts of the
+image.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ def by_worlds(name: str) -> list[Row]:
     for worlds in (1, 16, 256):
         case = Ours(of_scene(name), [Shot(SMALL)], worlds, threads=1)
         case.frame()
-        # 256 images in each measurement, for one alone is short.
+        # 256 images per measurement, because a single image takes too little time to measure.
         seconds = [sum(case.frame()[0] for _ in range(256 // worlds)) for _ in range(RUNS)]
         rows.append(lower(f"{name}: an image of 84x84, worlds: {worlds}", 1e6 * statistics.median(seconds) / 256, "us", rows, "1 world"))
     return rows
@@ -42,7 +44,7 @@ def by_pixels(name: str) -> list[Row]:
 
 
 def lower(case: str, cost: float, unit: str, before: list[Row], first: str) -> Row:
-    """Beside the first of the rows before it; called `first`."""
+    """A row that is compared with the first row of `before`, whose column is named `first`."""
     return Row(case, cost, unit, before[0].ours if before else None, first if before else "", higher_is_better=False)
 
 
@@ -57,7 +59,8 @@ def by_threads(name: str) -> list[Row]:
 
 
 def median_seconds(*cases: Ours, runs: int) -> list[float]:
-    """Median wall seconds of a frame of each; they take turns, so that a machine that drifts drifts for all."""
+    """Median wall seconds of a frame of each case. The cases take turns, so that changes in the machine's speed affect all
+    alike."""
     for case in cases:
         case.frame()
     times = [[case.frame()[1] for case in cases] for _ in range(runs)]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images a second of CPU time beside mujoco_warp's cameras on the CPU, the renderer of mjlab's CameraSensor.
+"""Images per CPU second compared with mujoco_warp's cameras on the CPU, the renderer of mjlab's CameraSensor.
 
-64 worlds, 84 x 84, rgb and depth together, both with shadows and both without (the peer's default), in the views of camera_scenes.VIEWS;
-physics and kinematics are not timed. Rows say on how many pixels the depths are the same, so that both are known to draw the same
-scene; --pictures=FOLDER writes what both drew. Names of views as arguments measure these alone. The first run compiles the peer's
-kernels, about a minute.
+64 worlds, 84 x 84, rgb and depth together, in the views of camera_scenes.VIEWS: once with shadows on both sides and once without
+(the peer's default). Physics and kinematics are not measured. Rows give the share of pixels with equal depth, which shows that
+both sides render the same scene; --pictures=FOLDER writes the images of both. Arguments are views to measure; the default is all.
+The first run compiles the peer's kernels, which takes about a minute.
 """
 
 from __future__ import annotations
@@ -51,4 +51,4 @@ if __name__ == "__main__":
     try:
         main()
     except Unavailable as error:
-        print(f"cameras_warp left out: {error}", file=sys.stderr)
+        print(f"cameras_warp skipped: {error}", file=sys.stderr)

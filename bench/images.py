@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures side by side, and how far apart they are."""
+"""Writes images side by side and computes how much they differ."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def write_png(path: pathlib.Path, image: np.ndarray) -> None:
 
 
 def write_sheet(path: pathlib.Path, *images: np.ndarray) -> None:
-    """Side by side, small ones enlarged."""
+    """Writes the images side by side; small images are enlarged."""
     scale = max(1, 300 // images[0].shape[0])
     write_png(path, np.concatenate([image.repeat(scale, 0).repeat(scale, 1) for image in images], axis=1))
 
@@ -51,5 +51,5 @@ def ssim(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def same_depth(a: np.ndarray, b: np.ndarray) -> float:
-    """Percent of the pixels, among those where either sees something, on which both see it at the same distance to 1 cm."""
+    """Percentage of pixels whose depths agree within 1 cm, among the pixels in which at least one image has a surface."""
     return float(100 * (np.abs(a - b) < 0.01)[(a > 0) | (b > 0)].mean())

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The main job end to end: a planner drives a Franka to pick, two cameras watch, episodes land on disk.
+"""The main use case end to end: recording picks of a Franka by the planner with two cameras.
 
-Steps and frames a second over the whole job, and where the time goes. `encoders` and `files` are processor seconds spent
-beside the loop, in other processes and threads, and compete with it for the CPUs. `all CPUs together` is the processor time of
-the whole job, encoders included, a step: unlike the rates it hardly depends on what else the machine does. The real meshes of the
-arm are gymnasium-robotics'.
+Measures steps and frames per second of the whole job, and how its time is divided. `encoders` and `files` are CPU seconds spent
+in parallel to the loop, in other processes and threads, which compete with it for the CPUs. `all CPUs together` is the CPU time
+of the whole job per step, encoders included; unlike the rates it hardly depends on other load of the machine. The arm's real
+meshes come from gymnasium-robotics.
 """
 
 import json

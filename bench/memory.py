@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a simulation holds in memory: a mesh of a million triangles the first and the second time, and every world more.
+"""Memory of a simulation: of a mesh of a million triangles in a first and in a second simulation, and of each additional world.
 
-Resident memory of a process of its own for each figure, after a step and a frame of every sensor; of geometry without MuJoCo's model, which
-every simulation has of its own. A world is what 128 more of them take, divided; beside it as many mjData of MuJoCo's alone.
+Each figure is the resident memory of a separate process after one step and one frame of every sensor. Figures of geometry exclude
+MuJoCo's mjModel, of which every simulation has a copy. The memory of a world is that of 128 additional worlds divided by 128; it
+is compared with the memory of the same number of mjData.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ SCENES = {"go1": "Go1 on a height field, head camera, height scan, feet", "panda
 
 
 def resident() -> float:
-    """MB of this process."""
+    """Resident memory of this process in MB."""
     gc.collect()
     with open("/proc/self/statm") as f:
         return int(f.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -43,7 +44,8 @@ def run(sim: mjs.Simulation) -> mjs.Simulation:
 
 
 def of_geometry(triangles: str) -> list[float]:
-    """MB that the first and the second simulation add beside their mjModel, each of a scene of its own; MB of that model."""
+    """[MB that the first simulation adds, MB that the second adds, MB of mjModel]. Each simulation has a separate scene; the
+    first two figures exclude mjModel."""
     held, added = [], []
     for _ in range(2):
         scene = scene_of(f"boulder:{triangles}", "view")
@@ -55,7 +57,7 @@ def of_geometry(triangles: str) -> list[float]:
 
 
 def of_worlds(name: str, worlds: str) -> list[float]:
-    """MB of a simulation of so many worlds."""
+    """MB of a simulation with this number of worlds."""
     if name == "go1":
         scan = mjs.RayCastSensorCfg(name="scan", frame=mjs.ObjRef("body", "w/trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1))
         feet = mjs.ContactMatch(mode="geom", pattern=r".*_foot_collision", entity="w")
@@ -69,7 +71,7 @@ def of_worlds(name: str, worlds: str) -> list[float]:
 
 
 def of_mujoco(name: str, worlds: str) -> list[float]:
-    """MB of as many mjData."""
+    """MB of this number of mjData."""
     model = camera_scenes.compiled(name)
     before = resident()
     data = [mujoco.MjData(model) for _ in range(int(worlds))]
@@ -79,7 +81,7 @@ def of_mujoco(name: str, worlds: str) -> list[float]:
 
 
 def measured(what: str, *arguments: str) -> list[float]:
-    """What `of_<what>` finds in a process that did nothing before."""
+    """The result of `of_<what>` in a new process."""
     done = subprocess.run([sys.executable, __file__, "--child", what, *arguments], check=True, stdout=subprocess.PIPE, text=True)
     return [float(x) for x in done.stdout.split()]
 

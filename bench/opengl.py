@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes MuJoCo's classic renderer usable. To be imported before mujoco, which looks for PyOpenGL once, when it is imported itself."""
+"""Makes MuJoCo's classic renderer usable: selects EGL and finds PyOpenGL. Import it before mujoco, which looks for PyOpenGL at
+its import."""
 
 import importlib.util
 import os

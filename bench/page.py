@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the tables of docs/performance_notes.md from the last runs, and those of README.md and docs/performance.md from these tables:
-`python bench/page.py`. No figure is typed by hand.
+"""Writes the tables of docs/performance_notes.md from the last runs, and those of README.md and docs/performance.md from these
+tables: `python bench/page.py`. No figure in them is edited by hand.
 
-Each benchmark leaves its rows in .cache/bench/results. Between `<!-- bench NAME -->` and `<!-- end -->` a page has the table of that
-benchmark, with the machine and its load. If the benchmark was not run, the table stays as it is. The parts of a benchmark that was run in
-parts become one table.
+Each benchmark stores its rows in .cache/bench/results. Between `<!-- bench NAME -->` and `<!-- end -->` a page has the table of
+that benchmark, with the machine and its load. If the benchmark was not run, its table is not changed. If it was run in parts, the
+parts are combined into one table.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from harness import RESULTS, ROOT, table
 
 
 def runs(name: str) -> list[dict]:
-    """The whole run, or its parts in the order of the views."""
+    """The stored runs of a benchmark: one complete run, or its parts in the order of VIEWS."""
     labels = [view.label for view in VIEWS.values()]
     found = [json.loads(p.read_text()) for p in RESULTS.glob("*.json") if p.stem.split("-")[0] == name]
 
@@ -36,7 +36,7 @@ def under(found: list[dict]) -> str:
 def block(name: str, before: str) -> str:
     found = runs(name)
     if not found:
-        print(f"page: no results of {name}, its table stays as it is", file=sys.stderr)
+        print(f"page: no results of {name}; its table is not changed", file=sys.stderr)
         return before.strip()
     return f"{table([row for run in found for row in run['rows']])}\n\n{under(found)}"
 

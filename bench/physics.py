@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What fresh sensors cost: a control step of a Simulation beside plain mj_step of MuJoCo's own batch, which leaves everything a substep old.
+"""Time of current sensor values: a control step of a Simulation compared with mj_step of MuJoCo's own batch, whose derived values
+are one substep old.
 
-Both start from the same states, get the same controls, new ones at every step, and go through the same states bit for bit. CPU time
-of one thread, in turns, so that other programs on the machine matter little. What the sensors take by themselves is a row of its own:
-the same sensors, read again at a state that stands still.
+Both start from the same states, get the same controls, new ones at every step, and go through bitwise equal states. CPU time of
+one thread is measured in turns, so that other programs have little influence. A separate row gives the time of the sensors alone:
+the same sensors, evaluated again at an unchanged state.
 """
 
 import copy
@@ -28,7 +29,7 @@ ZOO = "mjlab/asset_zoo/robots"
 
 
 def with_motors(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """mjlab adds actuators when a task is made."""
+    """Adds motors to the model: mjlab adds its actuators only when it creates a task."""
     for joint in spec.joints:
         if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
             spec.add_actuator(name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint.name)
@@ -36,19 +37,19 @@ def with_motors(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def go1() -> mjs.SceneCfg:
-    """mjlab's Go1, standing on springs."""
+    """mjlab's Go1, which stands on joint springs."""
     spec = with_motors(robot(wheel("mjlab") / ZOO / "unitree_go1/xmls/go1.xml", native=False))
     return mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=spec, pos=(0.0, 0.0, 0.3))}, terrain=mjs.TerrainCfg())
 
 
 def g1() -> mjs.SceneCfg:
-    """mjlab's G1, a humanoid that falls and lies."""
+    """mjlab's G1, a humanoid that has fallen and lies on the floor."""
     spec = with_motors(mujoco.MjSpec.from_file(str(wheel("mjlab") / ZOO / "unitree_g1/xmls/g1.xml")))
     return mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=spec, pos=(0.0, 0.0, 0.8))}, terrain=mjs.TerrainCfg())
 
 
 def panda() -> mjs.SceneCfg:
-    """robosuite's Panda at its table."""
+    """robosuite's Panda at a table."""
     return mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=camera_scenes.panda())})
 
 
@@ -59,13 +60,13 @@ def poses_and_velocities(body: str) -> list:
 
 
 def rays(body: str) -> list:
-    """Two of them: what rays want of the physics, not what many of them cost."""
+    """A sensor with two rays: measures the physics that ray sensors require, not the rays themselves."""
     frame = mjs.ObjRef(type="body", name=body, entity="robot")
     return [mjs.RayCastSensorCfg(name="scan", frame=frame, pattern=mjs.GridPatternCfg(size=(0.1, 0.0), resolution=0.1))]
 
 
 def camera(body: str) -> list:
-    """A tiny one: what images want of the physics, not what they cost."""
+    """A camera of 4 x 4 pixels: measures the physics that cameras require, not the images themselves."""
     return [mjs.CameraSensorCfg(name="eye", parent_body=f"robot/{body}", pos=(0.0, 0.0, 0.0), width=4, height=4, data_types=("depth",))]
 
 
@@ -92,8 +93,8 @@ class Ours:
 
 
 class Plain:
-    """MuJoCo's batch, without marks of visited bounding volumes (bvactive 0, its default; we never make them): one mjData a thread, its
-    default, or one a world."""
+    """MuJoCo's batch with bvactive 0, as in mjsense: visited bounding volumes are not marked. It has one mjData per thread (its
+    default) or one per world (`persistent`)."""
 
     def __init__(self, ours: Ours, persistent: bool) -> None:
         model = copy.copy(ours.sim.model)
@@ -107,7 +108,7 @@ class Plain:
 
 
 def us(body: Callable[[], None], controls: np.ndarray, ctrl: np.ndarray, per: int) -> float:
-    """Microseconds of CPU time of a world's substep."""
+    """CPU microseconds per world and substep."""
     spent = 0.0
     for row in controls:
         ctrl[:] = row
@@ -136,19 +137,19 @@ def compare(name: str, scene: mjs.SceneCfg, body: str, touching: str, rounds: in
         rng = np.random.default_rng(0)
         sides = {**peers, **ours}
         settle = 0.02 * rng.standard_normal((300 // decimation, WORLDS, plain.ctrl.shape[1]))
-        for side in sides.values():  # robots stand or lie
+        for side in sides.values():  # until the robots are at rest
             us(side.step, settle, side.ctrl, decimation)
         spent: dict[str, list[float]] = {case: [] for case in sides}
         again: dict[str, list[float]] = {case: [] for case in what}
         for _ in range(rounds + 3):
             controls = 0.02 * rng.standard_normal((steps, WORLDS, plain.ctrl.shape[1]))
-            for case, side in sides.items():  # in turns long enough for each to find its own worlds in the cache
+            for case, side in sides.items():  # each turn is long enough that its worlds are in the cache
                 spent[case].append(us(side.step, controls, side.ctrl, decimation))
             for case in what:
                 if ours[case].read:
                     again[case].append(us(ours[case].again, controls[-1:], ours[case].ctrl, decimation))
             for case in what:
-                assert np.array_equal(ours[case].state, plain.state), f"{name}, {case}: not the states of mj_step"
+                assert np.array_equal(ours[case].state, plain.state), f"{name}, {case}: the states differ from those of mj_step"
         for case in what:
             label = f"{name}, {case}, decimation {decimation}"
             goal = {"nothing read": 1 / 1.03, "contact forces": None}.get(case, 1 / (1.05 if decimation == 1 else 1.03))
@@ -173,7 +174,7 @@ def main() -> None:
         rows += compare("G1", g1(), "torso_link", ".*_foot.*_collision", rounds, steps)
     if "panda" in robots:
         rows += compare("Panda", panda(), "robot0_right_hand", ".*finger.*", rounds, steps)
-    report(f"Physics of {WORLDS} worlds with fresh sensors, beside plain steps", rows)
+    report(f"Physics of {WORLDS} worlds with current sensors, compared with plain steps", rows)
 
 
 if __name__ == "__main__":

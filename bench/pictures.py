@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Side-by-side sheets: ours, MuJoCo's classic renderer, and their difference (times 3); and how far apart they are.
+"""Writes images of mjsense, of MuJoCo's classic renderer, and their difference (times 3) side by side, and prints how much they
+differ.
 
     .venv/bin/python bench/pictures.py FOLDER [scene ...]        scenes: gallery soft pick kitchen go1 panda
 
-It needs what ./dev bench builds. Depth and ids are compared where both see something; depth only where it is opaque, for MuJoCo's depth
-looks through glass.
+It needs the build of ./dev bench. Depth and ids are compared where both images have a surface; depth only on opaque surfaces,
+because MuJoCo's depth ignores transparent ones.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import opengl  # noqa: F401  before mujoco
 
 # isort: split
 import camera_scenes
-import harness  # noqa: F401  finds mjsense
+import harness  # noqa: F401  adds the measured build to sys.path
 import mujoco
 import numpy as np
 from fetch import Unavailable
@@ -32,7 +33,7 @@ SCENES = {
     "go1": ("view", "head"),
     "panda": ("view",),
 }
-STEPS = {"soft": 200}  # before the picture is taken
+STEPS = {"soft": 200}  # lets the scene settle first
 WIDTH, HEIGHT = 300, 225
 
 

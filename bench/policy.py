@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a policy written in Python costs: a step of 64 worlds asked of one that returns a constant, beside asking nobody.
+"""Overhead of a policy written in Python: a policy that returns a constant, in 64 worlds.
 
-Wall time of `act` alone, the steps between are not timed: the rows that the policy sees are there, and it is called once for all worlds.
+Measures the wall time of `act` alone, which calls the policy once for all worlds; the steps in between are not measured, and the
+observations are computed before.
 """
 
 import statistics

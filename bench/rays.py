@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Height scans and a lidar beside mj_ray, mj_multiRay, mujoco_warp (the engine under mjlab's ray sensors) and mujoco-lidar on the CPU, the
-update of a world's top level, scenes that grow, and threads: lidar_bench.cc, height_scan_bench.cc and ray_scene_bench.cc, run as one program.
+"""Height scans and a lidar compared with mj_ray, mj_multiRay, mujoco_warp (the engine of mjlab's ray sensors) and mujoco-lidar on
+the CPU; the update of a world's top-level BVH; scenes of increasing size; and threads. Runs lidar_bench.cc, height_scan_bench.cc
+and ray_scene_bench.cc as one program.
 
-Before every scan the robot has another pose, joints included; only the rays and bringing what they see up to date are timed. The robots
-are mjlab's Go1 and G1. Peers of Python run in an environment of their own (fetch.py) in the scenes that our program saved. Rates
-count processor time of one core, so that a busy machine counts for both sides alike.
+The pose of the robot, joints included, changes before every scan. Only the rays and the update of the ray scene are measured. The
+robots are mjlab's Go1 and G1. Peers written in Python run in separate environments (fetch.py) on scenes that mjsense_bench saved.
+Rates are per CPU second of one core, so that other load affects both sides alike.
 """
 
 import pathlib
@@ -16,11 +17,11 @@ from harness import Row, google_benchmarks, report, run_program
 
 
 def robots() -> dict[str, str]:
-    """What tells the program to use mjlab's robots instead of its stand-ins."""
+    """Environment variables that make the program use mjlab's robots instead of its stand-ins."""
     try:
         folder = wheel("mjlab") / "mjlab/asset_zoo/robots"
     except Unavailable as error:
-        print(f"rays: stand-ins for the Go1 and the G1, for {error}", file=sys.stderr)
+        print(f"rays: using stand-ins for the Go1 and the G1: {error}", file=sys.stderr)
         return {}
     return {"MJSENSE_BENCH_QUADRUPED": f"{folder}/unitree_go1/xmls/go1.xml", "MJSENSE_BENCH_HUMANOID": f"{folder}/unitree_g1/xmls/g1.xml"}
 
@@ -30,14 +31,15 @@ def rate(m: dict) -> float:
 
 
 def peer(models: dict[str, str], benchmark: str, script: str, *kind: str) -> float | None:
-    """M rays per CPU second of a peer in the scene of this benchmark; None, and a line that says why, if it cannot be had."""
+    """Million rays per CPU second of a peer in the scene of this benchmark; None, after printing the reason, if it is not
+    available."""
     with tempfile.TemporaryDirectory() as folder:
         scene = str(pathlib.Path(folder) / "scene.mjb")
         run_program("mjsense_bench", f"--benchmark_filter={benchmark}$", "--benchmark_min_time=0.01", MJSENSE_BENCH_SAVE=scene, **models)
         try:
             return run_peer("warp", script, scene, *kind)["rays_per_second"] * 1e-6
         except Unavailable as error:
-            print(f"rays: {script} left out: {error}", file=sys.stderr)
+            print(f"rays: {script} skipped: {error}", file=sys.stderr)
             return None
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writing and encoding: our recorder against a plain sequential writer in Python (h5py + ffmpeg), as MolmoSpaces saves.
+"""Writing and encoding: the recorder of mjsense compared with a sequential writer in Python (h5py and ffmpeg) that works like
+MolmoSpaces'.
 
-Both get the same pictures and rows, made before the clock starts, and both end with complete files. The peer keeps an
-episode in memory, then encodes its cameras one after the other (x264 with as many threads as it likes), encodes the dict
-rows as JSON and stacks and writes everything with lzf; it does not sync. Its depth is the lossy red-green form. Ours
-streams, with one thread an encoder, depth lossless, files synced.
+Both get the same images and rows, which are made before the measurement, and both produce complete files. The peer keeps an
+episode in memory, then encodes its cameras one after the other (x264 with its default number of threads), encodes the dict
+rows as JSON, and stacks and writes everything with lzf; it does not sync. It stores depth in the lossy red-green form. mjsense
+writes while the episode runs, with one thread per encoder, lossless depth and synced files.
 """
 
 import json
@@ -28,7 +29,7 @@ JSON_STREAMS = {f"actions/{k}": 2000 for k in ("commanded_action", "ee_pose", "e
 
 
 def pictures(steps: int) -> np.ndarray:
-    """The pictures of record_fake, for the peer: uint8 [steps, HEIGHT, WIDTH, 3]."""
+    """The same images as those of record_fake, for the peer: uint8 [steps, HEIGHT, WIDTH, 3]."""
     x, y, t = np.arange(WIDTH), np.arange(HEIGHT)[:, None], np.arange(steps)[:, None, None]
     ball = (x - 2 * t - 8) ** 2 + (y - HEIGHT // 2) ** 2 < HEIGHT * HEIGHT // 16
     red = np.where(ball, 220, 40 + 120 * x // WIDTH)
@@ -78,7 +79,7 @@ def peer_writes(out: pathlib.Path, rgb: list[np.ndarray], depths: list[np.ndarra
 
 
 def processor_seconds() -> float:
-    """Of this process and the programs that it has waited for."""
+    """CPU seconds of this process and of its finished child processes."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(u.ru_utime + u.ru_stime for u in used)
 
@@ -111,7 +112,7 @@ def main() -> None:
         split = walls[len(walls) // 2]
         case = f"{episodes} x {steps} steps, 2 RGB{' + 2 depth' if with_depth else ''}, {WIDTH}x{HEIGHT}"
         table.append(Row(case, split["frames"] / split["wall_s"], "frames/s", split["frames"] / peer_s, PEER))
-        # Processor time tells the same story on a machine that others use too.
+        # CPU time is comparable even if other programs use the machine.
         ours_cpu = sum(split[k] for k in ("copy_s", "write_s", "encode_cpu_s"))
         per_frame = 1000 / split["frames"]
         table.append(Row("- processor time", ours_cpu * per_frame, "ms/frame", statistics.median(peer_cpu[1:]) * per_frame, PEER, False))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run all benchmarks (or those named) one after the other: `./dev bench [name ...]`."""
+"""Runs all benchmarks, or the named ones, one after the other: `./dev bench [name ...]`."""
 
 import pathlib
 import subprocess
@@ -8,7 +8,7 @@ import sys
 HERE = pathlib.Path(__file__).parent
 SHARED = {"run", "harness", "fetch", "opengl", "images", "camera_scenes", "camera_rate", "pictures", "page", "figures"}  # not benchmarks
 
-ASKED_FOR = {"builds"}  # wants another build
+ASKED_FOR = {"builds"}  # run only if named: needs a second build
 
 
 def main() -> int:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Everything mjsense links. Debian packages (apt.txt) and the wheel mujoco-core; nothing is downloaded at configure time.
 
-# MuJoCo's series: any 4.0.x will do. Where pip or Python must know it too, a test says that they agree
-# (tests/python/test_installed.py).
+# Supported series of MuJoCo: any 4.0.x. tests/python/test_installed.py checks that pyproject.toml and the Python code state the
+# same series.
 set(MJSENSE_MUJOCO 4.0)
 
-# The installed package reads this file too (mjsenseConfig.cmake): find_package there says what is missing, an error here.
+# The installed package reads this file too (mjsenseConfig.cmake). A missing dependency makes find_package(mjsense) fail there and
+# is an error here.
 macro(mjsense_find)
   if(CMAKE_FIND_PACKAGE_NAME STREQUAL "mjsense")
     find_dependency(${ARGN})
@@ -31,7 +32,7 @@ if(NOT PCRE2_FOUND)
   mjsense_missing("libpcre2-8 not found: apt-get install libpcre2-dev")
 endif()
 
-# MuJoCo lives in the wheel of the Python that configures us, so that the C++ library and `import mujoco` are one library.
+# MuJoCo is taken from the wheel of the configuring Python, so that the C++ code and `import mujoco` use the same library.
 mjsense_find(Python 3.11 COMPONENTS Interpreter)
 execute_process(
   COMMAND ${Python_EXECUTABLE} -c
@@ -55,7 +56,8 @@ if(NOT embree_FOUND)
   mjsense_find(embree 3)
 endif()
 
-# OMPL, which plans ways. Its own package files name headers and libraries that Debian does not install with it.
+# OMPL, for motion planning. Its CMake package is not used, because it requires headers and libraries that Debian does not install
+# with it.
 find_library(OMPL_LIBRARY ompl)
 find_path(OMPL_INCLUDE ompl/config.h PATH_SUFFIXES ompl-1.5 ompl-1.6)
 find_path(EIGEN_INCLUDE Eigen/Core PATH_SUFFIXES eigen3)
@@ -78,7 +80,7 @@ if(NOT HDF5_STATIC OR NOT HDF5_INCLUDE)
 endif()
 mjsense_find(ZLIB)
 set(HDF5_LIBRARIES_OF_IT ${SZ_STATIC} ${AEC_STATIC} ZLIB::ZLIB ${CMAKE_DL_LIBS} m)
-# Debian 13's can read from Amazon S3 and wants what that takes; its libhdf5-dev brings it.
+# Debian 13's HDF5 can read from Amazon S3 and needs further libraries for this, which libhdf5-dev installs.
 include(CheckCXXSourceCompiles)
 set(CMAKE_REQUIRED_LIBRARIES ${HDF5_STATIC} ${HDF5_LIBRARIES_OF_IT})
 check_cxx_source_compiles("extern \"C\" int H5open(); int main() { return H5open(); }" MJSENSE_HDF5_LINKS)
@@ -97,8 +99,8 @@ if(NOT TARGET mjsense_hdf5)
   target_link_libraries(mjsense_hdf5 INTERFACE ${HDF5_STATIC} ${HDF5_LIBRARIES_OF_IT})
 endif()
 
-# A distribution's libraries are made by its newest GCC. An older one, asked for by name, links a libstdc++ of its own, which may lack what
-# they need; at run time all of them find the newest. So link that one.
+# The distribution's libraries are built with its newest GCC. An older GCC, if selected, links its own libstdc++, which may lack symbols
+# that they need. At run time the newest libstdc++ is loaded, so link this one.
 foreach(name libstdc++.so libstdc++.so.6)
   execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=${name} OUTPUT_VARIABLE MJSENSE_FOUND OUTPUT_STRIP_TRAILING_WHITESPACE)
   get_filename_component(MJSENSE_FOUND "${MJSENSE_FOUND}" REALPATH)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# find_package(mjsense): the public headers, the static library, and a search for its dependencies as in the build.
+# Installs the files for find_package(mjsense): the public headers, the static library, and the search for its dependencies.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 if(NOT SKBUILD AND NOT MJSENSE_STATIC)

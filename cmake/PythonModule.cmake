@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python package. It names no libmujoco: that of the installed mujoco-core is loaded before (mjsense/_libmujoco.py). The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
-# nanobind-backend), so that one wheel serves every CPython from 3.11 on. It is made of
-# python/bindings, which stands above every room of C++.
+# The Python package. The extension mjsense/_core.abi3.so is built from python/bindings with nanobind in split mode (its run-time
+# part is the package nanobind-backend), so that one wheel supports every CPython from 3.11 on. It is not linked to libmujoco:
+# mjsense/_libmujoco.py loads that of the installed mujoco-core before.
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
                 OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
@@ -13,8 +13,9 @@ target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR} ${MUJOCO
 target_compile_definitions(mjsense_python PRIVATE MJSENSE_VERSION="${PROJECT_VERSION}")
 target_compile_options(mjsense_python PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 
-# HDF5 in a shared object. Debian's static libraries are compiled for executables (-fPIE): their symbols must stay inside (as they
-# should, h5py brings an HDF5 of its own into the same process), and the two variables of libc that they name get a copy of ours.
+# HDF5 in a shared object. Debian's static libraries are compiled for executables (-fPIE). Their symbols must therefore stay inside
+# the extension, which is necessary anyway because h5py loads another HDF5 into the same process, and the two libc variables that
+# they use, stderr and stdout, are renamed to copies that mjsense defines.
 foreach(archive ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC})
   get_filename_component(name ${archive} NAME_WE)
   set(shared ${PROJECT_BINARY_DIR}/${name}_shared.a)
@@ -32,7 +33,7 @@ if(MJSENSE_STATIC)
   target_link_options(mjsense_python PRIVATE ${MJSENSE_STATIC_LINK})
 endif()
 
-# build/<preset>/python is a ready package: the extension, and links to the Python files. PYTHONPATH=build/dev/python.
+# build/<preset>/python is a usable package of the extension and links to the Python files: set PYTHONPATH=build/dev/python.
 set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
 set_target_properties(mjsense_python PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_DIR}
                                                 MJSENSE_MUJOCO_LATER ON SKIP_BUILD_RPATH ON)
@@ -47,6 +48,6 @@ endforeach()
 nanobind_add_stub(mjsense_stub MODULE mjsense._core OUTPUT ${MJSENSE_PY_DIR}/_core.pyi DEPENDS mjsense_python
                   PYTHON_PATH ${PROJECT_BINARY_DIR}/python)
 
-# scikit-build-core takes python/mjsense itself (pyproject.toml); CMake adds what is built.
+# scikit-build-core packs python/mjsense (pyproject.toml); CMake adds the built files.
 install(TARGETS mjsense_python LIBRARY DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL)
 install(FILES ${MJSENSE_PY_DIR}/_core.pyi DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What this compiler's standard library names and a glibc before 2.32 lacks.
+// Symbols that the standard library of this compiler uses and that glibc lacks before 2.32.
 
-// "Perhaps there are several threads": atomic operations are used.
+// 0: the process may have several threads, so libstdc++ uses atomic operations.
 extern "C" {
 char __libc_single_threaded = 0;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an OMPL planner writes when it is asked for its trees. OMPL's own brings Boost's serialization; nobody asks.
+// Replaces OMPL's PlannerData, which exports the trees of a planner, because it depends on Boost.Serialization. Planners refer to
+// these functions, but mjsense never exports trees.
 #include <ompl/base/PlannerData.h>
 
 #include <cstdlib>

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pip would install: mjsense with its extras, and beside its neighbours. Nothing is installed.
+"""Prints the versions that pip would install for mjsense: alone, with its extras, and together with related packages. Installs
+nothing.
 
     python packaging/resolve.py [NAME ...]
 """
@@ -24,7 +25,7 @@ ENVIRONMENTS: dict[str, list[str]] = {
     "viewers": ["rerun-sdk>=0.22", "viser>=0.2"],
     "trainers": ["rsl-rl-lib", "stable-baselines3"],
 }
-"""Name -> what is asked for beside mjsense."""
+"""Name -> requirements in addition to those of mjsense."""
 
 
 class Unavailable(RuntimeError):
@@ -32,7 +33,7 @@ class Unavailable(RuntimeError):
 
 
 def resolve(others: list[str]) -> dict[str, str]:
-    """Name -> version of everything; ValueError with pip's words where nothing fits together."""
+    """Name -> version of every package; ValueError with pip's message if the requirements conflict."""
     command = [sys.executable, "-m", "pip", "install", "--dry-run", "--ignore-installed", "--quiet", "--disable-pip-version-check",
                "--only-binary=:all:", "--report=-", *PROJECT["dependencies"], *others]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True)

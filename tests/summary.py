@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""summary.py FOLDER: counts passed and failed tests, and lists the reasons of skipped ones, from the XML of googletest and pytest."""
+"""summary.py FOLDER: counts passed and failed tests and lists the reasons of skipped tests, from the XML reports of googletest
+and pytest."""
 
 import pathlib
 import sys

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often the default cameras show what the task is about in the first frame of an episode.
+"""Measures how often the default cameras show the objects of the task in the first frame of an episode.
 
     python tools/camera_views.py [--episodes 200] [--only TASK[/ROBOT]] [--scene SCENE] [--at-least 0.95]
 
-For each task and robot, starts episodes without playing them, in small pictures, and counts the starts in which at
-least one camera that is not on a hand shows every object of the task (object and receptacle, or the handle). Prints a table; with
---at-least the exit code is 1 if a pair is below that share. Navigation is left out: its robot starts out of sight of the object.
+For each task and robot, starts episodes without playing them, with small images, and counts the starts in which at least one
+camera that is not on a wrist shows every object of the task (object and receptacle, or the handle). Prints a table; with
+--at-least the exit code is 1 if a pair is below that share. Navigation is excluded, because its object is not visible at the
+start.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ PAIRS = (
     *(("door_opening", robot) for robot in ("rby1", "mobile_franka")),
 )
 WORLDS = 8
-SHRINK = 2  # of the pictures' width and height; the handle of a door is too thin for that
+SHRINK = 2  # factor for width and height of the images; not used for door handles, which are too thin
 
 
 @dataclass
 class Count:
-    """Of one task and robot."""
+    """Counts for one task and robot."""
 
     starts: int = 0
-    refused: int = 0  # starts that cannot be played
+    refused: int = 0  # episodes that could not be started
     all_seen: int = 0  # starts in which one camera shows every object
     seen: dict[str, int] = field(default_factory=dict)  # starts in which some camera shows it, by role
 
@@ -63,7 +64,7 @@ def count(task: str, robot: str, scene: str = "", episodes: int = 200, seed: int
                               shadows=False, observations=["object_image_points"])) as env:  # fmt: skip
         while found.starts + found.refused < episodes:
             points = env.reset()[0]["object_image_points"]
-            faults = env._rollout.outcomes()[-1]  # the first observation says nothing of them
+            faults = env._rollout.outcomes()[-1]  # failed starts are not visible in the first observation
             roles = {role: cameras for role, cameras in points.items() if "gripper" not in role}
             shown = {role: [rows["num_points"][:, 0] > 0 for camera, rows in cameras.items() if "wrist" not in camera]
                      for role, cameras in roles.items()}  # fmt: skip

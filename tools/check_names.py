@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = ("src", "python/bindings", "tests", "examples/cpp", "packaging")
-# One file of each pair is built.
+# Alternative implementations: a build contains one file of each pair.
 ALTERNATIVES = (
     {"src/mjsense/render/opengl/gl_absent.cc", "src/mjsense/render/opengl/gl_renderer.cc"},
     {"src/mjsense/hdf5/in_child.cc", "tests/fuzz/in_process.cc"},
 )
-# One of a program; programs are not linked with each other.
+# Functions that each program defines once.
 ENTRY_POINTS = ("main(", "LLVMFuzzerTestOneInput(")
 
 TOKEN = re.compile(
@@ -40,7 +40,7 @@ NOT_A_NAME = {"if", "for", "while", "switch", "return", "catch", "sizeof", "alig
 
 
 class Definition(NamedTuple):
-    name: str  # qualified; of a function with its parameters' types
+    name: str  # qualified name; for functions with the types of the parameters
     file: str
     line: int
 
@@ -82,7 +82,7 @@ def split_at_commas(words: list[str]) -> list[list[str]]:
 
 
 def parameter_type(words: list[str]) -> str:
-    """A parameter without its name and default value."""
+    """The type of a parameter, without its name and default value."""
     if "=" in words:
         words = words[: words.index("=")]
     words = [word for word in words if word not in ("const", "std", "::", "mjsense")]
@@ -119,7 +119,7 @@ def function_name(words: list[str]) -> str | None:
                 return None  # a macro
             while j > 1 and flat[j - 1] == "::":  # a member: Class::name
                 if flat[j - 2] == ">":
-                    return None  # of a template's specialisation
+                    return None  # a specialisation of a template
                 name, j = f"{flat[j - 2]}::{name}", j - 2
             end, level = i, 0
             for end in range(i, len(flat)):
@@ -138,7 +138,7 @@ def function_name(words: list[str]) -> str | None:
 def definitions(text: str, file: str) -> list[Definition]:
     """What a file defines with external linkage at namespace scope."""
     found: list[Definition] = []
-    scopes: list[str | None] = []  # names of the namespaces around; None: anonymous
+    scopes: list[str | None] = []  # names of the enclosing namespaces; None: anonymous
     head: list[str] = []
     start, i, all_tokens = 0, 0, tokens(text)
 
@@ -176,7 +176,7 @@ def definitions(text: str, file: str) -> list[Definition]:
             if head.count("(") > head.count(")"):  # a default argument
                 continue
             if kind and "(" not in plain and "=" not in plain:
-                # The name may be qualified (`struct Recorder::Impl {`); bases follow a colon. Specialisations are left out.
+                # The name may be qualified (`struct Recorder::Impl {`); bases follow a colon. Specialisations are skipped.
                 name = re.match(r"(?:\w+::)*\w+", "".join(w for w in plain[plain.index(kind) + 1 :] if w not in TYPE | {"final"}))
                 if name and head[:3] != ["template", "<", ">"]:
                     add(f"type {name[0]}")
@@ -184,7 +184,7 @@ def definitions(text: str, file: str) -> list[Definition]:
                 continue
             name = function_name(head)
             if name:
-                # Constructors' initialisers may hold braces: X::X() : a{1} {...}
+                # Constructors' initialisers may contain braces: X::X() : a{1} {...}
                 while i < len(all_tokens) and all_tokens[i][0] in (",", "{") and ":" in head:
                     i = skip_braces(i) if all_tokens[i][0] == "{" else i + 1
                     while i < len(all_tokens) and all_tokens[i][0] not in "{;}":

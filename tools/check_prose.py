@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds phrases that do not belong in plain technical English, and misspelt words.
 
-    tools/check_prose.py             the files of CHECKED, and the spelling of the whole tree
+    tools/check_prose.py             the whole tree
     tools/check_prose.py PATH ...    these files or folders
 
-Markdown is checked outside code. Of C++ files comments and string literals are checked, of Python files comments and strings.
+In Markdown, text outside code is checked; in C++, Python, CMake and shell files, comments and string literals; in TOML, YAML and
+XML files, comments.
 """
 
 from __future__ import annotations
@@ -20,16 +21,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Files, folders and patterns whose text has been rewritten. Add to this list what you rewrite; in the end it is the whole tree.
 CHECKED = [
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "docs/guides", "docs/reference", "docs/*.py", "examples",
-    "python/mjsense", "python/bindings", "src/mjsense/app", "src/mjsense/effects", "tools/[!c]*.py",
-    "models/robots/*/page.md", "src/mjsense/**/page.md", "tests/python", "tests/site",
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CMakeLists.txt", "src/mjsense", "python", "tests", "tools", "bench", "examples", "docs",
+    "packaging", "models", "cmake", "dev", ".ci", ".github",
 ]  # fmt: skip
 
-QUOTES = "test_prose.py"  # not checked in a folder: quotes the phrases
+QUOTES = {"check_prose.py", "test_prose.py"}  # not checked: these files quote the phrases
 
-# Phrase -> what to write instead. Only what is wrong nearly everywhere.
+# Phrase -> what to write instead. Only phrases that are wrong nearly everywhere.
 PHRASES = {
     r"\b(?:no|any|some|every)body\b": "name the component or the user",
     r"\bwhoever\b|\bwho (?:waits|asks|pushes|pulls|leaves|sends|writes|reads)\b": "name the component or the user",
@@ -100,12 +99,41 @@ def python(text: str) -> Iterator[tuple[int, str]]:
     yield from blocks(comments, lambda line: not line.strip(), lambda line: False)
 
 
-READERS = {".md": markdown, ".h": cpp, ".cc": cpp, ".py": python}
+def hashes(text: str) -> Iterator[tuple[int, str]]:
+    """Comments of files in which they begin with '#'."""
+    lines = [m[1] if (m := re.search(r"(?:^|\s)#+!? ?(.*)$", line)) else "" for line in text.splitlines()]
+    yield from blocks(lines, lambda line: not line.strip(), lambda line: False)
+
+
+def script(text: str) -> Iterator[tuple[int, str]]:
+    """Comments, strings and here-documents of shell and CMake files."""
+    yield from hashes(text)
+    for match in re.finditer(r"<<'?(\w+)'?.*\n((?:.*\n)*?)\1$", text, re.MULTILINE):
+        first = text.count("\n", 0, match.start(2)) + 1
+        yield from ((first + i, line) for i, line in enumerate(match[2].splitlines()))
+    for number, line in enumerate(text.splitlines(), 1):
+        yield from ((number, m[1]) for m in re.finditer(r'"((?:[^"\\]|\\.)*)"', line))
+
+
+def xml(text: str) -> Iterator[tuple[int, str]]:
+    for match in re.finditer(r"<!--(.*?)-->", text, re.DOTALL):
+        yield text.count("\n", 0, match.start()) + 1, " ".join(match[1].split())
+
+
+# By suffix, or by name for files without one.
+READERS = {
+    ".md": markdown, ".h": cpp, ".cc": cpp, ".py": python, ".pyi": python, ".cmake": script, ".sh": script, "dev": script, "run": script,
+    ".toml": hashes, ".yml": hashes, ".txt": hashes, ".supp": hashes, ".xml": xml,
+}  # fmt: skip
+
+
+def reader(path: Path):
+    return READERS.get(path.suffix or path.name)
 
 
 def findings(path: Path) -> Iterator[str]:
     """One line for each phrase of the list."""
-    for line, block in READERS[path.suffix](path.read_text()):
+    for line, block in reader(path)(path.read_text()):
         for rule, advice in RULES:
             for match in rule.finditer(block):
                 yield f"{path}:{line}: '{match[0].strip()}' -> {advice}"
@@ -114,7 +142,7 @@ def findings(path: Path) -> Iterator[str]:
 def files(names: list[str]) -> Iterator[Path]:
     for name in names:
         for path in sorted(ROOT.glob(name)) if "*" in name else [ROOT / name]:
-            inside = [p for p in sorted(path.rglob("*")) if p.suffix in READERS and p.is_file() and p.name != QUOTES]
+            inside = [p for p in sorted(path.rglob("*")) if reader(p) and p.is_file() and p.name not in QUOTES]
             yield from inside if path.is_dir() else [path]
 
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fails where an include runs against the order of the rooms, which the table in docs/architecture.md gives.
+"""Checks the order of includes between rooms (the folders of src/mjsense), which the table in docs/architecture.md defines.
 
-A file may include its own room and the rooms above it in that table. Tests, benchmarks and folders testing/ may include
-anything: they judge from outside. Nothing in src/ may include python/. x.cc includes x.h before all else, which shows that
-the header compiles by itself.
+A file may include headers of its own room and of the rooms above it in that table. Tests, benchmarks and folders testing/ may
+include anything. Nothing in src/ may include python/. x.cc must include x.h first, which shows that the header is
+self-contained.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ JUDGES = re.compile(r"_(test|bench)\.cc$|/testing/")
 
 
 def rooms_of(page: str) -> list[str]:
-    """First column of the table under "## Rooms", in order."""
+    """The first column of the table in the section "## Rooms", in order."""
     table = page.split("## Rooms", 1)[1].split("\n## ", 1)[0]
     return re.findall(r"^\| `([a-z0-9]+)/", table, re.MULTILINE)
 
@@ -32,13 +32,13 @@ def wrong_includes(path: Path, text: str, order: dict[str, int]) -> list[str]:
     for include in INCLUDE.findall(text):
         target = include.removeprefix("mjsense/").split("/")[0]
         if include.startswith("python/"):
-            found.append(f"{path}: includes {include}: bindings stand above every room")
+            found.append(f"{path}: includes {include}: src/ must not depend on the bindings")
         elif not include.startswith("mjsense/") or "/" not in include.removeprefix("mjsense/"):
             continue
         elif target not in order:
             found.append(f"{path}: includes {include}: room '{target}' is not in docs/architecture.md")
         elif order[target] > order[room]:
-            found.append(f"{path}: includes {include}: {room}/ stands below {target}/")
+            found.append(f"{path}: includes {include}: {room}/ must not depend on {target}/")
     header = (SOURCES / path).with_suffix(".h")
     first = FIRST.search(text)
     if path.suffix == ".cc" and header.exists() and (first is None or first[1] != f"mjsense/{path.with_suffix('.h')}"):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Every C++ file past clang's front end, with the commands of a build by GCC: what one compiler alone refuses or warns of.
+"""Checks C++ files with clang's front end, using the compile commands of a GCC build. Finds errors and warnings that GCC does not
+report.
 
 usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/
 """
@@ -20,7 +21,7 @@ GCC_ALONE = ("-mmove-max=", "-mstore-max=")  # cmake/Isa.cmake
 
 
 def command_of(entry: dict[str, str]) -> list[str]:
-    """The command that checks the file and writes nothing."""
+    """clang's command that checks the file without output files."""
     words = shlex.split(entry["command"])
     if Path(words[0]).name == "ccache":
         words = words[1:]
@@ -55,7 +56,7 @@ def main(arguments: list[str]) -> int:
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         wrong = list(pool.map(check, entries)).count(False)
-    print(f"clang: {len(entries)} files, {wrong} refused", file=sys.stderr)
+    print(f"clang: {len(entries)} files, {wrong} with errors", file=sys.stderr)
     return 1 if wrong else 0
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the scenes and tasks for the documentation: python tools/scene_pictures.py [NAME ...], into docs/pictures.
+"""Writes the pictures of the scenes and tasks into docs/pictures: python tools/scene_pictures.py [NAME ...].
 
-Each is of two episodes, played by the planner up to the moment that is shown. A picture whose scene is of a package that is not
-installed is left out. Needs ffmpeg, which recordings need, too.
+Each picture shows two episodes, played by the planner up to this moment. Pictures of scenes from packages that are not installed
+are skipped. Needs ffmpeg.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class View(NamedTuple):
     scene: str
     robot: str = "franka"
     steps: int = 45
-    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # None: the robot's own camera, behind it
+    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # m, camera; None: the robot's camera_follower
     target: tuple[float, float, float] = (0.7, 0.0, 0.6)
     seed: int = 3
 
@@ -73,7 +73,7 @@ def write_jpeg(path: Path, pixels: np.ndarray) -> None:
 
 
 def picture(view: View) -> np.ndarray:
-    """Two episodes next to each other, [H, 2 W, 3]."""
+    """Two episodes side by side, [H, 2 W, 3]."""
     where = 'mount = "mjcf"\ncamera = "camera_follower"\n'
     if view.pos is not None:
         where = f'mount = "fixed"\npos = {list(view.pos)}\ntarget = {list(view.target)}\nfovy = 62\n'
@@ -94,7 +94,7 @@ def main() -> None:
         try:
             pixels = picture(VIEWS[name])
         except ValueError as error:
-            print(f"{name}: left out: {error}")
+            print(f"{name}: skipped: {error}")
             continue
         path = PICTURES / f"{name}.jpg"
         write_jpeg(path, pixels)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often the planners succeed, by task and robot: writes the table of docs/tasks.md.
+"""Measures how often the planners succeed, by task and robot, and writes the table of docs/tasks.md.
 
     python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT]] [--perturb]
 
-Plays every pair of CASES without cameras, each attempt an episode of its own seed, and keeps failures, too. A scene of a package
-that is not installed is left out, and said so. What was played is kept
-in .cache/tasks, so that a part can be played again alone.
+Plays every pair of CASES without cameras. Each attempt is an episode with a different seed; failures are recorded, too. Scenes of
+packages that are not installed are skipped with a message. Results are stored in .cache/tasks, so that a part can be repeated
+alone.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ import mjsense as mjs
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "tasks"
 BEGIN, END = "<!-- task table -->", "<!-- end -->"
 HOUSES = 30
-# task, robot, scene ("" is the task's own; "name:*": HOUSES houses, some episodes in each).
+# (task, robot, scene). Scene "": the task's default; "name:*": HOUSES houses with some episodes in each.
 CASES = (
     *(("pick", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
     *(("pick", "franka", scene) for scene in ("table", "tableware", "clutter", "shelf", "kitchen:*", "libero/kitchen", "libero/study", "libero/living_room")),
@@ -57,7 +57,7 @@ CASES = (
 
 
 def approach_angles(episodes: list[dict[str, Any]]) -> list[float]:
-    """Degrees between the last grasp's approach and straight down, of the episodes that have one."""
+    """Degrees between vertical and the approach direction of the last grasp, for the episodes with a grasp."""
     angles = []
     for episode in episodes:
         if episode["approach"] is not None:
@@ -66,7 +66,7 @@ def approach_angles(episodes: list[dict[str, Any]]) -> list[float]:
 
 
 def episodes_of(path: Path) -> list[dict[str, Any]]:
-    """Of each episode: retries, and the z component of the grasp's approach, None without a grasp."""
+    """For each episode, the number of retries and the z component of the grasp's approach direction (None without a grasp)."""
     found = []
     for file in sorted(path.glob("*.h5")):
         with h5py.File(file) as data:
@@ -76,7 +76,7 @@ def episodes_of(path: Path) -> list[dict[str, Any]]:
                 approach = None
                 if "grasp_pose" in extra:
                     position, (w, x, y, z) = extra["grasp_pose"][-1][:3], extra["grasp_pose"][-1][3:]
-                    if any(position):  # the identity stands for no grasp
+                    if any(position):  # the identity means: no grasp
                         approach = float(w * w - x * x - y * y + z * z)
                 found.append({"retries": retries, "approach": approach, "success": bool(episode["success"][-1])})
     return found
@@ -144,7 +144,7 @@ def main() -> None:
             except ValueError as error:
                 if "pip install" not in str(error):
                     raise
-                print(f"{task}/{robot} in {scene}: left out: {error}", flush=True)
+                print(f"{task}/{robot} in {scene}: skipped: {error}", flush=True)
         if kept.exists():
             results.append(json.loads(kept.read_text()))
             print(row(results[-1]), flush=True)

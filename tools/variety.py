@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What differs from episode to episode: writes the table of docs/tasks.md.
+"""Measures the differences between episodes and writes their table in docs/tasks.md.
 
     python tools/variety.py [--episodes 100] [--played 40] [--only SCENE]
 
-Begins episodes of one recording in each scene of CASES, as `mjsense record` would with a camera system that varies, and plays
-some with `--perturb 0.5` for the share of retries. What was found is kept in .cache/variety.
+Starts episodes of one recording in each scene of CASES like `mjsense record` with a randomised camera system, and plays
+some with `--perturb 0.5` to measure the share of retries. Results are stored in .cache/variety.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ import mjsense as mjs
 
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "variety"
 BEGIN, END = "<!-- variety -->", "<!-- end of variety -->"
-# task, scene, robot, camera system, policy: "" where nothing is taken and what is done takes no approach.
+# (task, scene, robot, camera system, policy). Policy "": the task has no grasp, so no approach direction is measured.
 TABLES = tuple(("pick", scene, "franka", "randomized_droid", "planner") for scene in ("table", "varied_table", "tableware", "clutter", "shelf"))
 CASES = (*TABLES, ("open", "kitchen", "franka", "randomized_droid", "planner"),
          ("door_opening", "room_with_door", "rby1", "gopro_d455", ""), ("nav_to_obj", "floor", "rby1", "gopro_d455", ""))  # fmt: skip
-AWAY = 50.0  # m: objects that take no part stand beyond
+AWAY = 50.0  # m; absent objects are farther from the origin
 
 
 def size(model: Any, aabb: Any, body: int) -> float:
-    """Longest edge (m) of the boxes about a body's geoms, of which `aabb` [ngeom, 6] are a world's."""
+    """Longest edge (m) of the bounding boxes of a body's geoms; `aabb` [ngeom, 6] are the boxes of a world."""
     geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == body]
     return float(max((2 * aabb[g, 3:].max() for g in geoms), default=0.0))
 
 
 def starts(task: str, scene: str, robot: str, system: str, policy: str, episodes: int) -> dict[str, list[Any]]:
-    """Of each episode's first moment, what varies."""
+    """The randomised quantities at the start of each episode, by name."""
     worlds = 10
     found: dict[str, list[Any]] = {name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt", "factor", "furniture")}
     env = mjs.make_vec(task, robot, scene=scene, num_envs=worlds, camera_system=system, width=32, height=24,
@@ -56,7 +56,7 @@ def starts(task: str, scene: str, robot: str, system: str, policy: str, episodes
     sizes = {b: size(model, model.geom_aabb, b) for b in free}
     still = [b for b in range(1, model.nbody) if model.body_treeid[b] < 0 and not model.body(b).name.startswith("robot_0/")]
     for first in range(0, episodes, worlds):
-        # The next episodes of the same recording: a reset without a seed.
+        # A reset without a seed starts the next episodes of the same recording.
         env.reset(seed=0) if first == 0 else env.reset()
         pos, quat, boxes = env.sim.data.xpos, env.sim.data.xquat, env.sim.model_field("geom_aabb")
         for w in range(min(worlds, episodes - first)):
@@ -77,7 +77,7 @@ def starts(task: str, scene: str, robot: str, system: str, policy: str, episodes
             cameras = env.sim.data.cam_xpos
             found["camera"].append(cameras[w].ravel().tolist())
             grasp = env.rows["grasp_pose"][w] if policy else np.zeros(7)
-            if any(grasp[:3]):  # the identity stands for no grasp
+            if any(grasp[:3]):  # the identity means: no grasp
                 qw, qx, qy, qz = grasp[3:]
                 approach = qw * qw - qx * qx - qy * qy + qz * qz
                 found["tilt"].append(float(np.degrees(np.arccos(np.clip(-approach, -1, 1)))))

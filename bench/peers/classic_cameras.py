@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images a second of MuJoCo's classic renderer through EGL: classic_cameras VIEW WIDTH HEIGHT.
+"""Images per CPU second of MuJoCo's classic renderer through EGL: classic_cameras VIEW WIDTH HEIGHT.
 
-rgb with shadow maps of 4096 (MuJoCo's default) and of 1024, rgb without shadows, and depth; without multisampling, its fastest
-setting. Timed are the update of mjvScene, the picture and reading it back.
+Measures rgb with shadow maps of 4096 (MuJoCo's default) and of 1024, rgb without shadows, and depth, all without multisampling
+(its fastest setting). The time includes the update of mjvScene, rendering and reading the image back.
 """
 
 import copy

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images a second of MuJoCo's Filament renderer through Vulkan, in software where there is no GPU:
+"""Images per CPU second of MuJoCo's Filament renderer through Vulkan, in software if there is no GPU:
 
     filament_cameras SCENE WIDTH HEIGHT rgb|depth image.npz
 
-One image at a time and no multisampling; rgb with shadows but without reflections, which cost it the most. Timed are the update of its
-scene, the image and reading it back. mujoco.rendering.filament.Renderer needs Python 3.12, so mjrf is used as that does. image.npz
-gets frame 0.
+One image at a time without multisampling; rgb with shadows but without reflections, its most expensive feature. The time includes
+the update of its scene, rendering and reading the image back. mujoco.rendering.filament.Renderer needs Python 3.12, so this
+program calls mjrf directly in the same manner. Frame 0 is written to image.npz.
 """
 
 import json
@@ -34,7 +34,8 @@ def camera(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> mjrf.Camera
 
 
 def metres(depth: np.ndarray, camera: mjrf.Camera) -> np.ndarray:
-    """From what Filament writes, 1 at the near plane and 0 at the far one; 0 where nothing is."""
+    """Depth in metres from Filament's depth buffer, which is 1 at the near plane and 0 at the far plane. 0 where there is no
+    surface."""
     near, far = camera.frustum_near, camera.frustum_far
     return np.where(depth > 0, near * far / (near + depth * (far - near)), 0).astype(np.float32)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rays a second of mujoco-lidar (Warp on the CPU) in the scene that lidar_bench.cc saved: lidar_rays scene.mjb."""
+"""Rays per CPU second of mujoco-lidar (Warp on the CPU) in the scene that lidar_bench.cc saved: lidar_rays scene.mjb."""
 
 import json
 import statistics
@@ -20,7 +20,7 @@ lidar = MjLidarWrapper(model, "head", backend="warp", cutoff_dist=30.0, args={"d
 elevation, azimuth = np.meshgrid(np.radians(np.linspace(-15, 15, 16)), np.radians(np.arange(360.0)), indexing="ij")
 azimuth, elevation = azimuth.ravel().astype(np.float32), elevation.ravel().astype(np.float32)
 seconds = []
-poses = [data.qpos.copy(), data.qpos.copy()]  # in turns, the joints differ
+poses = [data.qpos.copy(), data.qpos.copy()]  # used alternately; the joint positions differ
 poses[1][7:] += np.random.default_rng(2).uniform(-0.2, 0.2, model.nq - 7)
 for i in range(30):
     data.qpos[:] = poses[i % 2]

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What mjlab's sensors cost on the CPU: 64 Go1 on rough terrain, IMU and feet as in bench/contact.py.
+"""Time of mjlab's sensors on the CPU: 64 Go1 on rough terrain, IMU and feet as in bench/contact.py.
 
-The scene is mjlab's own: Scene and Simulation on the device "cpu", its Go1 held by its actuators, four of its rough terrains, its physics
-(mujoco_warp, whose kernels are compiled in the first run, about a minute). The last line is a JSON object; microseconds of CPU time of one
-thread, a world and substep:
+The scene is mjlab's own: Scene and Simulation on the device "cpu", its Go1 held by its actuators, four of its rough terrains, its
+physics (mujoco_warp, whose kernels are compiled in the first run, which takes about a minute). The last line of the output is a
+JSON object with CPU microseconds of one thread per world and substep:
 
-    physics           Simulation.step in the scene without the feet; the IMU's sensordata is part of it, as in bench/contact.py
-    sensors           what the feet add to Simulation.step: mujoco_warp fills their sensordata
-    torch             update of all sensors at every substep and, once in four, reading feet and IMU
-    feet_in_contact   share of the feet at the end, to see that the robots stand
+    physics           Simulation.step in the scene without the feet's sensors; includes the IMU's sensordata, as in bench/contact.py
+    sensors           increase of Simulation.step with the feet's sensors, because mujoco_warp fills their sensordata
+    torch             update of all sensors at every substep, and reading feet and IMU at every fourth
+    feet_in_contact   share of the feet in contact at the end, to check that the robots stand
 
 mjlab's history holds force, torque and dist.
 """
@@ -53,7 +53,7 @@ class Case:
         self.torch: list[float] = []
 
     def stand(self) -> None:
-        """Each robot on its tile, in the pose that its actuators hold."""
+        """Puts each robot on its terrain tile, in the pose that its actuators hold."""
         robot = self.scene["robot"]
         state = robot.data.default_root_state.clone()
         state[:, :3] += self.scene.env_origins

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images a second of mujoco_warp's ray-traced cameras on the CPU, the renderer of mjlab's CameraSensor:
+"""Images per CPU second of mujoco_warp's ray-traced cameras on the CPU, the renderer of mjlab's CameraSensor:
 
     warp_cameras VIEW WIDTH HEIGHT WORLDS shadows|plain images.npz
 
-rgb and depth together, textures, skybox and all lights; without shadows unless asked for. Timed are the refit of its BVH and the images;
-poses are brought up to date before, as for ours. images.npz gets rgb and depth of world 0 in frame 0.
+rgb and depth together, with textures, skybox and all lights, and with shadows if `shadows` is passed. The time includes the refit
+of its BVH and the images; as for mjsense, kinematics are computed before. rgb and depth of world 0 in frame 0 are written to
+images.npz.
 """
 
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rays a second of mujoco_warp on the CPU, the engine under mjlab's ray sensors, in a scene that our benchmarks saved:
+"""Rays per CPU second of mujoco_warp on the CPU, the engine of mjlab's ray sensors, in a scene that mjsense_bench saved:
 warp_rays scene.mjb lidar|height.
 """
 
@@ -24,7 +24,7 @@ def lidar(model, data):
 
 
 def height(model, data):
-    """187 rays straight down around the trunk, 64 worlds."""
+    """187 vertical rays downwards around the trunk, 64 worlds."""
     rng = np.random.default_rng(1)
     x, y = np.meshgrid(np.linspace(-0.8, 0.8, 17), np.linspace(-0.5, 0.5, 11))
     offsets = np.stack([x, y, 0 * x], -1).reshape(-1, 3)
@@ -50,7 +50,7 @@ def main() -> None:
     with wp.ScopedDevice("cpu"):
         m, d = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
         rng = np.random.default_rng(2)
-        poses = [np.stack(states), np.stack(states)]  # in turns, the joints differ: what is under the rays moves
+        poses = [np.stack(states), np.stack(states)]  # used alternately; the joint positions differ
         poses[1][:, 7:] += rng.uniform(-0.2, 0.2, poses[1][:, 7:].shape)
         mjw.kinematics(m, d)
         context = mjw.create_render_context(model, nworld=worlds, cam_res=(4, 4), enabled_geom_groups=groups)

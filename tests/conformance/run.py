@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """run.py CASES.jsonl RESULTS.json: runs the executable cases of scene sensors through mjsense's Python API.
 
-The cases' script is mjlab's order of calls, and their expectations hold its caches: contact data are a snapshot until
-update() or reset(), rays and images change at sense() only, everything after a raw step lags one substep. mjsense is never
-stale, so these snapshots are taken here (class Reader).
+The scripts of the cases are mjlab's order of calls, and the expected values include the effects of its caches: contact data
+change only at update() or reset(), rays and images only at sense(), and after a raw step all values are one substep old. Values
+of mjsense are always current, so class Reader imitates these caches.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def scene_of(case: dict[str, Any]) -> mjs.Scene:
 
 
 class Reader:
-    """mjlab's caches on top of sensors that are always current."""
+    """Imitates mjlab's caches for sensors whose values are always current."""
 
     def __init__(self, sim: mjs.Simulation) -> None:
         self.sim = sim
@@ -125,7 +125,8 @@ class Reader:
                 self.read(key)
 
     def hold(self, key: str) -> Any:
-        """What a peer's returned object shows later: a function that gives it."""
+        """A function that returns the later contents of the object that mjlab returns now: some of its arrays are updated in
+        place."""
         sensor = self.sim.scene[key]
         held = self.read(key)
         if isinstance(sensor, mjs.BuiltinSensor):
@@ -247,7 +248,7 @@ def run_script(case: dict[str, Any]) -> dict[str, Any]:
 
 
 class ReaderScene:
-    """scene[...] for observation functions, with data as the reader has them."""
+    """A scene for observation functions whose sensors return the values of the reader."""
 
     def __init__(self, reader: Reader) -> None:
         self.reader = reader
@@ -286,7 +287,7 @@ def run_case(case: dict[str, Any]) -> dict[str, Any]:
     if "pipeline" in case:
         settings = dict(case["pipeline"])
         frames = np.asarray(settings.pop("frames"), dtype=np.float32)
-        if "delay" in settings:  # a fixed lag
+        if "delay" in settings:  # constant delay
             settings["delay_min_lag"] = settings["delay_max_lag"] = settings.pop("delay")
         pipeline = ObservationPipeline(num_envs=frames.shape[1], **settings)
         return {"out": {"data": encode(np.stack([pipeline(frame) for frame in frames]))}}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The executable cases, graded: |x - v| <= atol + rtol |v|; integers and shapes exact. Divergences follow MuJoCo."""
+"""Runs the executable cases and checks |x - v| <= atol + rtol |v|; integers and shapes must be equal. Where mjlab and MuJoCo
+differ, the expected value is MuJoCo's."""
 
 import json
 import sys
@@ -50,8 +51,8 @@ def test_case(case):
 
 
 OTHERWISE = {
-    "div-cam-ortho": "the file has no right answer: tests/python/test_cameras.py has one",
-    "div-cam-inside": "images are MuJoCo's renderer's, which culls back faces; the file has mj_ray's, which does not",
+    "div-cam-ortho": "the file has no correct value; tests/python/test_cameras.py tests this case",
+    "div-cam-inside": "images follow MuJoCo's renderer, which culls back faces; the value in the file is mj_ray's, which does not",
 }
 
 
@@ -61,7 +62,7 @@ def test_divergence_follows_mujoco(case):
         pytest.skip(OTHERWISE[case["id"]])
     result = run.run_case(case)
     for key, value in case["mujoco4"].items():
-        if key in ("error", "msg"):  # unnamed XML sensors get a name instead
+        if key in ("error", "msg"):  # mjsense does not reject unnamed XML sensors but gives them a name
             assert result["n"]["value"] == ["r/sensor_0"]
             return
         label, field = key.split(".")

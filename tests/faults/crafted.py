@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings as a stranger might send them: each case changes a sound house into one that lies about itself.
+"""Crafted malicious recordings: each case modifies a valid house (a folder of a recording) so that its contents are inconsistent.
 
-A case is a function of the house's folder. `CASES` maps its name to it. None may crash, hang or feed on memory, reach a file
-outside the folder, or be called whole.
+A case is a function of the house's folder; `CASES` maps names to cases. With any of them, no command may crash, hang, use
+excessive memory or access a file outside the folder, and `verify` must not report the recording as intact.
 """
 
 import os
@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 CASES = {}
-SECRET = "secret"  # a folder beside the house that nobody may touch
+SECRET = "secret"  # a folder next to the house, which no command may access
 
 
 def case(function):
@@ -24,7 +24,7 @@ def case(function):
 
 
 def variants(name, values):
-    """One case for each value: the function takes the house and the value."""
+    """Adds one case for each value; the function takes the house and the value."""
 
     def add(function):
         for key, value in values.items():
@@ -47,7 +47,7 @@ def replace(group, name, **create):
     return group.create_dataset(name, **create)
 
 
-# ---- attributes of another type, shape or size than their readers expect
+# ---- attributes with an unexpected type, shape or size
 
 ATTRIBUTES = {
     "many_numbers": np.arange(1000, dtype=np.int64),
@@ -85,7 +85,7 @@ def _(house, value):
         f["traj_0/obs/agent/qpos"].attrs["encoding"] = value
 
 
-# ---- datasets that are not what they should be
+# ---- data sets with an unexpected type, shape or layout
 
 SHAPES = {
     "table": dict(data=np.zeros((50, 50), np.uint8)),
@@ -126,7 +126,7 @@ def _(house, create):
         replace(f["traj_0/obs/agent"], "qpos", **create)
 
 
-# What no recorder writes, of as many rows as there are steps.
+# Types and layouts that no recorder writes, with the correct number of rows.
 OF_STEPS = {
     "lists": lambda n: dict(shape=(n,), dtype=h5py.vlen_dtype(np.float64)),
     "references": lambda n: dict(shape=(n,), dtype=h5py.ref_dtype),
@@ -175,7 +175,7 @@ def chunk_of_four_gigabytes(house):
 
 
 def bomb(group, name, rows, width, packed):
-    """Rows that no disk holds: one small packed chunk, written again and again."""
+    """A data set that is huge when decompressed: one small compressed chunk, repeated for all rows."""
     chunk = 512
     dataset = replace(group, name, shape=(rows, width), dtype="u1", chunks=(chunk, width), compression="gzip")
     for first in range(0, rows, chunk):
@@ -412,7 +412,7 @@ def _(house, header):
 
 @case
 def many_large_pictures(house):
-    """Kilobytes that unpack to minutes and gigabytes."""
+    """Videos of a few kilobytes that take minutes and gigabytes to decode."""
     path = min(house.glob("*.mp4"))
     source = ["-f", "lavfi", "-i", "color=gray:size=8192x8192:rate=10", "-frames:v", "3"]
     subprocess.run(["ffmpeg", "-y", "-loglevel", "error", *source, "-c:v", "libx264", "-preset", "ultrafast", path], check=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults, one kind a function: each makes trials and returns what was lost, unnoticed, crashed and hung."""
+"""The kinds of faults, one function each, which runs trials and returns the numbers of lost, unnoticed, crashed and hung ones."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from pathlib import Path
 import crafted
 import h5py
 
-SECONDS, MEMORY = 20, 1 << 30  # what a look at a hostile file may take
-NO_END = 600  # seconds after which a program that should end by itself has no end, beside much other work
+SECONDS, MEMORY = 20, 1 << 30  # limits of CPU seconds and bytes for reading a hostile file
+NO_END = 600  # seconds after which a program counts as hung; long, because the machine may be busy
 
 
 @dataclass
 class Row:
-    """A line of the table: all but `trials` must be 0."""
+    """A line of the table. All numbers except `trials` must be 0."""
 
     kind: str
     trials: int = 0
@@ -45,7 +45,7 @@ class Row:
 
 @dataclass
 class Lab:
-    """Where the trials run: the program that records without physics, and an empty folder."""
+    """The program that records without physics, and the folder in which the trials run."""
 
     program: Path
     folder: Path
@@ -63,7 +63,7 @@ class Lab:
 
     @functools.cached_property
     def sound(self) -> Path:
-        """A whole recording of two files with videos of both kinds."""
+        """A complete recording of two files with both kinds of videos."""
         out = self.fresh("sound")
         done = self.run(out, "--episodes", 4, "--batches", 2, "--worlds", 2, "--steps", 10, "--width", 32, "--height", 24)
         assert done.returncode == 0, done.stderr
@@ -80,7 +80,8 @@ def limit_memory():
 
 
 def sanitisers_words(said: str) -> str:
-    """What ASan or UBSan found in our code; the HDF5 library's own faults, in a process that is made for them, are not ours."""
+    """The first error that ASan or UBSan found outside the HDF5 library. Errors inside it are expected: it runs in a separate
+    process for this reason."""
     for report in re.split(r"^(?===\d+==ERROR: |\S+: runtime error: )", said, flags=re.MULTILINE)[1:]:
         lines = [line for line in report.splitlines() if "libsanitizer" not in line]
         frames = re.findall(r"^\s+#\d+ \S+ in (\S+)", "\n".join(lines), re.MULTILINE)
@@ -91,7 +92,7 @@ def sanitisers_words(said: str) -> str:
 
 
 def look(lab: Lab, row: Row, what: str, command: str, path: Path, *more):
-    """One command on a hostile or damaged recording: it ends by itself, in time and in bounds. None if it did not."""
+    """Runs a command on a hostile or damaged recording and checks its exit code, time and memory. None if it crashed or hung."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
         done = lab.run(command, path, *more, preexec_fn=limit_memory)
@@ -117,7 +118,7 @@ def snapshot(folder: Path) -> dict:
 
 
 def hostile(lab: Lab, names=None) -> Row:
-    """Crafted files: no command crashes, hangs or reaches outside; verify calls none whole."""
+    """Crafted files: no command may crash, hang or access files outside, and verify must not report any of them as intact."""
     row = Row("crafted files, read by verify, inspect, repair and the contact sheet")
     for name, craft in crafted.CASES.items():
         if names is not None and name not in names:
@@ -139,7 +140,7 @@ def hostile(lab: Lab, names=None) -> Row:
         look(lab, row, name, "sheet", out, lab.folder / "sheet.png")
         look(lab, row, name, "repair", out)
         if snapshot(secret) != before:
-            row.wrong("lost", f"{name}: a file outside was touched")
+            row.wrong("lost", f"{name}: a file outside was changed")
     return row
 
 
@@ -148,7 +149,7 @@ def damaged_files(lab: Lab):
 
 
 def flips(lab: Lab, trials: int, seed=0) -> Row:
-    """One bit of one file, of every kind of file in turn."""
+    """Flips one bit of one file; all kinds of files take turns."""
     row = Row("flipped bits in HDF5, MP4 and Matroska files")
     rng = random.Random(seed)
     kinds = {}
@@ -186,7 +187,7 @@ def truncations(lab: Lab, trials: int, seed=1) -> Row:
         victim.write_bytes(data[:size])
         row.trials += 1
         done = look(lab, row, f"{path.name} cut to {size}", "verify", out)
-        # Without its last line, and whole otherwise: data are as recorded, and a note says that the line is missing.
+        # If only the last line is cut off, the data are unchanged, and a note reports the missing line.
         if done and done.returncode == 0 and "was changed since it was recorded" not in done.stdout:
             row.wrong("unnoticed", f"{path.name} cut to {size}")
         victim.write_bytes(data)
@@ -211,7 +212,7 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
 
 
 def mutations(lab: Lab, trials: int, seed=2) -> Row:
-    """Many changes in one file, its checksum cut off so that the readers behind it are met."""
+    """Makes many changes in one file and removes its checksum, so that the changes reach the readers."""
     row = Row("mutated HDF5, MP4 and Matroska files without checksums")
     rng = random.Random(seed)
     bare = lab.copy("bare")
@@ -247,7 +248,7 @@ KILLED = ["--episodes", "7", "--batches", "3", "--worlds", "3", "--steps", "8", 
 
 
 def kills(lab: Lab, trials: int, seed=3) -> Row:
-    """kill -9 at any moment, then --resume: every finished episode stays, and the end is the same to the byte."""
+    """kill -9 at a random time, then --resume: every finished episode is kept, and the final files are equal byte for byte."""
     row = Row("kill -9 of the program, then --resume")
     rng = random.Random(seed)
     whole = lab.fresh("whole")
@@ -277,9 +278,10 @@ def kills(lab: Lab, trials: int, seed=3) -> Row:
 
 
 def killed_changes(lab: Lab, trials: int) -> Row:
-    """kill -9 before one change of the file system after the other (tests/record/kill_at.cc), then --resume: the same files."""
+    """kill -9 before each change of the file system in turn (tests/record/kill_at.cc), then --resume: the final files are
+    equal."""
     row = Row("kill -9 before each change of the file system, then --resume")
-    # Some episodes are played beyond the wanted number, and dropped.
+    # More episodes are played than requested; the surplus is dropped.
     options = ["--episodes", "5", "--batches", "2", "--worlds", "3", "--steps", "4", "--discard", "4", "--no-depth", "--cameras", "1"]
     whole = lab.fresh("whole")
     counted = lab.run(whole, *options, env=os.environ | {"MJSENSE_COUNT_CHANGES": "1"})
@@ -288,7 +290,7 @@ def killed_changes(lab: Lab, trials: int) -> Row:
         at, out = 1 + trial * changes // trials, lab.fresh("killed")
         killed = lab.run(out, *options, env=os.environ | {"MJSENSE_KILL_AT": str(at)})
         if killed.returncode == 0:
-            continue  # threads took another turn: there were fewer changes
+            continue  # with other thread timing there were fewer changes
         row.trials += 1
         done = lab.run(out, *options, "--resume")
         if killed.returncode != -signal.SIGKILL or done.returncode != 0:
@@ -299,7 +301,8 @@ def killed_changes(lab: Lab, trials: int) -> Row:
 
 
 def full_disks(lab: Lab, trials: int) -> Row:
-    """A disk of a few hundred kilobytes more each time: a clear error, what was finished stays and is published on a larger one."""
+    """Records on a full disk, which is a few hundred kilobytes larger in each trial: a clear error, finished episodes are kept,
+    and --resume on a larger disk publishes them."""
     row = Row("full disks")
     options = ["--episodes", "7", "--batches", "3", "--worlds", "2", "--steps", "8", "--width", "32", "--height", "24"]
     for n in range(trials):
@@ -329,13 +332,14 @@ def full_disks(lab: Lab, trials: int) -> Row:
 
 
 def file_limits(lab: Lab, trials: int) -> Row:
-    """Files may not grow beyond a limit, larger each time: one clear error, nothing half-written, and --resume without it ends the same."""
+    """Records with a limit on file sizes, which grows with each trial: one clear error, no incomplete files, and the same final
+    files after --resume without the limit."""
     row = Row("limits on the size of files (ulimit -f)")
     options = ["--episodes", "5", "--batches", "2", "--worlds", "2", "--steps", "8", "--width", "32", "--height", "24"]
     whole = lab.fresh("whole_limit")
     assert lab.run(whole, *options).returncode == 0
     expected = contents(whole)
-    largest = max(map(len, expected.values())) * 3 // 2  # space is taken before it is needed
+    largest = max(map(len, expected.values())) * 3 // 2  # the recorder reserves space in advance
     for n in range(trials):
         limit, out = n * largest // trials, lab.fresh("limited")
         row.trials += 1
@@ -357,7 +361,7 @@ def file_limits(lab: Lab, trials: int) -> Row:
 
 
 def staged(lab: Lab) -> Row:
-    """What waits in .recording is damaged: the rest is saved, the damaged episode is set aside and recorded again."""
+    """Damages an episode in .recording: the other episodes are kept, and the damaged one is set aside and recorded again."""
     row = Row("damage to an unfinished recording, then repair or --resume")
     options = ["--episodes", "4", "--batches", "1", "--worlds", "1", "--steps", "8", "--width", "32", "--height", "24"]
     whole = lab.fresh("whole_staged")
@@ -403,7 +407,7 @@ def staged(lab: Lab) -> Row:
                 if done.returncode != 0 or found != expected:
                     row.wrong("lost", f"{name}: resume: {done.stderr}")
             if (secret / "keep.txt").read_text() != "mine":
-                row.wrong("lost", f"{name}: a file outside was touched")
+                row.wrong("lost", f"{name}: a file outside was changed")
     return row
 
 
@@ -424,7 +428,7 @@ def link(path: Path, staging: Path):
     path.symlink_to(moved)
 
 
-# ffmpegs that lie or hang. $out is the file, "$@" what was asked.
+# Faulty replacements of ffmpeg. $out is the output file, "$@" are the arguments.
 ENCODERS = {
     "garbage": "cat > /dev/null; echo garbage > $out",
     "nothing": "cat > /dev/null",
@@ -439,7 +443,7 @@ ENCODERS = {
 
 
 def encoders(lab: Lab, names=None) -> Row:
-    """Whatever ffmpeg does: the program ends by itself with a message, and nothing broken is called saved."""
+    """Records with faulty replacements of ffmpeg: the program ends with an error message and publishes no broken video."""
     row = Row("ffmpeg that lies, dies or hangs")
     real = shutil.which("ffmpeg")
     for name, body in ENCODERS.items():

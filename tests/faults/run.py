@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The long form of the fault suite; writes the table of docs/faults.md.
+"""Runs the long form of the fault suite and writes the table of docs/faults.md.
 
-    python tests/faults/run.py                    all kinds, hours
-    python tests/faults/run.py flips=1000 kills   these kinds, with so many trials; other lines of the table stay
+    python tests/faults/run.py                    all kinds, takes hours
+    python tests/faults/run.py flips=1000 kills   only these kinds, with 1000 trials of flips; other lines of the table are kept
     python tests/faults/run.py --no-table ...     print only
 
-The program is build/dev/record_fake, or $MJSENSE_RECORD_FAKE: with ASan and UBSan, that of such a build.
+The program is build/dev/record_fake or $MJSENSE_RECORD_FAKE, for example that of a build with ASan and UBSan.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import faults
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs/faults.md"
-# Trials of the long form; None: the kind has a list of its own.
+# Trials of the long form; None: one trial for each entry of the kind's list.
 TRIALS = {"kills": 300, "killed_changes": 200, "full_disks": 100, "file_limits": 100, "flips": 1000, "truncations": 200, "mutations": 2000, "hostile": None, "staged": None, "encoders": None}
 HEAD = "| fault | trials | lost | unnoticed | crashed | hung |\n| --- | --- | --- | --- | --- | --- |\n"
 BEGIN, END = "<!-- table of tests/faults/run.py -->\n", "<!-- end -->"

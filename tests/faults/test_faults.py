@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The short form of tests/faults/run.py: every kind of fault, few trials."""
+"""The short form of tests/faults/run.py: every kind of fault with few trials."""
 
 import os
 import shutil
@@ -32,7 +32,7 @@ def check(row):
     assert row.clean, "\n".join(row.notes)
 
 
-# The slow ones read files of many megabytes; the long form has them all.
+# Without the slow cases, which read files of many megabytes and run only in the long form.
 QUICK = sorted(set(crafted.CASES) - {"gzip_bomb", "json_bomb", "deep_groups", "many_large_pictures"})
 
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the fuzz targets share. A target is a file x_fuzz.cc with one function; run.py runs them.
+// Functions shared by the fuzz targets. A target is a file x_fuzz.cc with one function; run.py runs
+// the targets.
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -14,14 +15,14 @@
 
 namespace mjsense::fuzz {
 
-// A promise is broken: what a sanitiser does not see.
+// Reports a violated property that sanitisers cannot detect, and aborts.
 [[noreturn]] inline void broken(const char* promise, std::string_view found) {
-  std::fprintf(stderr, "broken promise: %s: %.*s\n", promise, static_cast<int>(found.size()),
+  std::fprintf(stderr, "violated property: %s: %.*s\n", promise, static_cast<int>(found.size()),
                found.data());
   std::abort();
 }
 
-// The bytes as a file in memory, made once and written over for each input.
+// Writes the bytes to a file in memory, which is created once and overwritten for each input.
 class MemoryFile {
  public:
   MemoryFile() : fd_(memfd_create("input", MFD_CLOEXEC)) {}

@@ -30,16 +30,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   std::size_t numbers = 0;
   const std::string wrong = parse_json(text, [&](const std::string& path, double) {
-    if (path.size() > text.size()) fuzz::broken("a path is made of keys", path);
+    if (path.size() > text.size()) fuzz::broken("paths are no longer than the text", path);
     ++numbers;
   });
-  if (numbers > size) fuzz::broken("a number takes a byte", text);
+  if (numbers > size) fuzz::broken("every number takes at least one byte", text);
   // Our parser accepts NaN and Infinity, as Python does, and does not check the encoding of
   // strings. The other parser ends at a NUL.
   const bool accepted = nlohmann::json::accept(text);
   const bool odd = text.find('\0') != std::string::npos || text.starts_with("\xEF\xBB\xBF");
   if (accepted && !wrong.empty() && depth_of(text) < 60 && !odd)
-    fuzz::broken("JSON is JSON", wrong + " in " + text);
+    fuzz::broken("valid JSON is accepted", wrong + " in " + text);
   const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return (c & 0x80) == 0; });
   const bool plain = ascii && text.find_first_of("NI\\") == std::string::npos;
   if (!accepted && wrong.empty() && plain) {
@@ -49,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } catch (const nlohmann::json::out_of_range&) {
       return 0;
     } catch (const nlohmann::json::exception& e) {
-      fuzz::broken("what is no JSON is found", e.what() + (" in " + text));
+      fuzz::broken("invalid JSON is rejected", e.what() + (" in " + text));
     }
   }
   // Comparison of two descriptions of a recording, one of which comes from a file.
@@ -59,7 +59,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const std::string difference = fingerprint_difference(was, now);
       if (difference.empty() && was != now &&
           nlohmann::json::parse(was, nullptr, false) != nlohmann::json::parse(now, nullptr, false))
-        fuzz::broken("different recordings differ", text);
+        fuzz::broken("different descriptions give a difference", text);
     } catch (const Error&) {
     }
   }

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the fuzz targets of build/fuzz, each for so many seconds: ./dev fuzz [SECONDS] [NAME ...]
+"""Runs each fuzz target of build/fuzz for a number of seconds: ./dev fuzz [SECONDS] [NAME ...]
 
-Seeds are made here; what a target finds interesting stays in build/fuzz/corpus/NAME for the next run. An input that breaks
-something is left in build/fuzz/found/: make a test of it beside the code, then mend.
+This script creates the seeds. Inputs that reach new code are stored in build/fuzz/corpus/NAME for the next run. Inputs that cause
+a failure are written to build/fuzz/found/: add a test with such an input next to the code, then fix the code.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ def json_seeds():
 
 
 def experiment_seeds():
-    """The experiments of the documentation, and one with every kind of value."""
+    """The experiment files in the documentation, and one with every type of value."""
     for page in sorted((ROOT / "docs").glob("*.md")):
         yield from (block.encode() for block in re.findall(r"```toml[^\n]*\n(.*?)```", page.read_text(), re.DOTALL))
     yield b'task = "pick"\nepisodes = 4\nworlds = 2\nseed = 3\ncameras = ["wrist_camera"]\nsize = "64x48"\naction_noise = 0.5\nkeep_failures = true\n'
 
 
 def video_seeds():
-    """Small videos as the recorder's ffmpeg writes them."""
+    """Small videos, encoded like those of recordings."""
     with tempfile.TemporaryDirectory() as folder:
         for name, pixels, codec in (("a.mp4", "yuv420p", ["libx264"]), ("a.mkv", "gray16le", ["ffv1", "-level", "3", "-slicecrc", "1"])):
             source = ["-f", "lavfi", "-i", "color=gray:size=16x16:rate=10", "-frames:v", "3", "-pix_fmt", pixels]
@@ -57,7 +57,7 @@ def video_seeds():
 
 
 def recording_seeds():
-    """What the target makes of bytes is its own matter; these differ."""
+    """Different byte strings; the target turns any bytes into a recording."""
     return [bytes((7 * i * i + k * i) % 256 for i in range(400)) for k in range(20)]
 
 
@@ -71,7 +71,7 @@ SEEDS = {
 
 
 def words(name: str) -> list[str]:
-    """What a target may put together: keys of experiments, letters of boxes."""
+    """The dictionary of a target: keys of experiment files, names of MP4 boxes and similar."""
     if name == "experiment":
         fields = (ROOT / "python/mjsense/configs.py").read_text()
         return sorted(set(re.findall(r"^    (\w+):", fields, re.MULTILINE))) + ["true", "false", "inf", "nan", "0x", "'''", '"""', "[[", "no_"]
@@ -96,7 +96,7 @@ def run(name: str, seconds: int) -> bool:
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", env=environment)
     runs = re.search(r"number_of_executed_units: (\d+)", done.stderr)
     covered = re.findall(r"cov: (\d+)", done.stderr)
-    print(f"{name}: {runs[1] if runs else '?'} inputs, {covered[-1] if covered else '?'} places reached", flush=True)
+    print(f"{name}: {runs[1] if runs else '?'} inputs, {covered[-1] if covered else '?'} code locations reached", flush=True)
     if done.returncode != 0:
         print(done.stderr[-6000:], file=sys.stderr)
     return done.returncode == 0

@@ -13,6 +13,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (facts.frames < 0 || facts.width < 0 || facts.height < 0)
     fuzz::broken("sizes are not negative", "");
   if (facts.error.empty() && static_cast<std::uint64_t>(facts.frames) > size)
-    fuzz::broken("a picture takes a byte", "");
+    fuzz::broken("every frame takes at least one byte", "");
   return 0;
 }

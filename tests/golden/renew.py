@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the hashes of this CPU anew: python tests/golden/renew.py "why the bits changed" [--build build/dev]
+"""Rewrites the hashes of this CPU: python tests/golden/renew.py "reason for the change" [--build build/dev]
 
-Every instruction set of the kernels that this CPU has is run; lines of other CPUs stay, and are wrong from here on until somebody
-renews them there (CI says so). The reason becomes the file's first line and belongs into the commit's message.
+Runs the test with every instruction set of the kernels that this CPU supports. Lines of other CPUs are not changed; they are
+outdated until this script is run on such a CPU, and the test fails there. The reason becomes the first line of the file and
+belongs in the commit message.
 """
 
 import argparse
@@ -21,13 +22,13 @@ def main() -> int:
     parser.add_argument("--build", type=Path, default=HERE.parents[1] / "build/dev")
     options = parser.parse_args()
     if len(options.reason.split()) < 2:
-        parser.error("say in a few words why the bits changed")
+        parser.error("the reason must have at least two words")
     fresh: dict[str, str] = {}
     for isa in ("portable", "avx2", "avx512"):
         done = subprocess.run([options.build / "golden_test", "--print"], env={**os.environ, "MJSENSE_ISA": isa},
                               capture_output=True, text=True)
         if done.returncode == 77:
-            print(f"{isa}: this CPU does not have it", file=sys.stderr)
+            print(f"{isa}: not supported by this CPU", file=sys.stderr)
         elif done.returncode != 0:
             sys.exit(done.stdout + done.stderr)
         else:

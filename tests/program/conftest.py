@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drives the mjsense program as a user does: build/dev/mjsense, or $MJSENSE_PROGRAM."""
+"""Fixture that runs the mjsense program: build/dev/mjsense, or $MJSENSE_PROGRAM."""
 
 import os
 import pathlib
@@ -13,7 +13,8 @@ PROGRAM = os.environ.get("MJSENSE_PROGRAM", str(ROOT / "build/dev/mjsense"))
 
 @pytest.fixture
 def mjsense(tmp_path):
-    """mjsense("record", "pick", ..., rc=0) runs in an empty folder and returns the finished process."""
+    """mjsense("record", "pick", ..., rc=0) runs the program in an empty folder, checks the exit code and returns the finished
+    process."""
 
     def run(*args, rc=0, env=None, **kwargs):
         done = subprocess.run(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense record: what is on disk, that it depends on nothing but the seed, and that it stops cleanly."""
+"""Tests of `mjsense record`: contents of the files, reproducibility from the seed, and clean termination."""
 
 import json
 import pathlib
@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 
-# Small pictures, a few steps: enough for everything but success.
+# Small images and few steps: sufficient for every test that does not need a successful episode.
 QUICK = ["record", "pick", "--size", "64x48", "--horizon", "6", "--keep-failures", "-q"]
 
 
@@ -22,7 +22,7 @@ def rows(dataset):
 
 
 def contents(folder):
-    """{path below folder: bytes} of what a recording is made of."""
+    """{path relative to the folder: bytes} of the files of a recording."""
     folder = pathlib.Path(folder)
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
@@ -46,13 +46,13 @@ def check_cameras(traj, house, start, T):
         assert (video["width"], video["height"], video["r_frame_rate"]) == (160, 96, "500/33")
         points = traj[f"obs/extra/object_image_points/pickup_obj/{camera}/points"]
         assert points.shape == (T, 10, 2) and points.dtype == np.float32
-        if camera == "exo_camera_1":  # the object is seen where its pose is projected
+        if camera == "exo_camera_1":  # the object is visible at the projection of its pose
             p = E @ [*start[:3], 1.0]
             assert np.abs(np.nanmean(points[0], axis=0) - (K @ p)[:2] / p[2] / (160, 96)).max() < 0.05
 
 
 def check_actions(traj, T):
-    """Row t is the action that led to observation t; the last is the done sentinel."""
+    """Row t is the action that led to observation t; the last row is the done sentinel."""
     actions = {k: rows(v) for k, v in traj["actions"].items()}
     assert all(len(v) == T for v in actions.values())
     assert actions["commanded_action"][0] == {} and actions["commanded_action"][-1] != {}
@@ -97,7 +97,7 @@ def test_molmospaces_readers_accept_a_pick(mjsense):
 
 
 def test_absent_objects_are_marked(mjsense):
-    """`floor` has 12 objects, 6 to 10 of them in an episode: the others are NaN in the file, and not present."""
+    """`floor` has 12 objects, of which an episode uses 6 to 10. The others are NaN in the file and marked as absent."""
     mjsense("record", "nav_to_obj", "--episodes", 2, "--horizon", 3, "--keep-failures", "--cameras", "none", "--no-sheet", "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
         for traj in file.values():
@@ -193,7 +193,7 @@ def test_recording_contains_the_reason_of_a_failure(mjsense):
         assert {name for name, outcome in outcomes.items() if outcome == "success"} == {
             name for name, traj in file.items() if traj["success"][-1]}  # fmt: skip
     failed = {name: outcome for name, outcome in outcomes.items() if outcome != "success"}
-    # Details of one episode stand in parentheses; outcomes are counted without them.
+    # Parentheses contain details of one episode; outcomes are counted without them.
     counted = {name: outcome.split(" (")[0] for name, outcome in outcomes.items()}
     reasons = {counted[name] for name in failed}
     assert failed and reasons <= {"horizon reached: the object is not lifted", "the policy gave up: found no plan"}
@@ -257,7 +257,7 @@ def test_recording_with_a_changed_scene_cannot_be_resumed(mjsense):
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.03\n')
     assert "'settings/scene_file/gap' was" in mjsense(*args, "--resume", rc=2).stderr
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
-    assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # the same again: nothing else is wrong
+    assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # with the original scene the recording is accepted again
 
 
 def test_progress_without_a_terminal_is_plain_lines(mjsense):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense scan: a lidar's view of a scene as a point cloud."""
+"""Tests of `mjsense scan`, which writes a lidar scan of a scene as a point cloud."""
 
 import resource
 import subprocess
@@ -41,7 +41,7 @@ def test_embedded_model(mjsense):
     done = mjsense("scan", "embedded:scenes/table/room.xml", "--frame", "geom:table_top", "--out", "cloud.ply")
     cloud = points(mjsense.folder / "cloud.ply")
     assert f"{len(cloud)} of 5760 rays returned" in done.stdout
-    on_floor = np.abs(cloud[:, 2] + 0.585) < 1e-4  # the table's top is that high
+    on_floor = np.abs(cloud[:, 2] + 0.585) < 1e-4  # m, height of the table top
     on_wall = np.abs(cloud[:, 0] - 1.65) < 1e-4
     assert on_floor.sum() > 100 and on_wall.sum() > 100
     assert "imu" in mjsense("sensors", "embedded:robots/quadruped.xml").stdout
@@ -62,7 +62,8 @@ def few_bytes():
 
 
 def test_limit_on_the_size_of_files(mjsense, room):
-    """ulimit -f: an error as of a full disk, and nothing is left; of what goes to stdout too."""
+    """With a file size limit (ulimit -f), the program fails as with a full disk and leaves no file; likewise if it writes to
+    stdout."""
     done = mjsense("scan", room, "--frame", "site:head", "--out", "cloud.ply", rc=2, preexec_fn=few_bytes)
     assert done.stderr == "mjsense: cannot write 'cloud.ply': File too large\n"
     assert [p.name for p in mjsense.folder.iterdir()] == ["room.xml"]

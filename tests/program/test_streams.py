@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stdin, stdout and stderr that are closed or full, as a daemon, a lost terminal or a full disk leave them."""
+"""Tests with stdin, stdout and stderr closed or full, as with a daemon, a lost terminal or a full disk."""
 
 import os
 import subprocess
@@ -24,7 +24,7 @@ def test_exit_code_if_the_streams_are_closed(mjsense, streams):
 
 
 def test_recording_continues_if_messages_cannot_be_written(mjsense):
-    """A recording goes on when the terminal of its progress is gone, and its files hold no words of stderr."""
+    """A recording continues if stderr is closed or full, and text for stderr is never written into its files."""
     with open("/dev/full", "w") as full:
         assert run(mjsense, "verify", "missing", stderr=full) == 2
         assert run(mjsense, "record", "pick", "--out", "full", "--cameras", "none", "--seed", "1", stderr=full, stdout=subprocess.DEVNULL) == 0
@@ -33,4 +33,4 @@ def test_recording_continues_if_messages_cannot_be_written(mjsense):
     assert (mjsense.folder / "closed" / name).read_bytes() == (mjsense.folder / "full" / name).read_bytes()
     for word in ("verify", "inspect"):
         assert run(mjsense, word, "closed", stdout=subprocess.DEVNULL, preexec_fn=closing(0, 2)) == 0
-        assert run(mjsense, word, "closed", preexec_fn=closing(1)) == 2  # its answer is lost
+        assert run(mjsense, word, "closed", preexec_fn=closing(1)) == 2  # its result cannot be written

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The other words of mjsense, and wrong input: one clear line, exit code 2, nothing half-written."""
+"""Tests of the other commands of mjsense, and of invalid input: one line of error, exit code 2, and no incomplete files."""
 
 import json
 import os
@@ -93,7 +93,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("record packing --out x --scene table", "scene 'table' has no receptacle"),
     ("record pick --out x --cameras none extra", "extra"),
 ])
-def test_wrong_input_is_one_clear_line(mjsense, args, line):
+def test_invalid_input_is_a_one_line_error(mjsense, args, line):
     (mjsense.folder / "scene.xml").write_text(SCENE)
     (mjsense.folder / "file").write_text("mine")
     (mjsense.folder / "folder").mkdir()
@@ -112,14 +112,15 @@ def test_wrong_input_is_one_clear_line(mjsense, args, line):
 
 
 def numbers_of_record(mjsense):
-    """(name, kind) of every option of record that takes a number."""
+    """(name, kind) of every numeric option of `record`."""
     fields = json.loads(mjsense("schema").stdout)["structs"]["RecordJobCfg"]["fields"]
     kinds = [(f["option"], f["type"].get("element", f["type"])["kind"]) for f in fields]
     return [(name, kind) for name, kind in kinds if kind in ("int", "unsigned", "number")]
 
 
 def test_numbers_out_of_range_are_rejected_everywhere(mjsense):
-    """No integer is cut to 32 bits (4294967297 would be 1), and no number is NaN: in experiments, as an option, by --set."""
+    """Integers beyond 32 bits are rejected, not truncated (4294967297 would become 1), and so is NaN: in experiment files, as
+    options, by --set."""
     wrong = {"int": (2**32 + 1, 1 - 2**32, 2**31, 2**64 + 1, -1, "2.0", '"2"'), "unsigned": (-1, 2**64 + 1, "1.5"), "number": ("nan", "-inf")}
     numbers = numbers_of_record(mjsense)
     assert len(numbers) > 15
@@ -163,7 +164,7 @@ def test_no_command_lists_the_commands(mjsense):
     assert "record" in done.stderr and "verify" in done.stderr
 
 
-def test_a_folder_that_cannot_be_written(mjsense):
+def test_output_folder_that_cannot_be_created(mjsense):
     (mjsense.folder / "file").write_text("")
     done = mjsense("record", "pick", "--cameras", "none", "--out", "file", rc=2)
     assert "file" in done.stderr and done.stderr.count("\n") == 1
@@ -171,7 +172,7 @@ def test_a_folder_that_cannot_be_written(mjsense):
 
 @pytest.mark.parametrize("name", ("file:a:b", "-y", "a b%d", "tcp://x"))
 def test_folder_names_are_never_options_or_addresses(mjsense, name):
-    """Nothing of a name is an option or an address for ffmpeg."""
+    """ffmpeg must not interpret any part of the folder's name as an option or a protocol."""
     mjsense("record", "pick", "--size", "32x24", "--horizon", 2, "--keep-failures", "-q", f"--out={name}")
     assert "intact: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
     assert sorted(p.name for p in (mjsense.folder / name).iterdir()) == ["contact_sheet.png", "house_0"]
@@ -286,7 +287,7 @@ def test_completion(mjsense, words, expected):
 
 
 def test_completion_in_bash(mjsense):
-    """As bash does it: the script is sourced, the function is called with the words, and leaves what it found in COMPREPLY."""
+    """Completes like bash: sources the script, calls the function with COMP_WORDS, and reads the candidates from COMPREPLY."""
     script = '''source <("$1" completion bash); PATH="$2:$PATH"; COMP_WORDS=(mjsense record --policy p); COMP_CWORD=3; _mjsense
     printf '%s\n' "${COMPREPLY[@]}"'''
     done = subprocess.run(["bash", "-c", script, "bash", mjsense.program, os.path.dirname(mjsense.program)], capture_output=True, text=True)
@@ -322,7 +323,7 @@ def test_physics_that_fails_prints_no_table(mjsense):
     (mjsense.folder / "ball.xml").write_text(stiff)
     done = mjsense("sensors", "ball.xml", rc=2)
     assert "ball.xml: the physics failed: " in done.stderr and not done.stdout
-    assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # MuJoCo would leave its log
+    assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # without MuJoCo's log file
 
 
 def test_record_reports_the_contact_sheet(mjsense):

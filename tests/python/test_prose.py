@@ -24,7 +24,9 @@ def check_prose():
 ])  # fmt: skip
 def test_finds_unidiomatic_text(check_prose, tmp_path, text):
     for name, content in (("a.md", text), ("b.md", f"- {text}"), ("c.md", f"| x | {text} |"), ("a.h", f"// {text}"),
-                          ("b.cc", f'  throw ValueError("{text}");'), ("a.py", f'"""{text}"""'), ("b.py", f"x = 1  # {text}")):  # fmt: skip
+                          ("b.cc", f'  throw ValueError("{text}");'), ("a.py", f'"""{text}"""'), ("b.py", f"x = 1  # {text}"),
+                          ("a.cmake", f"# {text}"), ("a.sh", f"cat <<'EOF'\n{text}\nEOF"), ("b.sh", f'echo "{text}"'),
+                          ("a.toml", f"x = 1  # {text}"), ("a.xml", f"<!-- {text} -->")):  # fmt: skip
         (tmp_path / name).write_text(content + "\n")
         assert list(check_prose.findings(tmp_path / name)), (name, text)
 
@@ -41,6 +43,8 @@ def test_finds_a_phrase_across_two_lines(check_prose, tmp_path):
     ("c.md", "<!-- nobody -->\n<!-- fields XCfg -->\n| a | of yours |\n<!-- end -->"),
     ("a.h", "int nobody = 0;  // metres"),
     ("a.py", "nobody = beside"),
+    ("a.toml", 'nobody = "beside"'),
+    ("a.xml", "<nobody/>"),
 ])  # fmt: skip
 def test_plain_text_passes(check_prose, tmp_path, name, text):
     (tmp_path / name).write_text(text + "\n")
@@ -49,5 +53,5 @@ def test_plain_text_passes(check_prose, tmp_path, name, text):
 
 def test_rewritten_files_have_no_findings(check_prose):
     paths = list(check_prose.files(check_prose.CHECKED))
-    assert len(paths) > 40
+    assert len(paths) > 1000
     assert [finding for path in paths for finding in check_prose.findings(path)] == []

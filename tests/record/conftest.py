@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="session")
 def record_fake():
-    """The program that records a suite without physics: record_fake(out, "--episodes", 4) -> CompletedProcess."""
+    """Runs the program that records a suite without physics: record_fake(out, "--episodes", 4) -> CompletedProcess."""
     program = Path(os.environ.get("MJSENSE_RECORD_FAKE", ROOT / "build/dev/record_fake"))
     if not program.exists():
         pytest.skip("record_fake is not built (./dev build)")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What MolmoSpaces' own scripts ask of a recording, written anew from their documented behaviour.
+"""Reimplementation of MolmoSpaces' scripts that read recordings, from their documented behaviour.
 
-Chain of the peer: repair_video_paths -> validate_trajectories -> calculate_stats, then training loaders.
+Their order: repair_video_paths -> validate_trajectories -> calculate_stats, then training loaders.
 """
 
 import json
@@ -13,7 +13,7 @@ import numpy as np
 
 
 def rows(dataset):
-    """The JSON rows of a dict sensor."""
+    """The rows of a dict sensor, decoded from JSON."""
     return [json.loads(row.tobytes().decode("utf-8").rstrip("\x00")) for row in dataset[:]]
 
 
@@ -22,7 +22,7 @@ def file_name(dataset):
 
 
 def decode(path, pixel_format, shape):
-    """Every frame of a video: uint8 [T, H, W, 3] or uint16 [T, H, W]."""
+    """All frames of a video: uint8 [T, H, W, 3] or uint16 [T, H, W]."""
     raw = subprocess.run(
         ["ffmpeg", "-v", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", pixel_format, "-"], capture_output=True, check=True
     ).stdout
@@ -36,7 +36,7 @@ def probe(path):
 
 
 def validate(path: Path, visible=(), min_steps=3):
-    """validate_trajectories: one list of complaints per trajectory; an empty list is a valid trajectory."""
+    """validate_trajectories: a list of errors for each trajectory, empty if it is valid."""
     result = []
     with h5py.File(path) as f:
         numbers = sorted(int(k.split("_")[-1]) for k in f if k.startswith("traj_"))
@@ -72,7 +72,7 @@ def complaints(path, traj, visible, min_steps):
 
 
 def missing_video_names(path: Path):
-    """repair_video_paths: the names that it would have to add."""
+    """repair_video_paths: the missing names of videos."""
     with h5py.File(path) as f:
         for traj in (f[k] for k in f if k.startswith("traj_")):
             for camera in traj["obs/sensor_param"]:
@@ -85,9 +85,9 @@ def statistics(path: Path, keys=("actions", "obs/agent/qpos")):
     gathered: dict[str, list[np.ndarray]] = {}
 
     def gather(name, dataset, trim):
-        assert np.issubdtype(dataset.dtype, np.integer) and dataset.ndim == 2, name  # integers are JSON rows
+        assert np.issubdtype(dataset.dtype, np.integer) and dataset.ndim == 2, name  # integer data sets contain JSON rows
         decoded = rows(dataset)
-        decoded = decoded[1:-1] if trim else decoded  # the first action is a dummy, the last the sentinel
+        decoded = decoded[1:-1] if trim else decoded  # the first action is a placeholder, the last one the sentinel
         for group in decoded[0]:
             values = [row[group] for row in decoded]
             if len({len(v) for v in values}) == 1 and len(values[0]) > 0:
@@ -126,7 +126,7 @@ def collect_episode_results(path: Path):
 
 
 def training_samples(path: Path, action="joint_pos.arm"):
-    """MolmoBot: sample s pairs state row s with action row s + 1; T - 2 samples a trajectory."""
+    """MolmoBot: sample s pairs state row s with action row s + 1, which gives T - 2 samples per trajectory."""
     name, group = action.split(".")
     with h5py.File(path) as f:
         for traj in (f[k] for k in f if k.startswith("traj_")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kill -9 at random moments: every finished episode stays readable, resuming goes on, nothing twice."""
+"""Tests with kill -9 at random times: finished episodes stay readable, --resume continues, and no episode is recorded twice."""
 
 import random
 import signal
@@ -26,7 +26,7 @@ def episodes_of(files):
 
 @pytest.fixture(scope="module")
 def whole(record_fake, tmp_path_factory):
-    """The files, and the episodes in them: those that were played beyond the wanted number are not kept."""
+    """The files of an uninterrupted recording and its episodes. Episodes beyond the requested number are not stored."""
     out = tmp_path_factory.mktemp("whole")
     record_fake(out, *OPTIONS)
     return contents(out), episodes_of(out.glob("house_0/*.h5"))
@@ -36,7 +36,7 @@ def whole(record_fake, tmp_path_factory):
 def test_kill_and_resume(record_fake, whole, tmp_path, seed):
     rng = random.Random(seed)
     files, wanted = whole
-    finished = []  # episodes that the program said are safe
+    finished = []  # episodes that the program reported as stored
     for _ in range(12):
         process = subprocess.Popen(
             [record_fake.program, tmp_path, *OPTIONS, "--resume", "--step-ms", "4"], stdout=subprocess.PIPE, text=True
@@ -45,7 +45,7 @@ def test_kill_and_resume(record_fake, whole, tmp_path, seed):
         process.send_signal(signal.SIGKILL)
         finished += [line.split()[1] for line in process.communicate()[0].splitlines() if line.startswith("finished")]
         if (tmp_path / "house_0").exists() and not (tmp_path / "house_0/.recording").exists():
-            break  # it was faster
+            break  # the recording finished before the kill
         check_readable(record_fake, tmp_path, wanted.intersection(finished))
     record_fake(tmp_path, *OPTIONS, "--resume")
     assert len(set(finished)) == len(finished), "an episode was recorded twice"
@@ -55,7 +55,7 @@ def test_kill_and_resume(record_fake, whole, tmp_path, seed):
 def check_readable(record_fake, out, finished):
     house = out / "house_0"
     assert finished <= episodes_of([*house.glob("*.h5"), *house.glob(".recording/episode_????????/traj.h5")])
-    for path in house.glob("*.h5"):  # under a final name: whole, with its videos
+    for path in house.glob("*.h5"):  # files with a final name are complete, including their videos
         assert "\nwhole" in "\n" + record_fake("verify", path).stdout
 
 

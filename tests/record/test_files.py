@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files as h5py, ffmpeg and MolmoSpaces' readers see them."""
+"""Tests of recorded files with h5py, ffmpeg and MolmoSpaces' readers."""
 
 import json
 import os
@@ -41,7 +41,7 @@ def test_molmospaces_scripts_accept_every_trajectory(files):
 
 def test_validation_can_fail(files, tmp_path):
     copy = tmp_path / files[0].name
-    copy.write_bytes(files[0].read_bytes())  # without its videos
+    copy.write_bytes(files[0].read_bytes())  # the videos are not copied
     assert all("does not exist" in c[0] for c in readers.validate(copy))
 
 
@@ -136,19 +136,19 @@ def test_videos(house, files):
     assert (rgb["codec_name"], rgb["pix_fmt"], rgb["r_frame_rate"]) == ("h264", "yuv420p", "500/33")
     assert (rgb["width"], rgb["height"], int(rgb["nb_read_frames"])) == (WIDTH, HEIGHT, T)
     frames = readers.decode(name["wrist_camera"], "rgb24", (HEIGHT, WIDTH, 3)).astype(int)
-    assert np.abs(frames[5, HEIGHT // 2, 2 * 5 + 8] - [220, 60, 80]).max() < 25  # the ball, where and when it was
+    assert np.abs(frames[5, HEIGHT // 2, 2 * 5 + 8] - [220, 60, 80]).max() < 25  # the ball at its position in frame 5
 
     x, y, t = np.arange(WIDTH), np.arange(HEIGHT)[:, None], np.arange(T)[:, None, None]
     metres = np.float32(0.3) + np.float32(0.001) * (x + 2 * y + t).astype(np.float32)
     codes = readers.decode(name["wrist_camera_depth_16bit"], "gray16le", (HEIGHT, WIDTH))
-    assert (codes[:, 0, 0] == 0).all() and (codes[:, 0, -1] == 65535).all()  # invalid; infinitely far
+    assert (codes[:, 0, 0] == 0).all() and (codes[:, 0, -1] == 65535).all()  # first column: invalid; last column: infinitely far
     inner = np.s_[:, 1:, :]
     assert np.abs(codes[inner] * units - metres[inner]).max() <= units / 2 * 1.01
 
     lossy = readers.decode(name["wrist_camera_depth"], "rgb24", (HEIGHT, WIDTH, 3)).astype(float)
     peer = (lossy[..., 0] * 256 + lossy[..., 1] - 1) / 65534 * 0.5 + 0.05
     inside = metres < 0.5
-    assert np.median(np.abs(peer - metres)[inside]) < 0.01  # the peer's form, with the peer's losses
+    assert np.median(np.abs(peer - metres)[inside]) < 0.01  # MolmoSpaces' lossy encoding
 
 
 @pytest.mark.parametrize("size", [(33, 17), (640, 362)])
@@ -173,7 +173,7 @@ def test_statistics_and_results(files):
     assert state["base"] == []
 
 
-def test_h5py_may_add_to_the_files(files, tmp_path):
+def test_h5py_can_add_to_the_files(files, tmp_path):
     copy = tmp_path / "copy.h5"
     copy.write_bytes(files[0].read_bytes())
     with h5py.File(copy, "r+") as f:
@@ -192,12 +192,12 @@ def test_only_stock_filters(files):
         f.visititems(stock)
 
 
-# ---- files of the peer
+# ---- files written by MolmoSpaces
 
 
 @pytest.fixture
 def peer_file(tmp_path):
-    """A file as MolmoSpaces leaves it: LZF, no attributes, no names of videos."""
+    """A file like those of MolmoSpaces: LZF, no attributes, no names of videos."""
     house = tmp_path / "house_3"
     house.mkdir()
     T = 40
@@ -235,7 +235,7 @@ def test_molmospaces_files_are_understood(record_fake, peer_file):
     assert "1 videos" in record_fake("verify", path.parent).stdout
 
 
-# ---- damage is found
+# ---- detection of damage
 
 
 def damage(path, name, change):
@@ -257,7 +257,7 @@ def damage(path, name, change):
 )
 def test_verify_finds_damage(record_fake, house, tmp_path, name, change, complaint):
     for path in house.iterdir():
-        os.link(path, tmp_path / path.name)  # a soft link would not be followed
+        os.link(path, tmp_path / path.name)  # a hard link, because symbolic links are not followed
     copy = tmp_path / "trajectories_batch_1_of_2.h5"
     copy.unlink()
     copy.write_bytes((house / copy.name).read_bytes())

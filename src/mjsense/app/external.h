@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Words that the program does not know run `mjsense-<word>` from PATH, as git does.
+// Unknown commands run the program `mjsense-<command>` from PATH, as in git.
 
 #include <span>
 #include <string>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The `mjsense` program, as a function: the executable and the Python package's command are the same.
+// The `mjsense` program as a function, which the executable and the command of the Python package
+// both call.
 
 namespace mjsense {
 

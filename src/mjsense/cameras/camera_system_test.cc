@@ -21,7 +21,8 @@ using ::testing::HasSubstr;
 
 constexpr double kDeg = std::numbers::pi / 180;
 
-// A robot with a camera on a turned body, a ball, a wall east of it, and far away a ball whose parent has no geom.
+// A robot with a camera on a rotated body, a ball, a wall at larger x, and far away another ball,
+// whose parent body has no geom.
 constexpr char kXml[] = R"(
 <mujoco>
   <worldbody>

@@ -20,11 +20,11 @@
 namespace mjsense {
 namespace {
 
-// Runs `deed` in the child process of a death test, with a file size limit of 1000 bytes.
-void write_with_a_limit(const testing::TempDir& folder, auto&& deed) {
+// Runs `write` in the child process of a death test, with a file size limit of 1000 bytes.
+void write_with_a_limit(const testing::TempDir& folder, auto&& write) {
   const rlimit limit{1000, 1000};
   setrlimit(RLIMIT_FSIZE, &limit);
-  deed(folder.path / "large");
+  write(folder.path / "large");
 }
 
 TEST(FileLimit, WriteBeyondTheLimitFails) {

@@ -12,8 +12,9 @@
 extern "C" mjfLogHandler _mjPRIVATE_setTlsLogHandler(mjfLogHandler handler);
 extern "C" mjfLogHandler _mjPRIVATE_getGlobalLogHandler();
 
-// call(argument) in a stack frame whose personality routine is ours. A personality routine is what an unwinder asks whether a frame
-// handles an exception; those of C++ compilers call back into the unwinder of their own run-time library, ours calls none.
+// Runs call(argument) in a stack frame with the personality routine below. An unwinder calls the
+// personality routine of a frame to find out whether the frame handles an exception. Those of C++
+// compilers call back into the unwinder of their own run-time library; this one does not.
 extern "C" void mjsense_call_in_frame(void (*call)(void*), void* argument);
 extern "C" [[gnu::used, gnu::visibility("hidden")]] _Unwind_Reason_Code mjsense_personality(
     int, _Unwind_Action, _Unwind_Exception_Class, _Unwind_Exception*, _Unwind_Context*);
@@ -106,7 +107,8 @@ void run_mujoco(void (*call)(void*), void* argument) {
 
 }  // namespace mjsense
 
-// In the first phase an unwinder searches for a handler; in the second it has cleaned up all frames below ours, so that it can be left.
+// In the first phase an unwinder searches for a handler. When it calls this routine in the second
+// phase, it has cleaned up all frames below this one, so the unwinder can be left.
 _Unwind_Reason_Code mjsense_personality(int, _Unwind_Action actions, _Unwind_Exception_Class,
                                         _Unwind_Exception* exception, _Unwind_Context*) {
   if (actions & _UA_FORCE_UNWIND) return _URC_CONTINUE_UNWIND;  // a thread is cancelled

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Calls of MuJoCo functions that allocate memory. MuJoCo reports a lack of memory in two ways, both of which would end the process:
-// mju_error() calls exit(), and a std::bad_alloc of its C++ code cannot be caught here, because libmujoco contains a C++ run-time library
-// and an unwinder of its own, which crashes in the first of our stack frames that has something to clean up.
+// Calls of MuJoCo functions that allocate memory. MuJoCo reports a lack of memory in two ways, both
+// of which would end the process: mju_error() calls exit(), and a std::bad_alloc of its C++ code
+// cannot be caught by a normal handler. libmujoco contains its own C++ run-time library and
+// unwinder, which crashes in the first stack frame of mjsense that has destructors to run.
 
 #include <mujoco/mujoco.h>
 
@@ -12,7 +13,8 @@
 
 namespace mjsense {
 
-// Runs call(argument). An error or C++ exception of MuJoCo becomes a RuntimeError. `call` must hold nothing with a destructor.
+// Runs call(argument). An error or C++ exception of MuJoCo becomes a RuntimeError. `call` must not
+// have local objects with destructors.
 void run_mujoco(void (*call)(void*), void* argument);
 
 // call_mujoco(mj_compile, spec, vfs): the function's result; throws RuntimeError if MuJoCo fails.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// All effects as one variant. Python and every reader of fields know the types that are listed here.
+// All effects as one variant. Only effects in this list are available in Python and in files.
 
 #include <memory>
 

@@ -426,7 +426,8 @@ TEST(StepDelay, LagsAreUniformHeldAndShared) {
   }
 }
 
-// A lag lasts `update_period` rows. Each world changes its lag at rows of its own, or all do at the same ones.
+// A lag is kept for `update_period` rows. With a phase per world, the worlds change their lags at
+// different rows, otherwise at the same rows.
 TEST(StepDelay, TheUpdatePeriodHasAPhaseForEachWorld) {
   constexpr int kWorlds = 40, kLags = 9, kUpdate = 5, kRows = 400;
   for (const bool per_world : {true, false}) {

@@ -18,11 +18,11 @@ struct GraspObject {
   ObjectShape shape;  // at the size of its model
 };
 
-// Where a task wants its target to be placed.
+// Where a task requires its target to be placed.
 class PlaceScene {
  public:
   virtual ~PlaceScene() = default;
-  // The body on, in or beside which the target must come to rest.
+  // The body on, in or next to which the target must come to rest.
   virtual int receptacle(int world) const = 0;
   // Possible positions (m, world frame) of the centre of the target's underside in the current
   // state, best first, if the object is rotated by `turn` from its current orientation. `out` is

@@ -47,7 +47,7 @@ struct SceneFileCfg;
 struct TaskCfg {
   RobotCfg robot;     // without a name: the robot in the task's scene, if any
   std::string scene;  // name or file; "": the task's own scene
-  // Creates a scene that replaces a named one; `scene` is then only a label for people.
+  // Creates a scene that replaces a named one; `scene` is then only a display name.
   std::function<SceneFileCfg()> make_scene;
   std::uint64_t seed = 0;
   int horizon = 500;      // policy steps after which an episode is truncated
@@ -64,7 +64,7 @@ struct TaskCfg {
 struct TaskObject {
   std::string role;
   int body = -1;
-  std::string name;   // short name of the body, for people: "mug"
+  std::string name;   // display name: "mug"
   bool thin = false;  // a handle, a wire: its image points may be on its rim
 };
 
@@ -175,8 +175,8 @@ class Task {
   // may change.
   virtual std::span<const TaskObject> objects(int world) const = 0;
   virtual std::string description(int world) const = 0;  // "Pick up the mug"
-  // Bodies with a free joint that are absent from some episodes, and whether one of them takes part in this world's.
-  // An absent body is held far away.
+  // Bodies with a free joint that are absent from some episodes, and whether one of them is present
+  // in this world's episode. Absent bodies are held far away.
   virtual std::vector<int> absentees() const { return {}; }
   virtual bool present(int /*world*/, int /*body*/) const { return true; }
   using Referrals = std::vector<std::pair<std::string, std::vector<Referral>>>;  // by role

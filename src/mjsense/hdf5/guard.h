@@ -39,8 +39,8 @@ void each_dataset(hid_t group, const std::function<void(const std::string& path)
 // Reads a dataset of single bytes [n], n <= most.
 [[nodiscard]] std::string read_bytes(hid_t parent, const std::string& path, std::size_t most);
 
-// The process that read a file was killed by another process or got no processor time, which says
-// nothing about the file.
+// The process that read a file was killed by another process or got no processor time, so it
+// is unknown whether the file is damaged.
 struct Ended : RuntimeError {
   using RuntimeError::RuntimeError;
 };

@@ -12,7 +12,7 @@ namespace {
 
 // What the bytes unpack to; "refused" if they do not.
 std::string unpacked(const std::vector<std::uint8_t>& packed, std::size_t capacity = 16) {
-  // What lies before the output must not be read: it would be copied into it.
+  // Memory before the output must not be read, because it would be copied into the output.
   std::vector<std::uint8_t> memory(16 + capacity, '!');
   const std::size_t n = lzf_unpack(packed, std::span(memory).subspan(16));
   return n == 0 ? "refused"

@@ -13,14 +13,15 @@
 
 namespace mjsense {
 
-// Which free bodies can be absent from an episode, and whether one of them takes part in that of a world.
+// The free bodies that can be absent from an episode, and a function that tells whether one of them
+// is present in a world's episode.
 struct Presence {
   std::vector<int> bodies;
   std::function<bool(int world, int body)> present;
 };
 
-// Bodies with a free joint outside a robot, in the order of their joints, and the names of their actors. `robot`: free
-// bodies at or below it are no actors; -1: all are.
+// Bodies with a free joint and the names of their actors, in the order of the joints. Bodies at or
+// below the body `robot` are excluded; -1: none are.
 std::vector<std::pair<int, std::string>> actors_of(const mjModel* model, int robot);
 
 // Streams
@@ -31,15 +32,16 @@ std::vector<std::pair<int, std::string>> actors_of(const mjModel* model, int rob
 //                                     each such tree of the scene, by the name of its root body.
 //   env_states/actors/<name>          float32 [13]: position 3 (m), quaternion 4 (wxyz), velocity 6
 //                                     (m/s in world axes, rad/s in body axes): MuJoCo's qpos and
-//                                     qvel of the free joint, which written back restore the body.
-//                                     One for each free body outside the robot. Zeros while the
-//                                     body is absent
-//   env_states/present/<name>         bool []: whether the actor takes part in the episode; one for
-//                                     each actor that can be absent
+//                                     qvel of the free joint. Writing them back restores the body.
+//                                     One stream for each free body outside the robot. Zeros while
+//                                     the body is absent
+//   env_states/present/<name>         bool []: whether the actor is present in the episode; one
+//                                     stream for each actor that can be absent
 //   env_states/articulations/<peer>   float32 [N]: qpos of all groups in order, then their qvel,
-//                                     then zeros: MolmoSpaces' row, where it is asked for
-// An actor is called as its body, without the entity's prefix ("mug" for "mug/mug") where that is
-// unique, else with '_' for '/', which would make a folder of it in a file.
+//                                     then zeros: MolmoSpaces' row, only if it is configured
+// The name of an actor is that of its body without the entity's prefix ("mug" for "mug/mug"). If
+// this is not unique, it is the full name with '/' replaced by '_', because '/' separates groups in
+// HDF5.
 class EnvStatesSensor final : public Sensor {
  public:
   // `length`: N, at least the number of values of the groups; 0: exactly that number. `robot_body`:

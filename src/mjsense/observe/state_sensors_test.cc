@@ -167,7 +167,7 @@ TEST(EnvStates, ContainsEveryFreeBodyAndTheRobot) {
   EXPECT_THAT(values<float>(least, "articulations/arm"), ElementsAre(.25f, -2));
 }
 
-// While an actor is absent its row is zeros and its flag false; actors that cannot be absent have no
+// The row of an absent actor is zero and its flag is false. Actors that cannot be absent have no
 // flag.
 TEST(EnvStates, AbsentActorsAreMasked) {
   TestWorld w(R"(<mujoco><worldbody><body name="a/cup"><freejoint/><geom size=".1"/></body>

@@ -24,7 +24,7 @@ namespace mjsense {
 class Horizons {
  public:
   static constexpr int kOctants = 8;
-  // Larger than any sine: no ray is known to be clear of the mesh.
+  // For faces without a horizon: larger than any sine, so no ray is known to miss the mesh.
   static constexpr float kNever = 2;
   // Number of queries before a horizon is computed. Computing one costs 4 us; a packet's lane that
   // Embree casts costs 0.1 us.

@@ -80,8 +80,7 @@ void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& fiel
   videos.push_back(video);
 }
 
-// The flag "present/mug" that belongs to the float field "actors/mug" of the same sensor; null if there
-// is none.
+// The field "present/mug" that belongs to the float field "actors/mug" of the same sensor, or null.
 const Field* presence_of(const Sensor& sensor, const Field& field) {
   constexpr std::string_view kActors = "actors/";
   if (!field.name.starts_with(kActors) || field.spec.dtype != DType::kFloat32) return nullptr;

@@ -185,7 +185,7 @@ TEST(Frustum, GeomsThatMoveIntoTheImageAreVisible) {
       place(0, -12);
       EXPECT_TRUE(sees(geom));
       expect_nothing_missed(s, e, grid);
-      place(6, -6);  // beside the image
+      place(6, -6);  // outside the image
       EXPECT_FALSE(sees(geom));
       const double size = s.model->geom_size[3 * geom];
       // Now it reaches into the image.

@@ -52,7 +52,7 @@ TEST(Horizon, OfAWallIsItsHeightOverItsDistance) {
   EXPECT_NEAR(sine(mesh, 0, kMinusX), 2e-3, 1e-6);  // the wall is behind the face
   mesh.add({-0.01f, -9, 0, -0.01f, 9, 0, -0.01f, 9, 1});
   mesh.add({-0.01f, -9, 0, -0.01f, 9, 1, -0.01f, -9, 1});
-  // Geometry just behind the face still counts, because rays start slightly beside the face.
+  // Geometry just behind the face still counts, because rays start slightly off the face.
   EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
   for (std::size_t i = mesh.vertices.size() - 18; i < mesh.vertices.size(); i += 3)
     mesh.vertices[i] = -0.1f;

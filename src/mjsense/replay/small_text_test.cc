@@ -54,7 +54,7 @@ TEST(SmallText, EveryCharacterIsDistinct) {
   for (char c = ' '; c <= '~'; ++c) {
     EXPECT_TRUE(seen.insert(drawn(c)).second) << "'" << c << "' looks like another\n" << drawn(c);
   }
-  EXPECT_TRUE(seen.insert(drawn('\x07')).second) << "what has no letter is a box";
+  EXPECT_TRUE(seen.insert(drawn('\x07')).second) << "characters without a glyph are drawn as a box";
   EXPECT_EQ(drawn('\xc3'), drawn('\x07'));
 }
 

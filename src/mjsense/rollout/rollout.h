@@ -83,14 +83,14 @@ struct RolloutCfg {
   std::map<std::string, std::map<std::string, std::string>> code;
   // Adds a camera sensor kDefaultView to the scene, which the suite does not contain.
   bool default_view = false;
-  // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
-  // policy, simulation, cameras and the suite so far are there.
+  // Creates further sensors for the suite, recorded like the others. Called during construction of
+  // the rollout, when task, policy, simulation, cameras and the previous sensors of the suite exist.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
-  // The same for the robot's sensors that are written in Python. They precede the policy's sensors.
+  // The same for sensors of the robot that are written in Python. They precede those of the policy.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> robot_sensors;
   // Edits the suite after everything else.
   std::function<void(SensorSuite&)> edit_suite;
-  // Called when only task and policy exist, and after construction.
+  // `making` is called when only task and policy exist, `made` at the end of the construction.
   std::function<void(Rollout&)> making, made;
 };
 template <class V>
@@ -216,8 +216,9 @@ class Rollout {
   void step_chunk(std::span<const Action> actions, bool stop_on_success = false);
 
   const Evaluation& evaluation(int world) const { return evaluations_[world]; }
-  // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that could
-  // not be filled. "" if it can. Its rows mean nothing until it is started again.
+  // Reason why this world's episode cannot continue: physics that diverged (MuJoCo's message) or a
+  // row that could not be computed. "" if there is none. With a fault, the world's rows are invalid
+  // until its next episode starts.
   const std::string& fault(int world) const { return faults_[world]; }
   // True if the fault is a row that could not be computed: the episode must not be kept.
   bool refused(int world) const { return refused_[world]; }

@@ -145,11 +145,12 @@ Pose pose_of(const Element* element, const mjSpec* spec, const std::string& plac
   return {vec3(element->pos), normalized(quat(q))};
 }
 
-// Puts a root where the configuration says. Returns the motion from where it stood in the world.
+// Sets the configured pose of a root body. Returns the displacement from its previous pose, world
+// frame.
 Pose set_pose(mjsBody* body, const EntityCfg& cfg, const mjSpec* spec, const std::string& place) {
   const std::array<double, 4> q = unit_quat(cfg, place);
   if (is_identity(cfg)) return {};
-  Pose frames;  // that the body stands in
+  Pose frames;  // product of the frames that contain the body
   for (mjsFrame* f = mjs_getFrame(body->element); f; f = mjs_getFrame(f->element))
     frames = pose_of(f, spec, place) * frames;
   const Pose before = frames * pose_of(body, spec, place);

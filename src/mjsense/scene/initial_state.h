@@ -28,13 +28,13 @@ struct Attached {
   bool fixed_base = false;
   bool wrapped = false;        // attached below "<name>/mocap_base"
   std::vector<Keyframe> keys;  // at most one of an entity
-  // Transform from the root's pose in the entity's own model to its pose in the scene. It is applied
-  // to the root's pose in a keyframe.
+  // Transform from the root's pose in the entity's own model to its pose in the scene, also applied
+  // to the root's pose in keyframes.
   Pose moved{};
 };
 
-// Removes and returns the keyframes of a spec, because MuJoCo would make each a keyframe of the whole
-// scene.
+// Removes and returns the keyframes of a spec, because attaching it with MuJoCo would make each of
+// them a keyframe of the whole scene.
 std::vector<Keyframe> take_keyframes(mjSpec* spec);
 
 // Adds the scene's keyframes to the spec with names and times only; `base` holds those of the base.

@@ -91,7 +91,7 @@ void Scene::Impl::build() {
     if (!text.starts_with("Attach conflict")) warnings.push_back(std::move(text));
   }
   add_sensors();
-  add_keyframes(spec.get(), attached.front().keys);  // the base stands first
+  add_keyframes(spec.get(), attached.front().keys);  // the base is the first element
   if (cfg.spec_fn) cfg.spec_fn(spec.get());
   if (cfg.terrain && cfg.terrain->daylight) add_daylight(spec.get());
   compile();

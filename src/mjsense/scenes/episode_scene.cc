@@ -22,12 +22,12 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kHand = 0.085;    // m, what the usual grippers open
-constexpr double kBeside = 0.005;  // m, free beside what an open hand goes around
-constexpr double kReach = 0.25;    // m, half of what is still an object to carry
+constexpr double kHand = 0.085;    // m, opening of common grippers
+constexpr double kBeside = 0.005;  // m, minimum difference between an opening and an object's width
+constexpr double kReach = 0.25;    // m, maximum radius of an object that can be carried
 constexpr double kInside = 0.002;  // m
 constexpr double kAway = 100;      // m, x and y of absent objects
-// Out of sight, a metre apart and above a floor that extends so far.
+// Pose of an absent object: out of sight, one metre from other absent objects.
 Pose away(int object) { return {{kAway + object, kAway, 0.5}, {}}; }
 
 Quat rest_of(std::string_view name) {

@@ -417,7 +417,7 @@ TEST(EpisodeScene, AbsentObjectsAreInert) {
     for (int k = 0; k < 6; ++k) EXPECT_EQ(qvel[m->jnt_dofadr[m->body_jntadr[body]] + k], 0);
   }
   EXPECT_TRUE(played.scene.body_present(0, played.scene.objects()[1].body));
-  EXPECT_NE(played.at(1).z, before[1].z) << "what is present is not held";
+  EXPECT_NE(played.at(1).z, before[1].z) << "present objects move freely";
   EXPECT_LT(norm(played.at(1) - before[1]), 0.01);
 
   files.cfg.count = {-1, -1};

@@ -68,7 +68,7 @@ TEST(Occupancy, MarksObstaclesOnly) {
   EXPECT_FALSE(free(-1, 1)) << "the cylinder";
   EXPECT_TRUE(free(1, 1)) << "under the lamp";
   EXPECT_TRUE(free(1, -1)) << "on the rug";
-  EXPECT_TRUE(free(-1, -1)) << "what nobody touches";
+  EXPECT_TRUE(free(-1, -1)) << "geoms without collisions";
   EXPECT_EQ(o.clearance(50, 0), 0) << "off the grid";
   // Analytic distances, within one cell.
   EXPECT_NEAR(o.clearance(1, 0), 0.95, 0.06)
@@ -183,11 +183,12 @@ TEST(BaseRoute, DifferentialBaseMovesAlongItsHeading) {
   }
 }
 
-// A corridor 1.2 m wide, too narrow for a base of five discs in a row, 1.8 m long, to turn in by 45 degrees:
+// A corridor 1.2 m wide. The base consists of five discs in a row, 1.8 m long, and has no space to
+// turn by 45 degrees:
 //
 //   ---------------------
-//      o o o o o           it wants to be there
-//      o o o o o           it stands here
+//      o o o o o           goal
+//      o o o o o           start
 //   ---------------------
 TEST(BaseRoute, ADifferentialBaseDoesNotSlide) {
   std::string discs;
@@ -212,7 +213,8 @@ TEST(BaseRoute, ADifferentialBaseDoesNotSlide) {
   }
 }
 
-// Of two passages 1.5 m long, 0.7 and 1.2 m wide, a disc of 0.4 m takes the wide one, although the other is nearer.
+// There are two passages 1.5 m long, 0.7 and 1.2 m wide. A disc of 0.4 m takes the wide one,
+// although the narrow one is nearer.
 TEST(BaseRoute, KeepsClearWhereThereIsRoom) {
   for (const int side : {1, -1}) {  // of the wide passage
     const auto wall = [&](double from, double to) {

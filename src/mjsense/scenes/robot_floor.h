@@ -16,7 +16,7 @@ namespace mjsense {
 // Index of the group that commands x, y (m) and yaw (rad) of a mobile base; -1: none.
 int driving_base(const Robot& robot);
 
-// Height (m) of the level plane that wheels stand on; empty if there is none.
+// Height (m) of the level plane under the wheels; empty if there is none.
 std::optional<double> ground_height(const mjModel* model);
 
 // The compiled model with the robot's groups at their start positions, with its own mjData.

@@ -139,7 +139,7 @@ class Worlds {
     bool behind = false;
     std::int64_t model_version = 0;  // version of the model they were computed with
   };
-  // A free joint that is held, and the pose in which it is.
+  // A free joint that is held, and its pose.
   struct Held {
     int qpos, dof;  // addresses
     mjtNum pose[7];

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# mujoco has no types of its own: everything in it is anything.
+# Stub for mujoco.batch, which has no type annotations: every attribute is Any.
 from typing import Any
 
 def __getattr__(name: str) -> Any: ...

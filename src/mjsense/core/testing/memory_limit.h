@@ -10,8 +10,8 @@
 
 namespace mjsense::testing {
 
-// Runs `test` in a child process with this address space, in bytes; what fails there fails here. Sanitisers reserve terabytes, so the
-// test is skipped with them.
+// Runs `test` in a child process with this address space (bytes); failures there fail the calling
+// test. With sanitisers the test is skipped, because they reserve terabytes.
 inline void with_address_space(rlim_t bytes, auto&& test) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "an address space of " << bytes << " bytes is too small for a sanitiser";

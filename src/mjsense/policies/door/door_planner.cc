@@ -137,7 +137,7 @@ bool DoorPlanner::approach(const World& world, double goal, double margin, Plan&
     if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
         std::abs(wrapped(place.yaw - here.yaw)) > kThereYaw) {
       way = door_->routes()->find(here, place);
-      // The start or the goal is outside the free floor (in the doorway, beside the open leaf):
+      // The start or the goal is outside the free floor (in the doorway, next to the open leaf):
       // drive straight.
       if (way.empty() && std::hypot(place.x - here.x, place.y - here.y) < 0.8) way = {here, place};
       if (way.empty()) continue;

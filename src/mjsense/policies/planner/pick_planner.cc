@@ -13,7 +13,7 @@ namespace {
 
 // m, clearance between gripper and all objects on the path to the pregrasp, including the target:
 // at the end of the fast segment the tool is 2 cm behind its command, and fingers that are already
-// beside a tall object would push it over.
+// next to a tall object would push it over.
 constexpr double kPathMargin = 0.008;
 constexpr double kGraspMargin = 0.003;  // m, at the grasp
 constexpr double kPathStep = 0.01;      // m

@@ -221,11 +221,12 @@ inline float find_horizon(const Clusters& clusters, int place, int octant, float
 // at `foot`, lifted by `lift` (m) along `normal`, and go in direction d; geom frame.
 //
 // Let q be the maximum distance of the point from the face, L the lift, and c and s the cosine and
-// sine of the angle between the two normals. The ray starts at a height of at least L c - q, and at
-// most L s + q / facing beside the face, where `facing` is the cosine of the angle under which the
-// camera sees the face. So it starts above everything that rises with a slope of at most (L c - q)
-// / (L s + q / facing), which is 1.3 for the limits used below. In total it starts at most 1.5 L
-// from the face, so geometry that is not ahead in the ray's octant stays behind it.
+// sine of the angle between the two normals. The ray starts at a height of at least L c - q above
+// the face and at a lateral distance of at most L s + q / facing, where `facing` is the cosine of
+// the angle between the viewing ray and the face's normal. So it starts above everything that rises
+// with a slope of at most (L c - q) / (L s + q / facing), which is 1.3 for the limits used below.
+// In total it starts at most 1.5 L from the face, so geometry that is not ahead in the ray's octant
+// stays behind it.
 inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f normal, Vec3f d,
                         Float lift, Mask own) {
   own = own & (lift <= splat(kMostLift * g.radius));

@@ -68,7 +68,7 @@ bool find_window(const View& view, ViewGeom& g) {
       show(c[0], c[1], grid.orthographic ? 1.0f : depth, 0.0f);
       continue;
     }
-    // For a corner beside or behind the camera, use the points where its edges cross the plane of
+    // For a corner not in front of the camera, use the points where its edges cross the plane of
     // depth kNearest.
     for (int k = 0; k < 3; ++k) {
       const float *d = corners[corner ^ (1 << k)], beyond = -d[2];

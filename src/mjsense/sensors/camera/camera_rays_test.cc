@@ -54,7 +54,7 @@ TEST(CameraAgainstRays, EveryPixelEqualsItsRay) {
         rng, {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}, 40,
         2.5);
     const std::string end = "</worldbody>";
-    // Every second camera is among the geoms, with triangles beside and behind it.
+    // Every second camera is among the geoms, with triangles on its sides and behind it.
     const double far = scene % 2 == 0 ? 4 : 1;
     const std::string eye = testing::vec(
         {rng.uniform(-far, far), rng.uniform(-far, far), far / 4 + rng.uniform(0, 0.75 * far)});

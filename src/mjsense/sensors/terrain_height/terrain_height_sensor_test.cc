@@ -110,8 +110,8 @@ TEST(TerrainHeight, IfAllRaysMissTheGroundBelowIsUsed) {
 TEST(TerrainHeight, EveryFrameHasItsOwnHeight) {
   auto cfg = height();
   cfg->frame = {{"body", "foot", "r"}, {"site", "toe", "r"}};
-  // The toe is 0.1 m below the foot in the foot's axes. With the foot on its side it is beside it,
-  // at the same height.
+  // The toe is 0.1 m below the foot in the foot's axes. When the foot lies on its side, both have
+  // the same height.
   EXPECT_THAT(Lab(cfg).at(-2, 0.5), Pointwise(FloatNear(1e-6f), {0.5f, 0.5f}));
 }
 

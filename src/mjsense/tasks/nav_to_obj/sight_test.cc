@@ -57,7 +57,7 @@ TEST_F(Sighting, EndsAtEveryBorderOfTheImage) {
 TEST_F(Sighting, EndsAtOccludingGeoms) {
   write_vec({1, 0, 0}, data->qpos + 7);
   EXPECT_FALSE(sees(0, 0));
-  EXPECT_TRUE(sees(20, 0)) << "beside the screen";
+  EXPECT_TRUE(sees(20, 0)) << "past the screen";
 }
 
 }  // namespace
