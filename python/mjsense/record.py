@@ -85,6 +85,7 @@ def record(
     max_attempts: int = 0,
     keep_failures: bool = False,
     resume: bool = False,
+    replay: bool = True,
     house: int = 0,
     batches: int = 0,
     gzip: int = 4,
@@ -132,6 +133,7 @@ def record(
         max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
         keep_failures: Keep failed episodes too.
         resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
         house: Number of the ``house_N`` folder in the output directory.
         batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
         gzip: Compression level of arrays, 0 to 9.

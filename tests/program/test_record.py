@@ -173,8 +173,10 @@ def test_segmentation_is_kept(mjsense):
 
 
 def test_without_cameras(mjsense):
-    mjsense(*QUICK, "--cameras", "none", "--out", "data")
+    mjsense(*QUICK, "--cameras", "none", "--no-replay", "--out", "data")
     assert [p.name for p in (mjsense.folder / "data/house_0").iterdir()] == ["trajectories_batch_1_of_1.h5"]
+    with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
+        assert "replay" not in file["traj_0"]
 
 
 def test_failures_are_kept_only_on_request(mjsense):

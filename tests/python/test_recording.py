@@ -94,7 +94,7 @@ def test_the_program_writes_the_same_bytes(tmp_path):
     subprocess.run([PROGRAM, "record", "pick", "--out", tmp_path / "a", "-q", "--no-sheet", *options], check=True, capture_output=True)
     mjs.record("pick", out=tmp_path / "b", episodes=1, horizon=3, keep_failures=True, width=48, height=32, shadows=False, seed=1)
     names = sorted(path.name for path in (tmp_path / "a/house_0").iterdir())
-    assert names == sorted(path.name for path in (tmp_path / "b/house_0").iterdir()) and len(names) == 3
+    assert names == sorted(path.name for path in (tmp_path / "b/house_0").iterdir()) and len(names) == 4
     for name in names:
         assert (tmp_path / "a/house_0" / name).read_bytes() == (tmp_path / "b/house_0" / name).read_bytes(), name
 

@@ -37,6 +37,7 @@ class EpisodeFile {
   // but the last must be full.
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
   void write_scene(std::string_view obs_scene, std::string_view outcome);
+  void write_array(const EpisodeArray& array);
   // Checksums and sizes of the videos, in the order of the plan. finish() writes them and closes
   // the file; it throws if the disk reports an error.
   struct VideoSum {
@@ -50,13 +51,17 @@ class EpisodeFile {
     h5::Id id, crc;  // the dataset and its checksum attribute
     int rank = 0;
     std::size_t row_bytes = 0;
-    Checksum sum;  // of all rows
+    std::size_t shuffled = 0;  // bytes of an element if the shuffle filter is used, else 0
+    Checksum sum;              // of all rows
     hsize_t dims[Shape::kMaxRank + 1] = {};
   };
   // Returns a chunk converted to text; valid until the next call.
   std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
                                          std::span<const std::uint8_t> kept);
-  void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows);
+  void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows,
+                   bool shuffled = false);
+  // Compresses a chunk; the result is valid until the next call.
+  std::span<const std::uint8_t> packed(std::span<const std::uint8_t> chunk, std::size_t shuffled);
 
   std::shared_ptr<const Folder> folder_;
   std::string name_;
@@ -64,7 +69,7 @@ class EpisodeFile {
   const RecordingPlan& plan_;
   h5::Id file_, trajectory_;
   std::vector<Dataset> datasets_;
-  std::vector<std::uint8_t> texts_, packed_;
+  std::vector<std::uint8_t> texts_, shuffled_, packed_;
 };
 
 }  // namespace mjsense

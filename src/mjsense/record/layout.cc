@@ -118,6 +118,7 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
                    {"gzip", cfg.gzip},
                    {"streams", streams},
                    {"settings", settings}};
+  if (!cfg.archive_name.empty()) j["model_archive"] = cfg.archive_name;
   if (cfg.model) j["model"] = model_checksums(*cfg.model);
   if (!plan.videos.empty()) {
     const VideoCfg& v = cfg.video;
@@ -184,6 +185,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
       stream.sensor = sensor;
       stream.place = place_of(stream.spec.name);
       stream.chunk_rows = chunk_rows(stream.row_bytes());
+      stream.shuffled = stream.place.starts_with(kReplayGroup);
       claim(stream.place, owner);
       plan.arrays.push_back(std::move(stream));
     };

@@ -47,7 +47,8 @@ std::string units_of(const Sensor& sensor) {
 std::string place_of(std::string_view stream) {
   constexpr std::string_view kParam = "sensor_param_";
   if (stream == "qpos" || stream == "qvel") return fmt::format("obs/agent/{}", stream);
-  if (stream.starts_with("actions/") || stream.starts_with("env_states/"))
+  if (stream.starts_with("actions/") || stream.starts_with("env_states/") ||
+      stream.starts_with("replay/"))
     return std::string(stream);
   if (stream.starts_with(kParam))
     return fmt::format("obs/sensor_param/{}", stream.substr(kParam.size()));

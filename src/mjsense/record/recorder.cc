@@ -49,7 +49,10 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   check_ffmpeg(cfg.video, plan.videos);
   house = std::make_unique<RecordingFolder>(cfg.out_dir / fmt::format("house_{}", cfg.house),
                                             plan.fingerprint, cfg.resume);
-  if (!house->ended()) house->publish_ready();
+  if (!house->ended()) {
+    if (!cfg.archive_name.empty()) house->store(cfg.archive_name, cfg.archive);
+    house->publish_ready();
+  }
   decisions = house->decisions();
   saved = decisions.kept();
   for (const ArrayStream& stream : plan.arrays) {
@@ -175,7 +178,8 @@ void Recorder::Impl::open_video(const EpisodePtr& episode, const VideoStream& vi
   }
 }
 
-void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_view outcome) {
+void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_view outcome,
+                            std::vector<EpisodeArray> arrays) {
   Episode& episode = running(world, "finish an episode");
   rethrow();
   if (episode.refused) {
@@ -197,6 +201,7 @@ void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_v
   Job close{Job::kClose, kept};
   close.obs_scene = obs_scene;
   close.outcome = outcome;
+  close.arrays = std::move(arrays);
   post(std::move(close));
   for (EncoderPool::Stream* stream : kept->videos) pool->close(stream);
   kept->videos.clear();
@@ -265,8 +270,9 @@ Recorder::~Recorder() {
 
 void Recorder::begin_episode(int world, const EpisodeMeta& meta) { impl_->begin(world, meta); }
 void Recorder::append(int world, const StepRow& row) { impl_->append(world, row); }
-void Recorder::finish_episode(int world, std::string_view obs_scene, std::string_view outcome) {
-  impl_->finish(world, obs_scene, outcome);
+void Recorder::finish_episode(int world, std::string_view obs_scene, std::string_view outcome,
+                              std::vector<EpisodeArray> arrays) {
+  impl_->finish(world, obs_scene, outcome, std::move(arrays));
 }
 void Recorder::discard_episode(int world, std::string_view why) {
   impl_->running(world, "discard an episode");

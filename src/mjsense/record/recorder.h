@@ -60,8 +60,11 @@ class Recorder {
   // The sensors' rows of `world` must be up to date. Throws ValueError if a dict row contains
   // truncated text; the caller must then discard the episode.
   void append(int world, const StepRow& row);
-  // `obs_scene`: JSON text. `outcome`: a word or a sentence, stored as an attribute.
-  void finish_episode(int world, std::string_view obs_scene, std::string_view outcome = "");
+  // `obs_scene`: JSON text. `outcome`: a word or a sentence, stored as an attribute. `arrays`:
+  // further data for replay, such as the model's arrays in which the episode differs from
+  // cfg.archive.
+  void finish_episode(int world, std::string_view obs_scene, std::string_view outcome = "",
+                      std::vector<EpisodeArray> arrays = {});
   // Marks the attempt as decided but not kept: a resumed recording does not repeat it.
   void discard_episode(int world, std::string_view why = "");
   // Leaves the attempt undecided: a resumed recording repeats it.

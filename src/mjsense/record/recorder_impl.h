@@ -60,6 +60,7 @@ struct Recorder::Impl {
     std::int64_t rows = 0;
     Buffer chunk;
     std::string obs_scene, outcome;
+    std::vector<EpisodeArray> arrays;
   };
 
   RecordingCfg cfg;
@@ -110,7 +111,8 @@ struct Recorder::Impl {
   void end_row(Episode& episode, int world, int s);
   Buffer take_buffer(Episode& episode, int s);
   void hand_over(const EpisodePtr& episode, int s);
-  void finish(int world, std::string_view obs_scene, std::string_view outcome);
+  void finish(int world, std::string_view obs_scene, std::string_view outcome,
+              std::vector<EpisodeArray> arrays);
   void give_up(int world, Fate fate, std::string_view why);
   void leave(int world, const Episode& episode);
   void abort_videos(Episode& episode);

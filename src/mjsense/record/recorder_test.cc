@@ -13,6 +13,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/guard.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/record/video_file.h"
@@ -34,6 +35,35 @@ TEST(Recorder, BytesDoNotDependOnWorldsOrOrder) {
   const std::string bytes = record(one.path, 5, {.worlds = 1});
   EXPECT_EQ(bytes, record(three.path, 5, {.worlds = 3}));
   EXPECT_NE(bytes, record(discards.path, 5, {.worlds = 3, .discard_every = 2}));
+}
+
+TEST(Recorder, StoresTheArchiveAndTheArraysOfAnEpisode) {
+  TempDir out;
+  FakeSuite suite(without_video(1));
+  RecordingCfg cfg = fake_recording(out.path, suite, 1, 1);
+  cfg.archive_name = "model_12345678.zip";
+  cfg.archive = "bytes of the archive";
+  const fs::path archive = out.path / "house_0" / cfg.archive_name;
+  { const Recorder unused(cfg); }
+  EXPECT_FALSE(fs::exists(archive));  // nothing was recorded
+  Recorder recorder(cfg);
+  EXPECT_EQ(read_file(archive), cfg.archive);
+  recorder.begin_episode(0, {0, 7});
+  suite.fill(0, 0, 0, 1);
+  recorder.append(0, {});
+  const std::vector<double> sizes{1, 2, 3, 4, 5, 6};
+  const auto bytes = std::as_bytes(std::span(sizes));
+  recorder.finish_episode(
+      0, "{}", "success",
+      {{"model/geom_size", DType::kFloat64, {2, 3}, {bytes.begin(), bytes.end()}}});
+  recorder.complete();
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(out.path / "house_0/trajectories_batch_1_of_1.h5");
+  const h5::Id array = h5::open_dataset(file, "traj_0/replay/model/geom_size");
+  EXPECT_EQ(h5::dims(array), (std::vector<hsize_t>{2, 3}));
+  std::vector<double> read(6);
+  ASSERT_GE(H5Dread(array, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()), 0);
+  EXPECT_EQ(read, sizes);
 }
 
 TEST(Recorder, WorldsMayAppendFromDifferentThreads) {

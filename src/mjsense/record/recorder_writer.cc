@@ -63,8 +63,10 @@ void Recorder::Impl::run(Job& job, bool failed) {
       if (!failed && episode.file) episode.file->write_chunk(job.stream, job.rows, job.chunk);
       break;
     case Job::kClose:
-      if (!failed && episode.file && episode.fate == Fate::kKept)
+      if (!failed && episode.file && episode.fate == Fate::kKept) {
         episode.file->write_scene(job.obs_scene, job.outcome);
+        for (const EpisodeArray& array : job.arrays) episode.file->write_array(array);
+      }
       break;
     case Job::kSettle:
       settle(episode, failed);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/array.h"
 #include "mjsense/core/fields.h"
 
 namespace mjsense {
@@ -102,6 +103,9 @@ struct RecordingCfg {
   const mjModel* model = nullptr;
   bool resume = false;  // continue an existing recording; otherwise existing output is an error
   int gzip = 4;         // compression level, 0 (none) to 9
+  // File for replay, stored in the house once: its name, "model_1a2b3c4d.zip", and its bytes. Empty:
+  // none. Recordings with the same model have the same name.
+  std::string archive_name, archive;
   VideoCfg video;
   // At 2 or more the user wants to stop immediately: a hanging ffmpeg gets 2 s instead of
   // ffmpeg_timeout.
@@ -114,6 +118,14 @@ struct RecordingCfg {
 struct EpisodeMeta {
   std::int64_t episode = 0;
   std::uint64_t seed = 0;
+};
+
+// An array of an episode that does not depend on the step: traj_{i}/replay/{path}.
+struct EpisodeArray {
+  std::string path;  // "model/geom_size", "held"
+  DType dtype = DType::kFloat64;
+  Shape shape;
+  std::vector<std::byte> values;
 };
 
 // Data of a step in addition to the sensors' rows.

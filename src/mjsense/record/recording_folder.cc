@@ -208,6 +208,7 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
 RecordingFolder::~RecordingFolder() {
   const bool decided = decisions_.kept() + decisions_.discarded() > 0;
   if (ended_ || !published_.empty() || decided) return;
+  if (!stored_.empty()) dir_.remove(stored_);
   end();
   if (dir_.is_at_its_path()) rmdir(dir_.path().c_str());  // fails if it is not empty
 }
@@ -316,6 +317,13 @@ void RecordingFolder::load_staged() {
       set_aside(name, e.what());
     }
   }
+}
+
+void RecordingFolder::store(const std::string& name, std::string_view bytes) {
+  require_in_place();
+  if (dir_.is_plain_file(name)) return;
+  dir_.write(name, bytes);
+  stored_ = name;
 }
 
 std::shared_ptr<const Folder> RecordingFolder::begin(std::int64_t episode) {

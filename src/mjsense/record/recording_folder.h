@@ -71,6 +71,9 @@ class RecordingFolder {
   void discard(std::int64_t episode, const std::string& why);
   void abandon(std::int64_t episode);
 
+  // Stores a file that all episodes share; a file of this name is complete already.
+  void store(const std::string& name, std::string_view bytes);
+
   const Decisions& decisions() const { return decisions_; }
   // Everything is published; nothing can be recorded any more.
   bool ended() const { return ended_; }
@@ -103,6 +106,7 @@ class RecordingFolder {
   std::vector<std::string> damage_;
   std::int64_t published_bytes_ = 0;
   bool ended_ = false;
+  std::string stored_;  // name of the file that store() has written
   Fd lock_;
 };
 

@@ -9,9 +9,12 @@
 #include <limits>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/checksum.h"
+#include "mjsense/record/model_fields.h"
 #include "mjsense/record/outcome.h"
 #include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"
+#include "mjsense/scene/model_archive.h"
 
 namespace mjsense {
 namespace {
@@ -31,6 +34,13 @@ RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const Stop
   cfg.num_worlds = rollout.num_worlds();
   cfg.fps = Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
   for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
+  if (const Sensor* replay = rollout.replay_sensor()) {
+    cfg.sensors.push_back(replay);
+    cfg.archive = model_archive(rollout.simulation().scene());
+    Checksum sum;
+    sum.add(cfg.archive.data(), cfg.archive.size());
+    cfg.archive_name = fmt::format("model_{}.zip", sum.text());
+  }
   cfg.settings = recording_settings(job, rollout);
   cfg.model = rollout.task().model();
   cfg.resume = job.resume;
@@ -99,6 +109,7 @@ class RecordJob {
     }
     cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);
     cfg.rollout = resolved(std::move(cfg.rollout));
+    cfg.rollout.replay_sensor = cfg.replay;
     return cfg;
   }
 
@@ -167,7 +178,7 @@ class RecordJob {
   void end(int w, bool success, const std::string& outcome) {
     timed([&] {
       if (success || (cfg_.keep_failures && lengths_[w] > 1 && !rollout_.refused(w))) {
-        recorder_.finish_episode(w, rollout_.obs_scene(w), outcome);
+        recorder_.finish_episode(w, rollout_.obs_scene(w), outcome, replay_arrays(w));
       } else {
         recorder_.discard_episode(w, outcome);
       }
@@ -182,6 +193,23 @@ class RecordJob {
     summary_.lengths.push_back(lengths_[w]);
     rollout_.stop(w);
     --running_;
+  }
+
+  // Data for replay that does not depend on the step: the model's arrays of world w that differ from
+  // the archived model, and the free joints of absent objects, which are held at rest.
+  std::vector<EpisodeArray> replay_arrays(int w) {
+    if (!rollout_.replay_sensor()) return {};
+    Simulation& simulation = rollout_.simulation();
+    std::vector<EpisodeArray> arrays =
+        differing_fields(simulation.model_of(w), *rollout_.task().model());
+    const std::vector<int> held = simulation.worlds().held(w);
+    const auto bytes = std::as_bytes(std::span(held));
+    if (!held.empty())
+      arrays.push_back({"held",
+                        DType::kInt32,
+                        {static_cast<std::int64_t>(held.size())},
+                        {bytes.begin(), bytes.end()}});
+    return arrays;
   }
 
   void abandon() {

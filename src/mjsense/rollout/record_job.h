@@ -24,6 +24,7 @@ struct RecordJobCfg {
   int max_attempts = 0;
   bool keep_failures = false;
   bool resume = false;
+  bool replay = true;
   int house = 0;
   int batches = 0;
   int gzip = 4;
@@ -41,6 +42,8 @@ void visit_fields(V& v, RecordJobCfg& c) {
   v("keep_failures", c.keep_failures, "Keep failed episodes too.").decides_data();
   v("resume", c.resume,
     "Continue an interrupted recording; all settings that affect the data must be unchanged.");
+  v("replay", c.replay,
+    "Store what replay needs: the model, and the simulation's state and controls of every step.");
   v("house", c.house, "Number of the ``house_N`` folder in the output directory.").at_least(0);
   v("batches", c.batches,
     "Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.")

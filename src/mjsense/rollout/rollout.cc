@@ -13,6 +13,7 @@
 #include "mjsense/observe/shared_field.h"
 #include "mjsense/rollout/action_sensors.h"
 #include "mjsense/rollout/episode_cameras.h"
+#include "mjsense/rollout/replay_sensor.h"
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
@@ -157,9 +158,18 @@ void Rollout::make() {
   task_->bind(simulation_);
   if (policy_) policy_->bind(simulation_);
   task_->initialize(scene->model(), cfg_.num_worlds);
-  if (task_->robot().controls_every_step()) {
+  const bool controls = task_->robot().controls_every_step();
+  if (cfg_.replay_sensor) {
+    const int every = controls ? task_->control_decimation() : task_->decimation();
+    replay_ = std::make_shared<ReplaySensor>(simulation_->worlds(),
+                                             (task_->decimation() + every - 1) / every);
+    simulation_->add(replay_);
+  }
+  if (controls) {
     simulation_->set_control(task_->control_decimation(), [this](const World& world, int index) {
-      return index == 0 ? mjSTAGE_ACC : task_->robot().control(world, index);
+      const mjtStage valid = index == 0 ? mjSTAGE_ACC : task_->robot().control(world, index);
+      if (replay_) replay_->note_tick(world, index);
+      return valid;
     });
   }
   if (policy_) task_->register_policy(*policy_);
@@ -199,6 +209,8 @@ std::vector<std::shared_ptr<Sensor>> Rollout::robot_sensors() {
 }
 
 Rollout::~Rollout() = default;
+
+const Sensor* Rollout::replay_sensor() const { return replay_.get(); }
 
 std::span<const int> Rollout::active_worlds() {
   ids_.clear();
@@ -334,6 +346,7 @@ void Rollout::move(std::span<const int> worlds, bool answers) {
     });
   }
   task_->advance();
+  if (replay_) replay_->note_written(worlds);
   times_.policy += since(begun);
 
   begun = Clock::now();
@@ -405,6 +418,10 @@ void Rollout::sense() {
   const auto begun = Clock::now();
   const double cast = cast_cost();
   while (!active_worlds().empty() && !guard_rows([this] { suite_.refresh(ids_); })) {
+  }
+  if (replay_) {
+    Sensor* const replay[] = {replay_.get()};
+    simulation_->refresh(replay, active_worlds());
   }
   const double spent_cast = cast_cost() - cast;
   times_.rendering += spent_cast;

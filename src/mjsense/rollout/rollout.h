@@ -38,6 +38,7 @@
 
 namespace mjsense {
 
+class ReplaySensor;
 class Rollout;
 
 // Geometry with which robots are drawn: built-in primitive shapes, real meshes from other packages,
@@ -83,6 +84,8 @@ struct RolloutCfg {
   std::map<std::string, std::map<std::string, std::string>> code;
   // Adds a camera sensor kDefaultView to the scene, which the suite does not contain.
   bool default_view = false;
+  // Adds replay_sensor(), whose rows are updated with those of the suite.
+  bool replay_sensor = false;
   // Creates further sensors for the suite, recorded like the others. Called during construction of
   // the rollout, when task, policy, simulation, cameras and the previous sensors of the suite exist.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
@@ -190,6 +193,7 @@ class Rollout {
   // Runs a function on the fresh data of some worlds, in parallel.
   void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
+  const Sensor* replay_sensor() const;  // null if there is none
 
   // Description of this world's episode for a recording, JSON text: that of the task, and the
   // camera poses if a named camera system is used.
@@ -250,6 +254,7 @@ class Rollout {
   std::unique_ptr<CameraSystem> camera_system_;
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<ActionLog> log_;
+  std::shared_ptr<ReplaySensor> replay_;
   SensorSuite suite_;
   std::shared_ptr<Simulation> simulation_;  // refers to the suite's sensors
   std::vector<Action> actions_;

@@ -413,10 +413,16 @@ void Worlds::hold(int world, std::span<const int> joints) {
   for (int joint : joints) {
     if (joint < 0 || joint >= m->njnt || m->jnt_type[joint] != mjJNT_FREE)
       throw ValueError(fmt::format("hold: joint {} is not a free joint", joint));
-    Held held{m->jnt_qposadr[joint], m->jnt_dofadr[joint], {}};
+    Held held{joint, m->jnt_qposadr[joint], m->jnt_dofadr[joint], {}};
     std::copy_n(qpos + held.qpos, 7, held.pose);
     held_[world].push_back(held);
   }
+}
+
+std::vector<int> Worlds::held(int world) const {
+  std::vector<int> joints;
+  for (const Held& held : held_[world]) joints.push_back(held.joint);
+  return joints;
 }
 
 void Worlds::keep_held(mjData* d, int w) const {

@@ -92,6 +92,7 @@ class Worlds {
   // next reset, and releases all others: after every physics step their poses are written back and
   // their velocities are set to zero. Used for absent bodies.
   void hold(int world, std::span<const int> joints);
+  std::vector<int> held(int world) const;  // the free joints that are held in this world
   // Calls refreshed() without stepping. State rows written since the last call are taken into
   // account.
   void visit(WorldIds ids, WorldHooks& hooks);
@@ -141,7 +142,7 @@ class Worlds {
   };
   // A free joint that is held, and its pose.
   struct Held {
-    int qpos, dof;  // addresses
+    int joint, qpos, dof;  // id and addresses
     mjtNum pose[7];
   };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
