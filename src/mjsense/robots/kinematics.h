@@ -36,7 +36,9 @@ class Chain {
   // twist. Near a singular configuration it is damped, dq = J^T (J J^T + d^2 I)^-1 twist, and moves
   // the leaf by less: d^2 = d_max^2 (1 - (s / s_0)^2) where the gain s = |twist| / |J^+ twist| is
   // below s_0 (numerical filtering after Maciejewski and Klein). So |dq| stays below 15 |twist|.
-  void joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq) const;
+  // `moves` [J]: which joints may move (dq of the others is 0); all if it is empty.
+  void joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq,
+                    std::span<const bool> moves = {}) const;
 
   // Moves q (in: the start, out: the solution) until the leaf is at `target` (base frame): dq = J^T
   // (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, clipped to the joint ranges in

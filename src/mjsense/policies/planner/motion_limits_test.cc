@@ -64,15 +64,17 @@ struct Stage {
         [&](const World& world) { quality.begin(world); });
   }
   // The greatest speed of a joint of an arm (rad/s) after any physics step, and when.
-  MotionQuality::Greatest executed_speed(std::int64_t episode) {
+  MotionQuality::Greatest executed_speed(std::int64_t episode, bool* success) {
     MotionQuality::Greatest speed;
-    run_episode(*task, *policy, data.get(), 0, episode, {}, {}, [&](const World& world) {
-      for (const MoveGroup& group : task->robot().groups()) {
-        if (group.kind != GroupKind::kArm) continue;
-        for (int dof : group.dofs)
-          speed.see(std::abs(world.data->qvel[dof]), world.time(), planner().phase(0));
-      }
-    });
+    const EpisodeResult result =
+        run_episode(*task, *policy, data.get(), 0, episode, {}, {}, [&](const World& world) {
+          for (const MoveGroup& group : task->robot().groups()) {
+            if (group.kind != GroupKind::kArm) continue;
+            for (int dof : group.dofs)
+              speed.see(std::abs(world.data->qvel[dof]), world.time(), planner().phase(0));
+          }
+        });
+    *success = result.success;
     return speed;
   }
   const PlannerPolicy& planner() const { return dynamic_cast<const PlannerPolicy&>(*policy); }
@@ -167,11 +169,12 @@ TEST_P(NoisyMotion, KeepsToTheSpeedOfJoints) {
   const int first = number("MJSENSE_FIRST", c.first), many = number("MJSENSE_EPISODES", c.episodes);
   Stage stage(c, 0, /*noise=*/true);
   for (int episode = first; episode < first + many; ++episode) {
-    const MotionQuality::Greatest speed = stage.executed_speed(episode);
+    bool success;
+    const MotionQuality::Greatest speed = stage.executed_speed(episode, &success);
     EXPECT_LE(speed.value, kSpeed) << said(c, episode, speed);
     if (std::getenv("MJSENSE_EPISODES")) {
-      std::printf("noise %s %d: %.3f of the limit\n", testing::PrintToString(c).c_str(), episode,
-                  speed.value / kSpeed);
+      std::printf("noise %s %d: %s, %.3f of the limit\n", testing::PrintToString(c).c_str(),
+                  episode, success ? "ok" : "FAIL", speed.value / kSpeed);
       std::fflush(stdout);
     }
   }
