@@ -192,14 +192,17 @@ std::vector<Case> noisy_cases() {
   return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(Singular, NoisyMotion,
-                         testing::Values(Case{.task = "pick_and_place",
-                                              .robot = "bimanual_yam",
-                                              .scene = "",
-                                              .episodes = 1,
-                                              .first = 7,
-                                              .seed = 771000}),
-                         name_of_case);
+INSTANTIATE_TEST_SUITE_P(
+    Singular, NoisyMotion,
+    testing::Values(
+        Case{.task = "pick_and_place",
+             .robot = "bimanual_yam",
+             .scene = "",
+             .episodes = 1,
+             .first = 7,
+             .seed = 771000},
+        Case{.task = "pick_and_place", .robot = "rby1", .scene = "", .episodes = 1, .first = 11}),
+    name_of_case);
 INSTANTIATE_TEST_SUITE_P(Tasks, NoisyMotion, testing::ValuesIn(noisy_cases()), name_of_case);
 
 }  // namespace
