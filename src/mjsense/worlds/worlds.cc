@@ -548,6 +548,11 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   switch (call.op) {
     case Op::kStep:
       if (!step_world(m, d, w, call)) return;  // apply() resets the world
+      // MuJoCo checks positions, velocities, accelerations and controls, but no mocap pose.
+      if (!bad_component(batch_, w).empty()) {
+        diverged_[w] = kBadState + 1;
+        return;
+      }
       break;
     case Op::kForward:
       if (!bad_component(batch_, w).empty()) {

@@ -903,6 +903,29 @@ TEST(Worlds, DivergenceIsReportedWithoutReads) {
   }
 }
 
+// MuJoCo itself checks neither mocap poses nor the time.
+TEST(Worlds, StepReportsAnyBadState) {
+  const ModelPtr m = load_text(R"(<mujoco><worldbody>
+    <body name="hand" mocap="true"><geom size=".1" contype="0" conaffinity="0"/></body>
+    <body pos="0 0 1"><freejoint/><geom size=".1"/></body>
+    </worldbody></mujoco>)");
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (const char* name : {"time", "mocap_pos", "mocap_quat", "qpos", "qvel", "xfrc_applied"}) {
+      Worlds worlds(m.get(), 2, 1);
+      Recording hooks(2);
+      worlds.reset(all_worlds, -1, hooks);
+      state_row(worlds, name, 1)[0] = bad;
+      worlds.step(2, hooks);
+      ASSERT_EQ(worlds.failures().size(), 1u) << name;
+      EXPECT_EQ(worlds.failures()[0].world, 1);
+      worlds.step(1, hooks);
+      EXPECT_TRUE(worlds.failures().empty()) << name << ": the reset repairs it";
+      EXPECT_EQ(worlds.substeps(0), 3);
+    }
+  }
+}
+
 // A read that computes forces from a bad control must report it at once, and the next step must be
 // unaffected.
 TEST(Worlds, ReadingReportsABadControl) {
