@@ -66,3 +66,41 @@ def run(folder, xml, bytes_left):
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.startswith("raised ")
     return done.stdout
+
+
+STARVED = """
+import resource
+import gymnasium, numpy as np
+import mjsense as mjs
+
+class Greedy(mjs.Sensor):
+    uuid = "greedy"
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float32)
+
+    def compute(self, sim):
+        return np.ones((2, 10**9 if greedy else 1), np.float32)[:, :1]
+
+greedy = False
+sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base="%s", sensors=(Greedy(),))), num_worlds=2)
+sim.step()
+sim.scene["greedy"].data
+resource.setrlimit(resource.RLIMIT_AS, (3_000_000_000,) * 2)
+greedy = True
+for k in range(3):
+    try:
+        sim.step()
+        sim.scene["greedy"].data
+    except RuntimeError as error:
+        print("raised", error)
+greedy = False
+sim.step()
+print(sim.scene["greedy"].data.tolist(), sim.time.tolist())
+"""
+
+
+def test_a_sensor_that_runs_out_of_memory_raises_and_the_simulation_goes_on():
+    done = subprocess.run([sys.executable, "-c", STARVED % SMALL], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    *raised, last = done.stdout.splitlines()
+    assert len(raised) == 3 and all(line.startswith("raised sensor 'greedy': compute(): MemoryError") for line in raised)
+    assert last == "[[1.0], [1.0]] [0.01, 0.01]"

@@ -109,3 +109,29 @@ def test_meshes_option(tmp_path, monkeypatch):
     monkeypatch.setenv("MJSENSE_FRANKA_MESHES", str(tmp_path / "nowhere"))
     with pytest.raises(ValueError, match="MJSENSE_FRANKA_MESHES"):
         mjs.make_vec("pick")
+
+
+def test_nan_in_a_stream_is_reported_unless_its_description_names_it(tmp_path):
+    class Lost(mjs.Sensor):
+        """Distance to a thing that is lost."""
+
+        uuid = "lost"
+        observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2,), np.float32)
+
+        def compute(self, sim):
+            return np.array([[1, np.nan]] * sim.num_worlds, np.float32)
+
+    class Known(Lost):
+        """Distance to a thing; NaN while it is lost."""
+
+        uuid = "known"
+
+    result = {}
+    for sensor in (Lost(), Known()):
+        out = tmp_path / sensor.uuid
+        mjs.record(out=out, episodes=1, sensors=[sensor], cameras=[], horizon=5, keep_failures=True, seed=1)
+        done = subprocess.run([PROGRAM, "verify", out], capture_output=True, text=True, check=False)
+        result[sensor.uuid] = done.returncode, done.stdout
+    assert result["known"][0] == 0, result["known"][1]
+    assert result["lost"][0] != 0
+    assert "obs/extra/lost holds 6 NaN, the first in row 0, and its description does not say what NaN means" in result["lost"][1]

@@ -301,3 +301,25 @@ def test_a_recorder_compares_the_model(tmp_path):
     assert again.kept == 1
     record(again, 1)
     again.complete()
+
+
+def test_a_sensor_of_a_robot_toml_is_compared_by_its_class(lab, monkeypatch):
+    module = lab / "resumed_sensors.py"
+    module.write_text(
+        "import gymnasium\nimport numpy as np\nimport mjsense as mjs\n\n\nclass Grip(mjs.Sensor):\n"
+        "    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float32)\n\n"
+        "    def compute(self, sim):\n        return 1.0 * sim.qpos[:, :1].astype(np.float32)\n"
+    )
+    robot = lab / "arm/robot.toml"
+    robot.write_text(robot.read_text() + '\n[[sensors]]\nkind = "python"\nname = "grip"\nclass = "resumed_sensors:Grip"\n')
+    monkeypatch.syspath_prepend(lab)
+    import resumed_sensors
+
+    options = options_of(lab)
+    interrupted(**options)
+    compute = resumed_sensors.Grip.compute
+    resumed_sensors.Grip.compute = lambda self, sim: 2.0 * sim.qpos[:, :1].astype(np.float32)
+    with pytest.raises(ValueError, match="different recording: 'settings/code/sensor 'grip'/code' was"):
+        mjs.record(**{**options, "policy": Still(), "sensors": [Height()], "resume": True})
+    resumed_sensors.Grip.compute = compute
+    assert mjs.record(**{**options, "policy": Still(), "sensors": [Height()], "resume": True}).enough

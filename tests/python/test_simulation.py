@@ -288,6 +288,26 @@ def test_a_quaternion_of_length_zero_is_refused(field):
     assert sim.failures == []
 
 
+def test_a_quaternion_of_length_zero_written_directly_affects_its_world_alone():
+    floor = "<geom type='plane' size='5 5 .1' euler='1 0 0' pos='0 0 .001'/>"
+    ball = "<body pos='0 0 .09'><freejoint/><geom type='sphere' size='.1'/></body>"
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=f"<mujoco><worldbody>{floor}{ball}</worldbody></mujoco>")), num_worlds=3)
+    field = sim.model_field("geom_quat")
+    good = np.array(field)
+    field[1, 0] = 0
+    sim.step()  # it starts from the positions that were computed before the write
+    for _ in range(2):
+        sim.step()
+        assert [world for world, _ in sim.failures] == [1]
+        assert "fails even when reset" in sim.failures[0][1]
+        assert np.isfinite(sim.data.xpos[[0, 2]]).all()
+    np.testing.assert_allclose(sim.time, [0.006, 0.002, 0.006])  # world 1: of its last good step
+    field[:] = good
+    sim.step()
+    assert sim.failures == []
+    np.testing.assert_allclose(sim.time, [0.008, 0.002, 0.008])
+
+
 def test_python_callbacks_are_refused_by_name(sim):
     """MuJoCo's Python callbacks know objects of Python alone; function pointers work."""
     try:

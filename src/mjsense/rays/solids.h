@@ -27,12 +27,13 @@ inline Float first_ahead(Interval in, Mask hit, bool cull) {
 }
 
 // The part of a line (|d| > 0) between -s and s. If the line is parallel to the slab, it is
-// everything or nothing.
+// everything or nothing; lines outside by a rounding error are inside, so that none passes between
+// two neighbours.
 inline Interval slab(Float s, Float o, Float d) {
   const Float inverse = Float(1.0f) / d;
   const Float a = (-s - o) * inverse, b = (s - o) * inverse;
   const Mask parallel = abs(d) < Float(1e-12f);
-  const Float inside = select(abs(o) <= s, Float(kNoHit), Float(-kNoHit));
+  const Float inside = select(abs(o) <= s + (abs(o) + s) * 4e-7f, Float(kNoHit), Float(-kNoHit));
   return {select(parallel, -inside, min(a, b)), select(parallel, inside, max(a, b))};
 }
 
@@ -53,10 +54,29 @@ struct Box {
                    z = slab(size[2], o.z, d.z);
     return {max(x.enter, max(y.enter, z.enter)), min(x.leave, min(y.leave, z.leave))};
   }
+  // A ray through an edge hits: rounding must not leave it to a neighbour with a higher id, nor let
+  // it pass between two boxes that touch. The distance to a face that is almost parallel to the ray
+  // has an error of about 4e-7 (|o| + size) / |d|. Within it, the other faces decide.
   static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
-    const Interval in = interval(size, o, d);
-    // A ray through an edge hits: rounding must not leave it to a neighbour with a higher id.
-    return first_ahead(in, in.enter <= tied(in.leave), cull);
+    Interval in = {-kNoHit, kNoHit};      // between all faces
+    Interval facing = in, parallel = in;  // `parallel` is enlarged by the error
+    const Float os[3] = {o.x, o.y, o.z}, ds[3] = {d.x, d.y, d.z};
+    for (int i = 0; i < 3; ++i) {
+      const Float c = os[i], slope = select(abs(ds[i]) < Float(1e-12f), 1e-12f, ds[i]);
+      const Float inverse = Float(1.0f) / slope, s = size[i];
+      const Float a = (-s - c) * inverse, b = (s - c) * inverse;
+      const Float enter = min(a, b), leave = max(a, b);
+      const Float error = abs(inverse) * ((abs(c) + s) * 4e-7f);
+      const Mask is_parallel = abs(slope) < Float(0.25f);
+      in = {max(in.enter, enter), min(in.leave, leave)};
+      facing.enter = max(facing.enter, select(is_parallel, -kNoHit, enter));
+      facing.leave = min(facing.leave, select(is_parallel, kNoHit, leave));
+      parallel.enter = max(parallel.enter, select(is_parallel, enter - error, -kNoHit));
+      parallel.leave = min(parallel.leave, select(is_parallel, leave + error, kNoHit));
+    }
+    in.enter = select(parallel.enter > facing.enter, in.enter, facing.enter);
+    const Float leave = max(in.leave, min(facing.leave, parallel.leave));
+    return first_ahead(in, in.enter <= tied(leave), cull);
   }
   static Vec3f normal(const float* size, Vec3f p) {
     const Float x = abs(abs(p.x) - size[0]), y = abs(abs(p.y) - size[1]),

@@ -117,7 +117,8 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
                    {"fps", cfg.fps.str()},
                    {"gzip", cfg.gzip},
                    {"streams", streams},
-                   {"settings", settings}};
+                   {"settings", settings},
+                   {"versions", {{"mjsense", MJSENSE_VERSION}, {"mujoco", mj_versionString()}}}};
   if (!cfg.archive_name.empty()) j["model_archive"] = cfg.archive_name;
   if (cfg.model) j["model"] = model_checksums(*cfg.model);
   if (!plan.videos.empty()) {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/record/layout.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/depth.h"
@@ -184,6 +186,15 @@ TEST(Layout, FingerprintDifferencesAreDescribed) {
   EXPECT_EQ(difference(), "");
   b.settings = R"({"task": "place"})";
   EXPECT_EQ(difference(), "'settings/task' was \"pick\" and is now \"place\"");
+
+  const std::string now = plan_recording(a).fingerprint;
+  for (const char* library : {"mjsense", "mujoco"}) {
+    nlohmann::json other = nlohmann::json::parse(now);
+    other["versions"][library] = "0.0.9";
+    other["streams"].clear();  // a consequence, which is not reported first
+    EXPECT_THAT(fingerprint_difference(other.dump(), now),
+                HasSubstr(fmt::format("'versions/{}' was \"0.0.9\" and is now ", library)));
+  }
 }
 
 TEST(Depth, SixteenBitsAreExactToHalfAUnit) {

@@ -32,7 +32,8 @@ struct VerifyOptions {
   std::string ffmpeg;   // as in VideoCfg
 };
 
-// Checks structure, names and types, equal lengths, JSON rows, the number and size of the frames of
+// Checks structure, names and types, equal lengths, JSON rows, NaN in streams whose description does
+// not mention NaN, the number and size of the frames of
 // every video, and the checksums of files, data sets and videos. Always returns: each file is read
 // in a separate process, with limits that depend on its size.
 [[nodiscard]] VerifyResult verify(const std::filesystem::path& path,

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -177,6 +178,24 @@ class FileVerifier {
     }
     dataset.each_bytes([&](std::string_view bytes) { sum.add(bytes.data(), bytes.size()); });
     compare(dataset.id(), place, sum);
+    if (ours_ && dataset.dtype().starts_with("float")) check_nan(dataset, place);
+  }
+
+  // A stream may hold NaN if its description says what that means.
+  void check_nan(const RowDataset& dataset, const std::string& place) {
+    if (h5::text_attribute(dataset.id(), "description").find("NaN") != std::string::npos) return;
+    std::int64_t at = 0, first = -1, count = 0;
+    dataset.each_number([&](std::span<const double> values) {
+      for (const double x : values) {
+        if (std::isnan(x) && count++ == 0) first = at;
+        ++at;
+      }
+    });
+    if (count > 0) {
+      error(place, fmt::format("holds {} NaN, the first in row {}, and its description does not "
+                               "say what NaN means",
+                               count, first / dataset.row_size()));
+    }
   }
 
   void check_success(hid_t trajectory, const std::string& place) {

@@ -183,13 +183,16 @@ Pose Chain::jacobian(std::span<const double> q, std::span<double> jacobian) cons
   return jacobian_of(links_, {0, {}}, tail_, q, jacobian);
 }
 
-void Chain::joint_motion(std::span<const double> q, const Twist& twist,
-                         std::span<double> dq) const {
+void Chain::joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq,
+                         std::span<const bool> moves) const {
   std::array<double, 6 * kMaxJoints> storage;
   const std::span<double> jac(storage.data(), 6 * links_.size());
   jacobian(q, jac);
-  const double e[6] = {twist.v.x, twist.v.y, twist.v.z, twist.w.x, twist.w.y, twist.w.z};
   const int n = static_cast<int>(links_.size());
+  for (std::size_t k = 0; k < moves.size(); ++k) {
+    for (int i = 0; !moves[k] && i < 6; ++i) jac[i * n + k] = 0;
+  }
+  const double e[6] = {twist.v.x, twist.v.y, twist.v.z, twist.w.x, twist.w.y, twist.w.z};
   damped_step(jac, n, kDamping, e, dq);
   double motion = 0;
   for (double d : dq.first(n)) motion += d * d;

@@ -37,8 +37,10 @@ class Chain {
   // twist. Near a singular configuration it is damped, dq = J^T (J J^T + d^2 I)^-1 twist, and moves
   // the leaf by less than `twist`. Damping begins when the gain s = |twist| / |J^+ twist| is below
   // s_0: d^2 = d_max^2 (1 - (s / s_0)^2) (numerical filtering after Maciejewski and Klein). The
-  // result satisfies |dq| < 15 |twist|.
-  void joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq) const;
+  // result satisfies |dq| < 15 |twist|. `moves` [J]: which joints may move (dq of the others is 0);
+  // empty: all.
+  void joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq,
+                    std::span<const bool> moves = {}) const;
 
   // Changes q (in: the start, out: the solution) until the leaf is at `target` (base frame). Each
   // iteration adds dq = J^T (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, and clips q

@@ -285,15 +285,19 @@ void Robot::add_arm_noise(const World& world, int g, Rng& rng, std::span<double>
   const Chain& chain = *chains_[g];
   const std::size_t n = chain.joints().size();
   double q[Chain::kMaxJoints], jac[6 * Chain::kMaxJoints], dq[Chain::kMaxJoints];
+  bool moves[Chain::kMaxJoints];
   RobotValues now;
   read_qpos(world, now);
-  for (std::size_t i = 0; i < n; ++i) q[i] = now[source_[g][i].first].values[source_[g][i].second];
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto [from, k] = source_[g][i];
+    q[i] = now[from].values[k];
+    moves[i] = from == g;
+  }
   chain.jacobian({q, n}, {jac, 6 * n});
   Vec3 move;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto [from, k] = source_[g][i];
-    if (from != g) continue;
-    const double delta = target[k] - q[i];
+    if (!moves[i]) continue;
+    const double delta = target[source_[g][i].second] - q[i];
     move = move + delta * Vec3{jac[i], jac[n + i], jac[2 * n + i]};
   }
   const ActionNoiseCfg& cfg = cfg_.noise;
@@ -302,14 +306,12 @@ void Robot::add_arm_noise(const World& world, int g, Rng& rng, std::span<double>
   double e[6];
   for (int i = 0; i < 3; ++i) e[i] = truncated_normal(rng, deviation, cfg.max_position);
   for (int i = 3; i < 6; ++i) e[i] = truncated_normal(rng, rotation, cfg.max_rotation);
-  chain.joint_motion({q, n}, {{e[0], e[1], e[2]}, {e[3], e[4], e[5]}}, {dq, n});
+  chain.joint_motion({q, n}, {{e[0], e[1], e[2]}, {e[3], e[4], e[5]}}, {dq, n}, {moves, n});
   double largest = cfg.max_joint;
+  for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, std::abs(dq[i]));
   for (std::size_t i = 0; i < n; ++i) {
-    if (source_[g][i].first == g) largest = std::max(largest, std::abs(dq[i]));
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto [from, k] = source_[g][i];
-    if (from != g) continue;
+    if (!moves[i]) continue;
+    const int k = source_[g][i].second;
     const double noisy = target[k] + cfg.max_joint / largest * dq[i];
     target[k] = std::clamp(noisy, group.ctrl_low[k], group.ctrl_high[k]);
   }

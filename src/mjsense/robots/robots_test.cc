@@ -216,6 +216,51 @@ TEST_P(EveryRobot, ArmsReachTheirTargets) {
   }
 }
 
+// The tool is displaced by what the table [noise] says: joints of other groups that carry the arm,
+// such as a torso, take no part of the displacement.
+TEST_P(EveryRobot, ActionNoiseOfArmsIsAsLargeAsConfigured) {
+  RobotCfg cfg = alone.cfg;
+  cfg.noise.scale = 0.1;
+  cfg.noise.max_joint = 1;
+  Robot robot(cfg, alone.model, 1);
+  alone.start();
+  const StateRow state = state_row(alone.data.get());
+  Rng rng(8, 0, 0, 0);
+  for (int g = 0; g < static_cast<int>(robot.groups().size()); ++g) {
+    const MoveGroup& group = robot.groups()[g];
+    if (group.kind != GroupKind::kArm || !group.targets_are_qpos()) continue;
+    double square = 0, expected = 0;
+    for (int posture = 0; posture < 50; ++posture) {
+      RobotValues values;
+      std::vector<double> target;
+      for (std::size_t i = 0; i < group.joints.size(); ++i) {
+        const double* range = alone.model->jnt_range + 2 * group.joints[i];
+        const double q = range[0] + rng.uniform(0.25, 0.75) * (range[1] - range[0]);
+        alone.data->qpos[group.qpos[i]] = q;
+        target.push_back(q + rng.uniform(-0.05, 0.05));
+      }
+      robot.read_qpos(alone.world, values);
+      const Pose from = robot.fk(g, values);
+      Action action;
+      action.commands[g].set(target);
+      robot.reset(alone.world);
+      robot.command(alone.world, action);
+      values[g].set(target);
+      const Pose to = robot.fk(g, values);
+      for (int draw = 0; draw < 40; ++draw) {
+        robot.write_ctrl(alone.world, state, &rng);
+        robot.control(alone.world, cfg.policy_dt_ms / cfg.ctrl_dt_ms - 1);  // the end of a ramp
+        for (std::size_t i = 0; i < target.size(); ++i)
+          values[g].values[i] = state.ctrl[group.actuators[i]];
+        const Vec3 off = robot.fk(g, values).p - to.p;
+        square += dot(off, off) / 3;
+        expected += 0.01 * dot(to.p - from.p, to.p - from.p);
+      }
+    }
+    EXPECT_NEAR(std::sqrt(square / expected), 1, 0.1) << group.name;
+  }
+}
+
 TEST_P(EveryRobot, GrippersOpenAndClose) {
   const Robot& robot = *alone.robot;
   alone.start();

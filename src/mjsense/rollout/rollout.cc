@@ -23,6 +23,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kDraws = 10;  // maximum draws of a start until one is playable
+// m/s or rad/s. MuJoCo's own limit is 1e10, which lets an object that a contact has thrown away fly
+// on until the horizon.
+constexpr double kMaxSpeed = 1e4;
 
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -235,6 +238,23 @@ void Rollout::take_failures() {
   for (const Failure& failure : simulation_->failures()) set_fault(failure.world, failure.message);
 }
 
+// Ends the episodes in which something is faster than kMaxSpeed.
+void Rollout::check_speeds(std::span<const int> worlds) {
+  const mjModel* m = simulation_->model();
+  for (int w : worlds) {
+    for (int i = 0; i < m->nv; ++i) {
+      const double speed = std::abs(rows_[w].qvel[i]);
+      if (speed <= kMaxSpeed) continue;
+      const int body = m->dof_bodyid[i];
+      const char* name = mj_id2name(m, mjOBJ_BODY, body);
+      set_fault(w, fmt::format("the physics diverged: body '{}' moves at {:.2g} m/s or rad/s, more "
+                               "than {:.0e}",
+                               name ? name : std::to_string(body), speed, kMaxSpeed));
+      break;
+    }
+  }
+}
+
 void Rollout::reseed(std::uint64_t seed) {
   std::ranges::fill(active_, 0);
   cfg_.seed = seed;
@@ -353,6 +373,7 @@ void Rollout::move(std::span<const int> worlds, bool answers) {
   const double rows = row_cost(), cast = cast_cost();
   guard_rows([this, &worlds] { simulation_->step(1, worlds); });
   take_failures();
+  check_speeds(worlds);
   const double spent_rows = (row_cost() - rows) / threads();
   const double spent_cast = cast_cost() - cast;
   times_.sensing += spent_rows;

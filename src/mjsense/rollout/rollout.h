@@ -241,6 +241,7 @@ class Rollout {
   bool guard_rows(const std::function<void()>& body);
   void sense();
   void take_failures();
+  void check_speeds(std::span<const int> worlds);
   void sample(std::span<const int> worlds, std::span<const std::int64_t> episodes);
   void place_cameras(std::span<const int> worlds);
   void set_fault(int world, std::string text);

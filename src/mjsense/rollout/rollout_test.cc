@@ -303,6 +303,22 @@ TEST(Rollout, StepDoesNotAllocate) {
   EXPECT_EQ(count.since(), 0);
 }
 
+// An object that is thrown away does not fly on until the horizon.
+TEST(Rollout, ImpossibleSpeedsEndTheEpisode) {
+  Rollout rollout(blind(2, 2));
+  start(rollout, {0, 1}, {0, 1});
+  const mjModel* m = rollout.simulation().model();
+  int dof = 0;
+  while (m->jnt_type[m->dof_jntid[dof]] != mjJNT_FREE) ++dof;
+  state_row(rollout.simulation().worlds(), 1).qvel[dof] = 1e7;
+  rollout.act();
+  rollout.step();
+  EXPECT_THAT(rollout.fault(1), HasSubstr("the physics diverged: body '"));
+  EXPECT_EQ(rollout.fault(0), "");
+  start(rollout, {1}, {1});
+  EXPECT_EQ(rollout.fault(1), "");
+}
+
 TEST(Rollout, DivergingWorldDoesNotAffectOthers) {
   const auto run = [](bool poison) {
     Rollout rollout(blind(2, 2));

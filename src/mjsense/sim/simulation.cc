@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <exception>
 #include <functional>
+#include <new>
 #include <numeric>
 
 #include "mjsense/core/control_step.h"
@@ -34,6 +36,19 @@ class Timer {
   std::chrono::steady_clock::time_point start_;
 };
 
+// A lack of memory in a sensor, with the sensor's name. It allocates nothing.
+class SensorOutOfMemory : public std::bad_alloc {
+ public:
+  explicit SensorOutOfMemory(const Sensor& sensor) {
+    std::snprintf(message_, sizeof message_, "sensor '%.80s': out of memory",
+                  sensor.name().c_str());
+  }
+  const char* what() const noexcept override { return message_; }
+
+ private:
+  char message_[120];
+};
+
 // Runs `body` for a sensor. Errors that do not name the sensor get its name as a prefix.
 template <class Body>
 void guarded(const Sensor& sensor, Body&& body) {
@@ -53,6 +68,10 @@ void guarded(const Sensor& sensor, Body&& body) {
       case ErrorKind::kRuntime:
         throw RuntimeError(message);
     }
+  } catch (const SensorOutOfMemory&) {
+    throw;  // already names the sensor
+  } catch (const std::bad_alloc&) {
+    throw SensorOutOfMemory(sensor);
   }
 }
 

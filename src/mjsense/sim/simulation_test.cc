@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <memory>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -371,6 +373,76 @@ TEST(Simulation, FailingSensorIsNamedAndOthersContinue) {
   bad->fail_in = -1;
   sim.refresh(*bad);
   EXPECT_THAT(good->computes, Each(1));
+}
+
+// Throws this exception in one world and one of its functions.
+struct Throwing : Sensor {
+  explicit Throwing(Stage stage) : Sensor("throwing"), stage_(stage) {}
+  std::string_view kind() const override { return "throwing"; }
+  void initialize(const SensorInit& init) override {
+    add_field("", {.shape = {1}, .unit = "m"}, init.num_worlds);
+  }
+  void call(const char* function, int world) const {
+    if (std::string_view(function) != in || world != 1) return;
+    if (memory) throw std::bad_alloc();
+    throw 42;  // not derived from std::exception
+  }
+  void compute(const World& w) override { call("compute", w.id); }
+  void substep(const World& w) override { call("substep", w.id); }
+  void reset(const World& w) override { call("reset", w.id); }
+  void cast(const CastContext& context) override {
+    for (int w : context.ids) call("cast", w);
+  }
+  bool wants_substep() const override { return true; }
+  bool eager() const override { return true; }
+  Stage stage() const override { return stage_; }
+
+  Stage stage_;
+  std::string_view in;
+  bool memory = true;
+};
+
+// Whatever a sensor throws on MuJoCo's threads reaches the caller. The other worlds are stepped, and
+// after a reset of its own world the simulation equals one in which nothing was thrown.
+TEST(Simulation, AnyExceptionOfASensorReachesTheCaller) {
+  for (const char* in : {"compute", "substep", "reset", "cast"}) {
+    for (const bool memory : {true, false}) {
+      SCOPED_TRACE(testing::Message() << in << (memory ? " bad_alloc" : " int"));
+      const SimulationCfg cfg{.num_worlds = 3, .decimation = 2, .threads = 2};
+      Simulation sim(scene(), cfg), plain(scene(), cfg);
+      auto bad =
+          std::make_shared<Throwing>(std::string_view(in) == "cast" ? Stage::kCast : Stage::kRow);
+      sim.add(bad);
+      auto good = add(sim, "good");
+      sim.step(2);
+      plain.step(2);
+      bad->in = in;
+      bad->memory = memory;
+      for (int k = 0; k < 3; ++k) {
+        try {
+          std::string_view(in) == "reset" ? sim.reset() : sim.step();
+          FAIL() << "nothing was thrown";
+        } catch (const std::bad_alloc& e) {
+          EXPECT_TRUE(memory);
+          EXPECT_STREQ(e.what(), "sensor 'throwing': out of memory");
+        } catch (int thrown) {
+          EXPECT_FALSE(memory);
+          EXPECT_EQ(thrown, 42);
+        }
+        std::string_view(in) == "reset" ? plain.reset() : plain.step();
+      }
+      bad->in = "";
+      const std::vector<int> world{1};
+      sim.reset(world);
+      plain.reset(world);
+      sim.step();
+      plain.step();
+      sim.refresh(*good);
+      const ArrayView a = sim.worlds().state(), b = plain.worlds().state();
+      EXPECT_EQ(std::memcmp(a.data, b.data, 3 * a.strides[0]), 0);
+      EXPECT_THAT(good->computes, Each(testing::Ge(1)));
+    }
+  }
 }
 
 // The sensor's name is added to an error, whose type is unchanged.

@@ -215,6 +215,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   seed(0);
   held_.resize(num_worlds);
   reset_key_.assign(num_worlds, -1);
+  broken_.assign(num_worlds, 0);
   remembered_.resize(num_worlds * num_state_);
   derived_.resize(num_worlds);
   exceptions_.resize(num_worlds);
@@ -527,11 +528,37 @@ bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, const Call& call) {
   return true;
 }
 
+void Worlds::restart(const mjModel* m, mjData* d, int w, int key, WorldHooks& hooks) {
+  broken_[w] = 1;  // stays if a MuJoCo error jumps out of this function
+  if (key >= 0) {
+    mj_resetDataKeyframe(m, d, key);
+  } else {
+    mj_resetData(m, d);
+  }
+  held_[w].clear();
+  derived_[w].stage = mjSTAGE_NONE;
+  bring(m, d, w, mjSTAGE_ACC);
+  remember(m, d, w);
+  reset_key_[w] = key;
+  clocks_[w].substep = 0;
+  ++clocks_[w].episode;
+  ++clocks_[w].moment;
+  broken_[w] = 0;
+  hooks.reset(view(m, d, w));
+}
+
 void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   Derived& derived = derived_[w];
+  if (broken_[w] && (call.op == Op::kStep || call.op == Op::kForward))
+    restart(m, d, w, reset_key_[w], *call.hooks);
   switch (call.op) {
     case Op::kStep:
       if (!step_world(m, d, w, call)) return;  // apply() resets the world
+      // MuJoCo checks positions, velocities, accelerations and controls, but no mocap pose.
+      if (!bad_component(batch_, w).empty()) {
+        diverged_[w] = kBadState + 1;
+        return;
+      }
       break;
     case Op::kForward:
       if (!bad_component(batch_, w).empty()) {
@@ -544,19 +571,7 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       ++clocks_[w].moment;
       break;
     case Op::kReset:
-      if (call.key >= 0) {
-        mj_resetDataKeyframe(m, d, call.key);
-      } else {
-        mj_resetData(m, d);
-      }
-      held_[w].clear();
-      derived.stage = mjSTAGE_NONE;
-      bring(m, d, w, mjSTAGE_ACC);
-      remember(m, d, w);
-      reset_key_[w] = call.key;
-      clocks_[w].substep = 0;
-      ++clocks_[w].episode;
-      ++clocks_[w].moment;
+      restart(m, d, w, call.key, *call.hooks);
       break;
     case Op::kStepRaw:
       for (int k = 0; k < call.substeps; ++k) {
@@ -569,6 +584,7 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       derived.behind = true;
       return;
     case Op::kVisit:
+      if (broken_[w]) return;
       if (derived.behind) break;
       if (same_state(w)) {
         bring_late(m, d, w, call.hooks->stage());
@@ -580,7 +596,6 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       }
       break;
   }
-  if (call.op == Op::kReset) call.hooks->reset(view(m, d, w));
   call.hooks->refreshed(view(m, d, w));
 }
 
@@ -685,10 +700,9 @@ std::vector<int> Worlds::take_failures(Op op) {
   return failed;
 }
 
-// Resets only these worlds, each with the keyframe of its last reset. Returns an error message if a
-// world fails even in the reset.
+// Resets only these worlds, each with the keyframe of its last reset. Returns an error message if all
+// worlds of the call fail even in the reset.
 std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
-  std::string helpless;
   std::ranges::stable_sort(failed, {}, [this](int w) { return reset_key_[w]; });
   call.op = Op::kReset;
   for (auto first = failed.begin(); first != failed.end();) {
@@ -698,13 +712,15 @@ std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
     apply_ordered(batch_, &*first, static_cast<int>(last - first), run, &call, 1);
     drop_warnings(false);
     for (; first != last; ++first) {
-      if (mjb_status(batch_)[*first] && helpless.empty()) {
-        helpless = fmt::format("world {} fails even after a reset: MuJoCo: {}", *first,
-                               mjb_error(batch_, *first));
-      }
+      if (!broken_[*first]) continue;
+      Failure& failure = *std::ranges::find(failures_, *first, &Failure::world);
+      failure.message = fmt::format("fails even after a reset: MuJoCo: {}", mjb_error(batch_, *first));
     }
   }
-  return helpless;
+  for (int w : ids_) {
+    if (!broken_[w]) return "";
+  }
+  return fmt::format("world {} {}", failures_[0].world, failures_[0].message);
 }
 
 }  // namespace mjsense

@@ -51,6 +51,9 @@ class WorldHooks {
 };
 
 // A world whose physics diverged in the last call. Only this world was reset; the others continued.
+// If MuJoCo raises an error in the reset too, for example because of a value in the world's model,
+// the message says so. Such a world is broken: its rows keep their last values, and each step(),
+// forward() and reset() tries to reset it again. A call whose worlds are all broken throws.
 struct Failure {
   int world;
   std::string message;  // MuJoCo's text, or the warning it raised ("bad qacc at 0.314 s")
@@ -166,6 +169,7 @@ class Worlds {
   void report_warnings();
   std::vector<int> take_failures(Op op);
   std::string reset_failed(std::vector<int> failed, Call call);
+  void restart(const mjModel* m, mjData* d, int w, int key, WorldHooks& hooks);
   World view(const mjModel* m, mjData* d, int w) const;
   bool same_state(int w) const;
   bool same_controls(int w) const;
@@ -182,6 +186,7 @@ class Worlds {
   std::vector<Clock> clocks_;
   std::vector<std::vector<Held>> held_;  // by world
   std::vector<int> reset_key_;           // keyframe of each world's last reset
+  std::vector<std::uint8_t> broken_;     // by world: MuJoCo raised an error in its last reset
   std::vector<mjtNum> remembered_;       // state rows that the derived fields belong to
   std::vector<Derived> derived_;
   std::vector<std::exception_ptr> exceptions_;  // of hooks, by world

@@ -903,6 +903,29 @@ TEST(Worlds, DivergenceIsReportedWithoutReads) {
   }
 }
 
+// MuJoCo itself checks neither mocap poses nor the time.
+TEST(Worlds, StepReportsAnyBadState) {
+  const ModelPtr m = load_text(R"(<mujoco><worldbody>
+    <body name="hand" mocap="true"><geom size=".1" contype="0" conaffinity="0"/></body>
+    <body pos="0 0 1"><freejoint/><geom size=".1"/></body>
+    </worldbody></mujoco>)");
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (const char* name : {"time", "mocap_pos", "mocap_quat", "qpos", "qvel", "xfrc_applied"}) {
+      Worlds worlds(m.get(), 2, 1);
+      Recording hooks(2);
+      worlds.reset(all_worlds, -1, hooks);
+      state_row(worlds, name, 1)[0] = bad;
+      worlds.step(2, hooks);
+      ASSERT_EQ(worlds.failures().size(), 1u) << name;
+      EXPECT_EQ(worlds.failures()[0].world, 1);
+      worlds.step(1, hooks);
+      EXPECT_TRUE(worlds.failures().empty()) << name << ": the reset repairs it";
+      EXPECT_EQ(worlds.substeps(0), 3);
+    }
+  }
+}
+
 // A read that computes forces from a bad control must report it at once, and the next step must be
 // unaffected.
 TEST(Worlds, ReadingReportsABadControl) {
@@ -945,6 +968,49 @@ TEST(Worlds, MuJoCoErrorDoesNotAffectOtherWorlds) {
   }
   EXPECT_GT(failed, 1);
   EXPECT_LT(failed, 10);
+}
+
+// MuJoCo raises an error in a world whose floor has no normal, also when that world is reset.
+TEST(Worlds, WorldThatFailsEvenWhenResetDoesNotAffectOtherWorlds) {
+  const ModelPtr m = load_text(R"(<mujoco><worldbody>
+    <geom name="floor" type="plane" size="1 1 .1" pos="0 0 .001" euler="1 0 0"/>
+    <body pos="0 0 .09"><freejoint/><geom type="sphere" size=".1"/></body>
+    </worldbody></mujoco>)");
+  Worlds worlds(m.get(), 3, 2);
+  Recording hooks(3);
+  worlds.reset(all_worlds, -1, hooks);
+  auto* quat = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "geom_quat", nullptr, nullptr));
+  std::fill_n(quat + 4 * m->ngeom, 4, 0.0);  // of the floor of world 1
+  worlds.model_changed();
+  const DataPtr plain = make_data(m.get());
+  for (int k = 1; k <= 3; ++k) {
+    worlds.step(1, hooks);
+    mj_step(m.get(), plain.get());
+    for (int w : {0, 2}) expect_same_state(worlds, w, m.get(), plain.get());
+    ASSERT_EQ(worlds.failures().size(), 1u);
+    EXPECT_EQ(worlds.failures()[0].world, 1);
+    EXPECT_THAT(worlds.failures()[0].message,
+                ::testing::AllOf(::testing::HasSubstr("fails even when reset"),
+                                 ::testing::HasSubstr("contact frame")));
+    worlds.visit(all_worlds, hooks);  // reading is no error
+  }
+  worlds.forward(all_worlds, hooks);
+  EXPECT_EQ(worlds.failures().size(), 1u);
+  worlds.reset(all_worlds, -1, hooks);
+  EXPECT_EQ(worlds.failures().size(), 1u);
+  try {
+    worlds.step(1, hooks, std::vector<int>{1});
+    FAIL() << "no world of the call is left";
+  } catch (const RuntimeError& e) {
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("world 1 fails even when reset"));
+  }
+  quat[4 * m->ngeom] = 1;
+  worlds.model_changed();
+  const int resets = hooks.resets[1];
+  worlds.step(1, hooks);
+  EXPECT_TRUE(worlds.failures().empty());
+  EXPECT_EQ(hooks.resets[1], resets + 1) << "the world begins a new episode";
+  EXPECT_EQ(worlds.substeps(1), 1);
 }
 
 TEST(Worlds, FailingHookDoesNotAffectOtherWorlds) {

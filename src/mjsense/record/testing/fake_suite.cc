@@ -201,8 +201,9 @@ FakeSuite::FakeSuite(const FakeSuiteCfg& cfg) : cfg_(cfg) {
         xy[0] = xy[1] = 0.5f;
         s.row<std::int32_t>(1, m.world)[0] = 1;
       });
-  points->declare("pickup_obj/wrist_camera/points",
-                  spec_of(DType::kFloat32, {10, 2}, "", "pixels", "x, y as fractions"), B);
+  points->declare(
+      "pickup_obj/wrist_camera/points",
+      spec_of(DType::kFloat32, {10, 2}, "", "pixels", "x, y as fractions; NaN if unused"), B);
   points->declare("pickup_obj/wrist_camera/num_points",
                   spec_of(DType::kInt32, {1}, "", "", "valid rows of points"), B);
   sensors_.push_back(std::move(points));
