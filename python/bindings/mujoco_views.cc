@@ -16,6 +16,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -100,12 +101,14 @@ nb::object type_of<mjTimerStat>() {
   FIELD(duration) FIELD(number) return type.done();
 }
 
-// Name -> (address, data type, shape). Scalars have the shape ().
+// Name -> (address, data type, shape). Scalars have the shape (), and arrays one dimension if MuJoCo declares the width (the text of the
+// macro's argument) as 1.
 class Fields {
  public:
   template <class T>
-  void array(const char* name, const T* data, std::int64_t rows, std::int64_t columns) {
-    const nb::tuple shape = columns == 1 ? nb::make_tuple(rows) : nb::make_tuple(rows, columns);
+  void array(const char* name, const T* data, std::int64_t rows, std::int64_t columns,
+             std::string_view width) {
+    const nb::tuple shape = width == "1" ? nb::make_tuple(rows) : nb::make_tuple(rows, columns);
     set<T>(name, data, shape);
   }
   template <class T>
@@ -175,7 +178,7 @@ nb::dict model_fields(std::uintptr_t address) {
   MJSETCONST_SCALARS
 #undef X
   fields.value("signature", m->signature);
-#define X(type, name, nr, nc) fields.array<type>(#name, m->name, m->nr, nc);
+#define X(type, name, nr, nc) fields.array<type>(#name, m->name, m->nr, nc, #nc);
   MJMODEL_POINTERS_PREAMBLE(m)
   MJMODEL_POINTERS
 #undef X
@@ -189,13 +192,13 @@ nb::dict data_fields(std::uintptr_t model, std::uintptr_t address) {
   const auto* m = reinterpret_cast<const mjModel*>(model);
   const auto* d = reinterpret_cast<const mjData*>(address);
   Fields fields;
-#define X(type, name, nr, nc) fields.array<type>(#name, d->name, m->nr, nc);
+#define X(type, name, nr, nc) fields.array<type>(#name, d->name, m->nr, nc, #nc);
   MJDATA_POINTERS
 #undef X
 #define X(type, name) fields.value(#name, d->name);
   MJDATA_SCALAR
 #undef X
-#define X(type, name, nr, nc) fields.array<type>(#name, d->name, nr, nc);
+#define X(type, name, nr, nc) fields.array<type>(#name, d->name, nr * nc, 1, "1");
   MJDATA_VECTOR
 #undef X
   return fields.all();
@@ -210,7 +213,7 @@ nb::dict arena_fields(std::uintptr_t model, std::uintptr_t address) {
 #undef MJ_D
 #define MJ_M(n) m->n
 #define MJ_D(n) d->n
-#define X(type, name, nr, nc) fields.array<type>(#name, d->name, d->name ? nr : 0, nc);
+#define X(type, name, nr, nc) fields.array<type>(#name, d->name, nr, nc, #nc);
   MJDATA_ARENA_POINTERS
 #undef X
   return fields.all();

@@ -7,6 +7,7 @@ A view has the attributes of ``mujoco.MjModel`` or ``mujoco.MjData``: numbers, N
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from enum import IntEnum
@@ -170,7 +171,7 @@ class _Struct:
         value = self._get(name)
         if isinstance(value, _Struct):
             return value
-        if value.dtype == np.int8:  # names, separated by NUL
+        if name in ("names", "paths", "text_data"):
             return value.tobytes()
         return value.item() if value.shape == () else value
 
@@ -194,9 +195,12 @@ _DATA_KINDS = {"actuator": "actuator", "body": "", "cam": "cam", "geom": "geom",
                "tendon": "ten"}  # fmt: skip
 """Kinds of elements that mjData knows, with the prefix of its fields."""
 
+_SHAPES = {"numeric": ("size",), "hfield": ("nrow", "ncol"), "tex": ("height", "width", "nchannel")}
+"""Kinds of elements with data of their own, and the fields that tell its shape."""
+
 
 class _Element:
-    """An element of a model by name: ``model.geom("box").size``. Each attribute is an array of one dimension on the struct's memory."""
+    """An element of a model by name: ``model.geom("box").size``. Attributes are arrays on the struct's memory."""
 
     def __init__(self, view: _View, kind: str, index: int) -> None:
         self.__dict__.update(_view=view, _kind=kind, id=index, name=view._model._names(kind)[index])
@@ -287,19 +291,18 @@ class MjModelView(_View):
         return self._known[kind]
 
     def _element_field(self, kind: str, index: int, rows: dict[str, slice], name: str) -> np.ndarray | None:
-        if f"{kind}_{name}" in self._fields:
-            whole = self._get(f"{kind}_{name}")
-            count = len(self._names(kind))
-            if kind in ("numeric", "hfield") and name == "data":
-                start = int(self._get(f"{kind}_adr")[index])
-                size = self.numeric_size[index] if kind == "numeric" else self.hfield_nrow[index] * self.hfield_ncol[index]
-                return whole[start : start + int(size)]
-            return whole.reshape(count, -1)[index] if len(whole) == count else None
-        if kind == "jnt" and f"dof_{name}" in self._fields:
-            return self._get(f"dof_{name}")[rows["nv"]].reshape(-1)
+        if kind in _SHAPES and name == "data":
+            shape = [int(self._get(f"{kind}_{size}")[index]) for size in _SHAPES[kind]]
+            start = int(self._get(f"{kind}_adr")[index])
+            return self._get(f"{kind}_data")[start : start + math.prod(shape)].reshape(shape)
         if kind == "jnt" and name in ("qpos0", "qpos_spring"):
             return self._get(name)[rows["nq"]]
-        return None
+        if kind == "jnt" and f"dof_{name}" in self._fields and (name == "bodyid" or f"jnt_{name}" not in self._fields):
+            return self._get(f"dof_{name}")[rows["nv"]]
+        count, field = len(self._names(kind)), f"{kind}_{name}"
+        if field not in self._fields or len(whole := self._get(field)) != count:
+            return None
+        return whole.reshape(count, -1)[index]
 
     def __copy__(self) -> MjModelView:
         return MjModelView(_core.OwnedModel.copy(self._address))
@@ -346,7 +349,7 @@ class MjDataView(_View):
             if name in ("xanchor", "xaxis"):
                 return self._get(name)[index]
             part = rows["nq"] if name == "qpos" else rows["nv"] if name in _DOFS else None
-            return None if part is None else self._get(name)[part].reshape(-1)
+            return None if part is None else self._get(name)[part]
         if kind == "sensor":
             return self.sensordata[rows["nsensordata"]] if name == "data" else None
         if kind == "body":

@@ -98,7 +98,7 @@ class DebugShapes(KnownAttributes):
         geoms, identity = scene.geoms[scene.ngeom : scene.ngeom + room], np.eye(3).ravel()
         rows = zip(geoms, self.kinds, self.positions, self.positions + self.vectors, self.widths, self.rgba, self.labels)
         for geom, kind, start, end, width, rgba, label in rows:
-            shape = mujoco.mjtGeom[f"mjGEOM_{kind.upper()}"]
+            shape = getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
             mujoco.mjv_initGeom(geom, shape, np.full(3, width), start, identity, rgba)
             if kind != "sphere":
                 mujoco.mjv_connector(geom, shape, width, start, end)
