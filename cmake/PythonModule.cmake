@@ -37,7 +37,7 @@ add_custom_command(OUTPUT ${MJSENSE_PY_LIB}/libmj_mjsense.so
                            ${MJSENSE_PY_LIB}
                    DEPENDS ${PROJECT_SOURCE_DIR}/cmake/private_mujoco.py ${MUJOCO_LIBRARY} ${MUJOCO_PLUGINS}
                    COMMENT "Copying libmujoco under a name of its own")
-file(WRITE ${PROJECT_BINARY_DIR}/empty.c "")
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/empty.c CONTENT "")
 add_library(mjsense_shared_mujoco SHARED ${PROJECT_BINARY_DIR}/empty.c)
 target_link_options(mjsense_shared_mujoco PRIVATE -nostdlib)
 set_target_properties(mjsense_shared_mujoco PROPERTIES OUTPUT_NAME mj_mjsense LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_LIB}/shared)

@@ -6,7 +6,6 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -14,29 +13,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "mjsense/core/mujoco_call.h"
-#include "mjsense/scene/spec.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/mujoco_fields.h"
 
 namespace mjsense::python {
 
-namespace nb = nanobind;
-
 namespace {
-
-// NumPy's data type, as in the array interface.
-template <class T>
-nb::object type_of() {
-  if constexpr (std::is_same_v<T, bool>) return nb::str("|b1");
-  const char kind = std::is_floating_point_v<T> ? 'f' : std::is_signed_v<T> ? 'i' : 'u';
-  return nb::str((std::string("<") + kind + std::to_string(sizeof(T))).c_str());
-}
 
 // The data type of a struct, as the arguments of numpy.dtype().
 class StructType {
@@ -48,9 +35,9 @@ class StructType {
     offsets_.append(offset);
     if constexpr (std::is_array_v<T>)
       formats_.append(
-          nb::make_tuple(type_of<std::remove_extent_t<T>>(), nb::make_tuple(std::extent_v<T>)));
+          nb::make_tuple(numpy_type<std::remove_extent_t<T>>(), nb::make_tuple(std::extent_v<T>)));
     else
-      formats_.append(type_of<T>());
+      formats_.append(numpy_type<T>());
   }
   nb::dict done() {
     type_["names"] = names_;
@@ -64,22 +51,25 @@ class StructType {
   nb::list names_, formats_, offsets_;
 };
 
+}  // namespace
+
 #define FIELD(field) type.add<decltype(Struct::field)>(#field, offsetof(Struct, field));
 
 template <>
-nb::object type_of<mjContact>() {
+nb::object numpy_type<mjContact>() {
   using Struct = mjContact;
   StructType type(sizeof(Struct));
   FIELD(dist)
   FIELD(pos)
-  FIELD(frame) FIELD(includemargin) FIELD(friction) FIELD(solref) FIELD(solreffriction)
-      FIELD(solimp) FIELD(adhesion) FIELD(surfacevel) FIELD(mu) FIELD(H) FIELD(dim) FIELD(geom1)
-          FIELD(geom2) FIELD(geom) FIELD(flex) FIELD(elem) FIELD(vert) FIELD(exclude)
+  FIELD(frame)
+  FIELD(includemargin) FIELD(friction) FIELD(solref) FIELD(solreffriction) FIELD(solimp)
+      FIELD(adhesion) FIELD(surfacevel) FIELD(mu) FIELD(H) FIELD(dim) FIELD(geom1) FIELD(geom2)
+          FIELD(geom) FIELD(flex) FIELD(elem) FIELD(vert) FIELD(exclude)
               FIELD(efc_address) return type.done();
 }
 
 template <>
-nb::object type_of<mjSolverStat>() {
+nb::object numpy_type<mjSolverStat>() {
   using Struct = mjSolverStat;
   StructType type(sizeof(Struct));
   FIELD(improvement)
@@ -88,46 +78,18 @@ nb::object type_of<mjSolverStat>() {
 }
 
 template <>
-nb::object type_of<mjWarningStat>() {
+nb::object numpy_type<mjWarningStat>() {
   using Struct = mjWarningStat;
   StructType type(sizeof(Struct));
   FIELD(lastinfo) FIELD(number) return type.done();
 }
 
 template <>
-nb::object type_of<mjTimerStat>() {
+nb::object numpy_type<mjTimerStat>() {
   using Struct = mjTimerStat;
   StructType type(sizeof(Struct));
   FIELD(duration) FIELD(number) return type.done();
 }
-
-// Name -> (address, data type, shape). Scalars have the shape (), and arrays one dimension if MuJoCo declares the width (the text of the
-// macro's argument) as 1.
-class Fields {
- public:
-  template <class T>
-  void array(const char* name, const T* data, std::int64_t rows, std::int64_t columns,
-             std::string_view width) {
-    const nb::tuple shape = width == "1" ? nb::make_tuple(rows) : nb::make_tuple(rows, columns);
-    set<T>(name, data, shape);
-  }
-  template <class T>
-  void value(const char* name, const T& field) {
-    if constexpr (std::is_array_v<T>)
-      set<std::remove_extent_t<T>>(name, field, nb::make_tuple(std::extent_v<T>));
-    else
-      set<T>(name, &field, nb::make_tuple());
-  }
-  void add(const char* name, const Fields& inner) { all_[name] = inner.all_; }
-  nb::dict all() const { return all_; }
-
- private:
-  template <class T>
-  void set(const char* name, const void* data, nb::tuple shape) {
-    all_[name] = nb::make_tuple(reinterpret_cast<std::uintptr_t>(data), type_of<T>(), shape);
-  }
-  nb::dict all_;
-};
 
 Fields option_fields(const mjOption& opt) {
   Fields fields;
@@ -169,6 +131,8 @@ Fields visual_fields(const mjVisual& vis) {
 #undef XVEC
   return fields;
 }
+
+namespace {
 
 nb::dict model_fields(std::uintptr_t address) {
   const auto* m = reinterpret_cast<const mjModel*>(address);
@@ -246,11 +210,6 @@ struct Owned {
 using OwnedModel = Owned<mjModel, mj_deleteModel>;
 using OwnedData = Owned<mjData, mj_deleteData>;
 
-struct OwnedSpec {
-  SpecPtr pointer;
-  std::uintptr_t address() const { return reinterpret_cast<std::uintptr_t>(pointer.get()); }
-};
-
 }  // namespace
 
 void bind_mujoco_views(nb::module_& m) {
@@ -273,27 +232,6 @@ void bind_mujoco_views(nb::module_& m) {
                         call_mujoco(mj_makeData, reinterpret_cast<const mjModel*>(model)))};
                   })
       .def_prop_ro("address", &OwnedData::address);
-  nb::class_<OwnedSpec>(m, "Spec", "An mjSpec: empty, or of XML text or of a file.")
-      .def(
-          "__init__",
-          [](OwnedSpec* self, const std::optional<std::string>& base) {
-            if (!base) {
-              new (self) OwnedSpec{SpecPtr(mj_makeSpec())};
-              return;
-            }
-            ModelSource source;
-            const bool is_text = base->find_first_not_of(" \t\r\n") == base->find('<');
-            (is_text ? source.xml : source.path) = *base;
-            new (self) OwnedSpec{parse_model(source, "SceneCfg.base")};
-          },
-          nb::arg("base").none())
-      .def_prop_ro("address", &OwnedSpec::address);
-  m.def(
-      "spec_names",
-      [](std::uintptr_t spec, int kind) {
-        return spec_names(reinterpret_cast<const mjSpec*>(spec), static_cast<mjtObj>(kind));
-      },
-      nb::arg("spec"), nb::arg("kind"), "Names of the elements of an mjSpec, in its order.");
   m.def("model_fields", &model_fields, nb::arg("model"),
         "Fields of an mjModel: name -> (address, data type, shape).");
   m.def("data_fields", &data_fields, nb::arg("model"), nb::arg("data"),

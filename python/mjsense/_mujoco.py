@@ -32,9 +32,21 @@ class Obj(IntEnum):
     GEOM = 5
     SITE = 6
     CAMERA = 7
+    LIGHT = 8
+    MESH = 10
+    HFIELD = 12
+    TEXTURE = 13
+    MATERIAL = 14
+    PAIR = 15
+    EXCLUDE = 16
+    EQUALITY = 17
     TENDON = 18
     ACTUATOR = 19
+    SENSOR = 20
+    NUMERIC = 21
+    TEXT = 22
     KEY = 24
+    FRAME = 100
 
 
 class Geom(IntEnum):
@@ -113,23 +125,13 @@ def source_of(spec: mujoco.MjSpec) -> tuple[str, Any]:
 def new_spec(base: str | None) -> Any:
     """An empty spec, or that of XML text or of a file."""
     if _libmujoco.shared is None:
+        from mjsense._spec import MjSpecView
+
         return MjSpecView(_core.Spec(base))
     spec = _libmujoco.shared.MjSpec
     if base is None:
         return spec()
     return spec.from_string(base) if base.lstrip().startswith("<") else spec.from_file(base)
-
-
-class MjSpecView:
-    """The spec of a scene where Python code cannot edit it."""
-
-    def __init__(self, owner: _core.Spec) -> None:
-        self._owner, self._address = owner, owner.address
-
-    def __getattr__(self, name: str) -> NoReturn:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        raise AttributeError(f"spec.{name}: the spec of a scene cannot be edited in Python here: {_libmujoco.explain()}")
 
 
 class _Memory:
@@ -140,7 +142,8 @@ class _Memory:
         self.__array_interface__ = {"data": (address, False), "typestr": f"|V{dtype.itemsize}", "shape": shape, "version": 3}
 
 
-def _array(owner: Any, address: int, kind: Any, shape: tuple[int, ...]) -> np.ndarray:
+def array_of(owner: Any, address: int, kind: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """An array on memory that `owner` keeps; records for the fields of a struct."""
     dtype = np.dtype(kind)
     if 0 in shape or address == 0:
         array = np.zeros(shape, dtype)
@@ -159,7 +162,7 @@ class _Struct:
         """A struct or an array; scalars are arrays of the shape ()."""
         if name not in self._arrays:
             field = self._fields[name]
-            self._arrays[name] = _Struct(self._owner, field) if isinstance(field, dict) else _array(self._owner, *field)
+            self._arrays[name] = _Struct(self._owner, field) if isinstance(field, dict) else array_of(self._owner, *field)
         return self._arrays[name]
 
     def _missing(self, name: str) -> NoReturn:
@@ -338,7 +341,7 @@ class MjDataView(_View):
 
     def __getattr__(self, name: str) -> Any:
         if name in self.__dict__.get("_arena", ()):
-            return _array(self._owner, *_core.arena_fields(self._model._address, self._address)[name])
+            return array_of(self._owner, *_core.arena_fields(self._model._address, self._address)[name])
         return super().__getattr__(name)
 
     def __dir__(self) -> list[str]:

@@ -218,7 +218,9 @@ class Scene(KnownAttributes):
 
     def _entities_of_spec(self) -> dict[str, Entity]:
         """The entities before compilation, with names only."""
-        names = {kind.name.lower(): _core.spec_names(self.spec._address, kind) for kind in _mujoco.Obj if kind != _mujoco.Obj.KEY}
+        kinds = _mujoco.Obj
+        kinds = (kinds.BODY, kinds.GEOM, kinds.SITE, kinds.JOINT, kinds.ACTUATOR, kinds.TENDON, kinds.CAMERA)
+        names = {kind.name.lower(): _core.spec_names(self.spec._address, kind) for kind in kinds}
         entities = {}
         for name in self.cfg.entities:
             prefix = name + "/"

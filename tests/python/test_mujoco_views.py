@@ -199,8 +199,74 @@ def test_a_spec_of_another_series_goes_over_as_xml(monkeypatch, tmp_path):
     np.testing.assert_allclose(found.body("r/b").mass, shared.body("r/b").mass)
 
 
-def test_editing_a_spec_is_an_error_that_says_why(monkeypatch):
+def edit(spec):
+    """What functions that edit a spec do, with mujoco's own enumerators."""
+    spec.option.timestep = 0.005
+    spec.stat.extent = 3
+    spec.visual.global_.offwidth = 800
+    spec.add_texture(name="dots", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, width=8, height=8, rgb1=[1, 0, 0])
+    spec.add_material(name="shiny", shininess=0.9, textures=["", "dots"])
+    spec.add_mesh(name="tetra", uservert=[0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1])
+    body = spec.worldbody.add_body(name="added", pos=(0, 0, 2), gravcomp=0.5)
+    body.add_freejoint(name="loose")
+    body.add_geom(name="ball", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1], mass=2, material="shiny")
+    body.add_geom(name="rock", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="tetra", contype=0, conaffinity=0)
+    leg = body.add_body(name="leg", quat=[0.6, 0.8, 0, 0])
+    leg.add_joint(name="knee", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0], range=[-1, 1])
+    leg.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.1, 0.1, 0.1))
+    leg.add_site(name="foot", pos=[0, 0, -0.1])
+    leg.add_camera(name="down", fovy=60)
+    spec.worldbody.add_light(name="lamp", pos=[0, 0, 4], diffuse=[0.2, 0.3, 0.4])
+    motor = spec.add_actuator(name="motor", target="knee", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    motor.gainprm[0] = 7
+    motor.ctrlrange = [-2, 2]
+    motor.userdata = [1.0, 2.0]
+    assert [*motor.userdata] == [1.0, 2.0] and motor.target == "knee"
+    spec.add_sensor(name="height", type=mujoco.mjtSensor.mjSENS_FRAMEPOS, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="foot")
+    spec.add_equality(name="bond", type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1="added", name2="box/b", active=False)
+    spec.add_exclude(bodyname1="added", bodyname2="box/b")
+    spec.add_pair(geomname1="ball", geomname2="box/g", condim=4)
+    spec.add_numeric(name="pi", data=[3.14], size=1)
+    spec.add_text(name="note", data="hello")
+    spec.add_key(name="up", qpos=[0, 0, 2, 1, 0, 0, 0, 0.5])
+    for geom in spec.geoms:
+        geom.friction[0] = 0.7
+    found = spec.body("leg")
+    found.name = "limb"
+    assert found.parent.name == "added" and spec.geom("nothing") is None
+    assert [g.name for g in spec.body("added").geoms] == ["ball", "rock"] and spec.bodies[0].name == "world"
+    assert spec.joint("knee").type == mujoco.mjtJoint.mjJNT_HINGE and found.sites[0].name == "foot"
+
+
+BOX = "<mujoco><worldbody><body name='b'><geom name='g' size='.1 .1 .1' type='box'/></body></worldbody></mujoco>"
+
+
+def test_editing_a_scene_gives_the_same_model(monkeypatch):
+    def scene():
+        return mjs.Scene(mjs.SceneCfg(entities={"box": mjs.EntityCfg(model=BOX)}, spec_fn=edit))
+
+    real = scene().model
+    monkeypatch.setattr(_libmujoco, "shared", None)
+    view = scene().model
+    assert isinstance(view, _mujoco.MjModelView)
+    check(real, view)
+    shorter = mjs.Scene(mjs.SceneCfg(spec_fn=lambda spec: spec.delete(spec.worldbody.add_site(name="doomed")))).model
+    assert shorter.nsite == 0
+    assert real.nsensor == real.nu == real.nmesh == real.npair == real.nexclude == real.neq == 1
+
+
+@pytest.mark.parametrize(
+    ("edit", "error", "text"),
+    [
+        (lambda spec: spec.add_frame(), AttributeError, r"no 'add_frame' here: .*3\.8\.1; pip install 'mujoco>=4\.0,<4\.1'"),
+        (lambda spec: spec.worldbody.add_geom(siz=[1, 1, 1]), AttributeError, "no 'siz' here"),
+        (lambda spec: spec.worldbody.add_geom(size=[1, 1, 1, 1]), ValueError, "size: .* has more than 3 numbers"),
+        (lambda spec: spec.worldbody.add_geom("shiny", size=[1, 1, 1]), ValueError, "no default class named 'shiny'"),
+        (lambda spec: [spec.worldbody.add_body(name="twice") for _ in range(2)], ValueError, "repeated name 'twice'"),
+    ],
+)
+def test_edits_that_are_errors(monkeypatch, edit, error, text):
     monkeypatch.setattr(_libmujoco, "shared", None)
     monkeypatch.setattr(_libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
-    with pytest.raises(AttributeError, match=r"spec\.worldbody: the spec of a scene cannot be edited.*3\.8\.1; pip install"):
-        mjs.Scene(mjs.SceneCfg(spec_fn=lambda spec: spec.worldbody.add_geom(size=[1, 1, 1])))
+    with pytest.raises(error, match=text):
+        mjs.Scene(mjs.SceneCfg(spec_fn=edit))
