@@ -20,7 +20,12 @@ for name in "$@"; do
   "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py "${others[@]}" || { failed=1; continue; }
   "$venv/bin/python" -m pip check || failed=1
   "$venv/bin/python" -m pip list --disable-pip-version-check --format freeze | grep -i -E '^(mujoco|torch|numpy|gymnasium|h5py|rsl|stable)' || true
-  "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_load_order.py tests/python/test_libmujoco.py tests/python/test_rl.py \
-    tests/python/test_mjlab_compat.py || failed=1
+  mujoco=$("$venv/bin/python" -c 'import mujoco; print(mujoco.__version__)' 2>/dev/null || true)
+  for order in ${mujoco:+mujoco-first mjsense-first} alone; do
+    "$venv/bin/python" -W ignore tests/python/other_mujoco.py "$order" "$(mktemp -d)" || failed=1
+  done
+  tests=(tests/python/test_load_order.py tests/python/test_rl.py)
+  case $mujoco in 4.0.*) tests+=(tests/python/test_libmujoco.py tests/python/test_mujoco_views.py tests/python/test_mjlab_compat.py) ;; esac
+  "$venv/bin/python" -m pytest -q -p no:cacheprovider "${tests[@]}" || failed=1
 done
 exit $failed

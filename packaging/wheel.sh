@@ -17,7 +17,7 @@ rm -rf build/wheel/raw
 $python -m pip wheel -q --disable-pip-version-check --no-deps --no-build-isolation -w build/wheel/raw \
   -C build-dir=build/wheel/cmake -C cmake.define.MJSENSE_STATIC=ON "$@" .
 rm -f dist/mjsense-*
-PATH=$PWD/$tools/bin:$PATH $tools/bin/auditwheel repair --plat manylinux_2_28_x86_64 --only-plat -w dist build/wheel/raw/mjsense-*.whl
+PATH=$PWD/$tools/bin:$PATH $tools/bin/auditwheel repair --plat manylinux_2_28_x86_64 --only-plat --exclude libmj_mjsense.so -w dist build/wheel/raw/mjsense-*.whl
 $python -c 'import scikit_build_core.build as build; build.build_sdist("dist")' >/dev/null
 $tools/bin/auditwheel show dist/mjsense-*manylinux*.whl
 ls -l dist

@@ -299,7 +299,7 @@ def test_a_quaternion_of_length_zero_written_directly_affects_its_world_alone():
     for _ in range(2):
         sim.step()
         assert [world for world, _ in sim.failures] == [1]
-        assert "fails even when reset" in sim.failures[0][1]
+        assert "fails even after a reset" in sim.failures[0][1]
         assert np.isfinite(sim.data.xpos[[0, 2]]).all()
     np.testing.assert_allclose(sim.time, [0.006, 0.002, 0.006])  # world 1: of its last good step
     field[:] = good

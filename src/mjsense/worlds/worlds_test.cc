@@ -990,7 +990,7 @@ TEST(Worlds, WorldThatFailsEvenWhenResetDoesNotAffectOtherWorlds) {
     ASSERT_EQ(worlds.failures().size(), 1u);
     EXPECT_EQ(worlds.failures()[0].world, 1);
     EXPECT_THAT(worlds.failures()[0].message,
-                ::testing::AllOf(::testing::HasSubstr("fails even when reset"),
+                ::testing::AllOf(::testing::HasSubstr("fails even after a reset"),
                                  ::testing::HasSubstr("contact frame")));
     worlds.visit(all_worlds, hooks);  // reading is no error
   }
@@ -1002,7 +1002,7 @@ TEST(Worlds, WorldThatFailsEvenWhenResetDoesNotAffectOtherWorlds) {
     worlds.step(1, hooks, std::vector<int>{1});
     FAIL() << "no world of the call is left";
   } catch (const RuntimeError& e) {
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("world 1 fails even when reset"));
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("world 1 fails even after a reset"));
   }
   quat[4 * m->ngeom] = 1;
   worlds.model_changed();
