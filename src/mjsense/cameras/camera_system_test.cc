@@ -141,6 +141,34 @@ TEST(CameraSystem, MountsHaveTheConfiguredPoses) {
   expect_near(forward(bench.pose("corner")), {0, 1, 0}, 1e-12);
 }
 
+TEST(CameraSystem, TheFieldOfViewIsTheConfiguredOneOrThatOfTheCamera) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("shoulder", MountKind::kBody),
+                 mount("narrow", MountKind::kBody), mount("narrow_wrist", MountKind::kMjcf)};
+  cfg.cameras[2].fovy = 20;
+  cfg.cameras[3].fovy = 20;
+  Bench bench(cfg);
+  const auto frozen = nlohmann::json::parse(bench.cameras.frozen(0));
+  EXPECT_EQ(frozen["wrist"]["fovy"], 50);  // of the MJCF camera
+  EXPECT_EQ(frozen["shoulder"]["fovy"], 45);
+  EXPECT_EQ(frozen["narrow"]["fovy"], 20);
+  EXPECT_EQ(frozen["narrow_wrist"]["fovy"], 20);
+}
+
+// Before the first episode an orbit camera looks at its target from the largest distance and height.
+TEST(CameraSystem, BeforeAnEpisodeAnOrbitCameraShowsItsTarget) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("exo", MountKind::kOrbit)};
+  cfg.cameras[0].distance_range = {.6, 1};
+  cfg.cameras[0].height_range = {-.1, .2};
+  cfg.cameras[0].target = {0, .5, .1};
+  Bench bench(cfg);
+  const Pose pose = bench.pose("exo");
+  expect_near(pose.p, {1, 0, .2}, 1e-9);
+  expect_near(forward(pose), normalized(Vec3{-1, .5, -.1}), 1e-9);
+  EXPECT_GT(up(pose).z, .9);
+}
+
 TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("corner", MountKind::kFixed)};

@@ -9,11 +9,13 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/episode/testing/played_task.h"
+#include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 struct Played : PlayedTask<DoorOpeningTask> {
@@ -115,6 +117,17 @@ TEST(DoorOpening, TheStateOfTheDoorIsThatOfNow) {
     EXPECT_NEAR(norm(handle - vec3(p.data->geom_xpos + 3 * geom)), 0, 1e-9);
     EXPECT_NEAR(std::hypot(handle.x - hinge.x, handle.y - hinge.y), std::hypot(0.9, 0.02), 0.15);
   }
+}
+
+// Door recordings have the tools' poses under their own names. Other sensors stay, in their order.
+TEST(DoorOpening, TheSuiteHasEachToolPoseOnce) {
+  Played p;
+  SensorSuite suite;
+  suite.extend(p.task.robot().create_robot_sensors());
+  suite.extend(p.task.create_task_sensors());
+  p.task.edit_suite(suite);
+  EXPECT_THAT(suite.names(), ElementsAre("door_state", "left_tcp_pose", "right_tcp_pose",
+                                         "grasp_state_door_handle", "object_poses"));
 }
 
 TEST(DoorOpening, ASceneWithoutADoorIsRefused) {

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Judges the mutants that draw.py makes: the tests of the mutant's room, then those of the rooms that use it.
+
+Tests run in the order in which they are likely to notice: those of the file itself, the rest of the room, tests of other rooms that include
+the mutated header, slow tests, other rooms. All mutants are first judged by their own room (a few seconds each), then the survivors by other
+rooms, for at most OTHERS_S seconds of tests each. Results are kept after each mutant; a run that is stopped goes on where it was.
+"""
+
+import hashlib
+import json
+import re
+import time
+from pathlib import Path
+
+SLOW_S = 2  # tests that take longer run only when all others have passed
+OWN_S, OTHERS_S = 60, 60  # seconds of tests, as measured without a mutant, that judge one mutant: of its own room, of others
+OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
+
+
+class Judge:
+    def __init__(self, runner, root: Path, build: Path, rooms: list[str], pytests: dict[str, list[str]]) -> None:
+        self.runner, self.root, self.build, self.pytests = runner, root, build, pytests
+        self.rooms = [room for room in rooms if any((root / "src/mjsense" / room).rglob("*_test.cc"))]
+        self.original: dict[str, str] = {}  # hash of each program without a mutant
+        self.seconds: dict[str, dict[str, float]] = {}  # program: test: seconds
+        self.tests: dict[str, dict[str, str]] = {}  # room: suite: text of the file with its tests
+        self.uses: dict[str, set[str]] = {}  # room: what its files include, code and tests
+        for room in self.rooms:
+            files = list((root / "src/mjsense" / room).rglob("*.cc")) + list((root / "src/mjsense" / room).rglob("*.h"))
+            texts = {f: f.read_text() for f in files}
+            self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense/([^"]+)"', text, re.M)}
+            self.tests[room] = {suite: f"{f.parent}\n{text}" for f, text in texts.items() if f.name.endswith("_test.cc")
+                                for suite in re.findall(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),", text, re.M)}
+
+    def digest(self, program: str) -> str:
+        return hashlib.sha256((self.build / program).read_bytes()).hexdigest()
+
+    def baseline(self, cache: Path) -> None:
+        """The time of each test without a mutant. Tests that fail so are left out."""
+        known = json.loads(cache.read_text()) if cache.exists() else {}
+        self.runner.build([*(f"{room}_test" for room in self.rooms), "golden_test", "mjsense_program", "record_fake", "mjsense_python"])
+        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", "mjsense"]:
+            self.original[program] = self.digest(program)
+        for room in self.rooms:
+            program = f"{room}_test"
+            if known.get(program, {}).get("digest") != self.original[program]:
+                print(f"running {program} without a mutant", flush=True)
+                report = self.build / f"{program}.json"
+                self.runner.run([str(self.build / program), f"--gtest_output=json:{report}"], 1800)
+                tests = [(f"{s['name']}.{t['name']}", t) for s in json.loads(report.read_text())["testsuites"] for t in s["testsuite"]]
+                known[program] = {"digest": self.original[program],
+                                  "seconds": {name: float(t["time"][:-1]) for name, t in tests
+                                              if "failures" not in t and t["result"] == "COMPLETED"}}
+                cache.write_text(json.dumps(known))
+            self.seconds[program] = known[program]["seconds"]
+
+    def users(self, file: str) -> list[str]:
+        """Rooms that use a file's room: those that include its header first, then in the order of the rooms."""
+        room, header = file.split("/")[2], re.sub(r"\.cc$", ".h", file.removeprefix("src/mjsense/"))
+        users = [r for r in self.rooms if r != room and any(name.startswith(f"{room}/") for name in self.uses[r])]
+        return sorted(users, key=lambda r: header not in self.uses[r])
+
+    def split(self, room: str, file: str) -> tuple[list[str], list[str]]:
+        """Tests of a room: those in files that include the mutated file's header or, without such, stand in its folder; the others."""
+        header = re.sub(r"\.cc$", ".h", file.removeprefix("src/"))
+        texts, names = self.tests[room], list(self.seconds[f"{room}_test"])
+        suites = {s for s, text in texts.items() if f'"{header}"' in text}
+        suites = suites or {s for s, text in texts.items() if text.startswith(f"{(self.root / file).parent}\n")}
+        near = [n for n in names if n.split(".")[0].split("/")[-1] in suites]
+        return near, [n for n in names if n not in set(near)]
+
+    def stages(self, file: str, others: bool):
+        """(program, tests), the likeliest first."""
+        own = file.split("/")[2]
+        rooms = self.users(file) if others else [own] * (own in self.rooms)
+        left = OTHERS_S if others else OWN_S
+        groups = [(room, tests) for room in rooms for tests in self.split(room, file)]
+        if others:
+            groups.sort(key=lambda group: group[1] != self.split(group[0], file)[0] or not group[1])
+        slow: list[tuple[float, str, str]] = []
+        for room, tests in groups:
+            program, chosen = f"{room}_test", []
+            for test in tests:
+                cost = self.seconds[program][test]
+                if cost > SLOW_S:
+                    slow.append((cost, program, test))
+                elif cost <= left:
+                    left -= cost
+                    chosen.append(test)
+            if chosen:
+                yield program, chosen
+        for cost, program, test in sorted(slow):
+            if cost <= left:
+                left -= cost
+                yield program, [test]
+
+    def ask(self, file: str, others: bool) -> tuple[str, str]:
+        """(outcome, test that failed) of the mutant that stands in the tree."""
+        if file.startswith("python/"):
+            return self.ask_python(file)
+        same, built = True, set()
+        for program, tests in self.stages(file, others):
+            if program not in built:
+                self.runner.build([program])
+                built.add(program)
+            if self.digest(program) == self.original[program]:
+                continue
+            same = False
+            expected = sum(self.seconds[program][t] for t in tests)
+            if failed := self.runner.program(program, tests, 20 + 10 * expected):
+                return "noticed", f"{program}: {failed}"
+        if others:
+            if file.split("/")[2] in ("scene", "worlds", "rays", "render", "sim", "sensors"):
+                self.runner.build(["golden_test"])
+                if self.digest("golden_test") != self.original["golden_test"]:
+                    same = False
+                    if failed := self.runner.golden():
+                        return "noticed", failed
+            self.runner.build(["mjsense_program"])
+            same = same and self.digest("mjsense") == self.original["mjsense"]
+            if not same and (paths := self.pytests.get(file.split("/")[2])):
+                self.runner.build(["record_fake"])
+                if failed := self.runner.pytest(paths):
+                    return "noticed", failed
+        elif not built:
+            self.runner.build(["mjsense"])  # a room without tests of its own
+        return "same program" if others and same else "survived", ""
+
+    def ask_python(self, file: str) -> tuple[str, str]:
+        """The pytest files that name the mutated module's public classes and functions most often."""
+        if file.endswith(".cc"):
+            self.runner.build(["mjsense_python"])
+        else:
+            target = self.build / "python" / Path(file).relative_to("python")
+            self.runner.build(["mjsense_python"])
+            if not target.exists():
+                raise RuntimeError(f"{file} is not in the built package: {target}")
+        text = (self.root / file).read_text()
+        names = set(re.findall(r"^(?:class|def) ([A-Za-z]\w+)|^    def ([a-z]\w+)|m\.def\(\"(\w+)|nb::class_<.*\"(\w+)\"", text, re.M))
+        words = {w for group in names for w in group if w} | {Path(file).stem.strip("_")}
+        pattern = re.compile(r"\b(?:" + "|".join(map(re.escape, sorted(words))) + r")\b")
+        found = {f: len(pattern.findall(f.read_text())) / f.stat().st_size for f in (self.root / "tests/python").glob("test_*.py")}
+        start = time.time()
+        for path in sorted(found, key=lambda f: -found[f])[:8]:
+            if time.time() - start > OTHERS_S:
+                break
+            if failed := self.runner.pytest([str(path.relative_to(self.root))]):
+                return "noticed", failed
+        return "survived", ""
+
+
+def judge_all(judge: Judge, mutants: list, results_file: Path, tree: Path, failure: type[Exception]) -> dict[str, dict]:
+    results = json.loads(results_file.read_text()) if results_file.exists() else {}
+    for others in (False, True):
+        due = [m for m in mutants if not (r := results.get(m.id)) or r["digest"] != m.digest or
+               (others and r["outcome"] == "survived" and not r["others"] and m.room != "python")]
+        for i, mutant in enumerate(due):
+            path, start = tree / mutant.file, time.time()
+            original = path.read_text()
+            path.write_text(mutant.apply(tree))
+            try:
+                outcome, test = judge.ask(mutant.file, others)
+            except failure:
+                outcome, test = "not compiled", ""
+            finally:
+                path.write_text(original)
+            results[mutant.id] = {"digest": mutant.digest, "room": mutant.room, "outcome": outcome, "test": test, "others": others,
+                                  "seconds": round(time.time() - start, 1)}
+            results_file.write_text(json.dumps(results, indent=1))
+            print(f"[{i + 1}/{len(due)}] {mutant.file}:{mutant.line}: {mutant.what}: {outcome} {test}", flush=True)
+    return results
+
+
+def report(mutants: list, results: dict[str, dict], rooms: list[str]) -> str:
+    mine = [(m, results[m.id]) for m in mutants if m.id in results]
+    lines = ["| room | " + " | ".join(OUTCOMES) + " |", "|" + " --- |" * (len(OUTCOMES) + 1)]
+    for room in [*[r for r in rooms if any(m.room == r for m, _ in mine)], ""]:
+        counts = [sum(r["outcome"] == o and room in ("", m.room) for m, r in mine) for o in OUTCOMES]
+        lines.append(f"| {room or 'all'} | " + " | ".join(map(str, counts)) + " |")
+    lines += [f"survived: {m.file}:{m.line}: {m.what}\n  - {m.old.strip()}\n  + {m.new.strip()}" for m, r in mine if r["outcome"] == "survived"]
+    return "\n".join(lines)
