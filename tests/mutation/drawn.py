@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judges the mutants that draw.py makes: the tests of the mutant's room, then those of the rooms that use it.
 
-Tests run in the order in which they are likely to notice: those of the file itself, the rest of the room, tests of other rooms that include
-the mutated header, slow tests, other rooms. All mutants are first judged by their own room (a few seconds each), then the survivors by other
-rooms, for at most OTHERS_S seconds of tests each. Results are kept after each mutant; a run that is stopped goes on where it was.
+All mutants are first judged by the fast tests of their own room, a few seconds each: the tests of the mutated file, then the rest. Those that
+survive are then judged by the slow tests of the room and by the fast tests of the rooms that use it: those that include the mutated header
+first. Results are kept after each mutant; a run that is stopped goes on where it was.
 """
 
 import hashlib
@@ -12,9 +12,20 @@ import re
 import time
 from pathlib import Path
 
-SLOW_S = 2  # tests that take longer run only when all others have passed
-OWN_S, OTHERS_S = 60, 60  # seconds of tests, as measured without a mutant, that judge one mutant: of its own room, of others
+SLOW_S = 2  # a test that takes longer is slow
+# Seconds of tests, as measured without a mutant, that judge one mutant: slow ones of its own room, fast ones of other rooms.
+SLOW_OWN_S, OTHERS_S = 20, 40
 OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
+
+
+def within(limit: float, tests: list[str], seconds: dict[str, float]) -> list[str]:
+    """The first tests that together take no longer."""
+    chosen = []
+    for test in tests:
+        limit -= seconds[test]
+        if limit >= 0:
+            chosen.append(test)
+    return chosen
 
 
 class Judge:
@@ -70,29 +81,24 @@ class Judge:
         return near, [n for n in names if n not in set(near)]
 
     def stages(self, file: str, others: bool):
-        """(program, tests), the likeliest first."""
+        """(program, tests), the likeliest to notice first."""
         own = file.split("/")[2]
-        rooms = self.users(file) if others else [own] * (own in self.rooms)
-        left = OTHERS_S if others else OWN_S
-        groups = [(room, tests) for room in rooms for tests in self.split(room, file)]
+        if own in self.rooms:
+            seconds = self.seconds[f"{own}_test"]
+            if not others:
+                for tests in self.split(own, file):
+                    yield f"{own}_test", [t for t in tests if seconds[t] <= SLOW_S]
+                return
+            slow = sorted((t for tests in self.split(own, file) for t in tests if seconds[t] > SLOW_S), key=seconds.__getitem__)
+            yield f"{own}_test", within(SLOW_OWN_S, slow, seconds)
         if others:
-            groups.sort(key=lambda group: group[1] != self.split(group[0], file)[0] or not group[1])
-        slow: list[tuple[float, str, str]] = []
-        for room, tests in groups:
-            program, chosen = f"{room}_test", []
-            for test in tests:
-                cost = self.seconds[program][test]
-                if cost > SLOW_S:
-                    slow.append((cost, program, test))
-                elif cost <= left:
-                    left -= cost
-                    chosen.append(test)
-            if chosen:
-                yield program, chosen
-        for cost, program, test in sorted(slow):
-            if cost <= left:
-                left -= cost
-                yield program, [test]
+            left = OTHERS_S
+            users = {room: self.split(room, file) for room in self.users(file)}
+            for room, tests in [*((r, near) for r, (near, _) in users.items()), *((r, rest) for r, (_, rest) in users.items())]:
+                seconds = self.seconds[f"{room}_test"]
+                chosen = within(left, [t for t in tests if seconds[t] <= SLOW_S], seconds)
+                left -= sum(seconds[t] for t in chosen)
+                yield f"{room}_test", chosen
 
     def ask(self, file: str, others: bool) -> tuple[str, str]:
         """(outcome, test that failed) of the mutant that stands in the tree."""
@@ -100,6 +106,8 @@ class Judge:
             return self.ask_python(file)
         same, built = True, set()
         for program, tests in self.stages(file, others):
+            if not tests:
+                continue
             if program not in built:
                 self.runner.build([program])
                 built.add(program)

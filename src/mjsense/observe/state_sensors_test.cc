@@ -232,6 +232,12 @@ TEST(CameraParameters, ProjectKnownPoints) {
   EXPECT_NEAR(v1, 0, 1e-4);
 }
 
+TEST(CameraParameters, APictureHasPixels) {
+  EXPECT_THROW(CameraParameterSensor("p", "camera", 0, 1), ValueError);
+  EXPECT_THROW(CameraParameterSensor("p", "camera", 1, 0), ValueError);
+  EXPECT_NO_THROW(CameraParameterSensor("p", "camera", 1, 1));
+}
+
 TEST(CameraParameters, MatrixOfACameraWithASensor) {
   TestWorld w(kScene);
   CameraParameterSensor camera("sensor_param_chip", "chip", 640, 480);
