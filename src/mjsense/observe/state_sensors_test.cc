@@ -232,6 +232,27 @@ TEST(CameraParameters, ProjectKnownPoints) {
   EXPECT_NEAR(v1, 0, 1e-4);
 }
 
+// A turned camera that is not the model's first.
+TEST(CameraParameters, TheTwoPosesAreInverse) {
+  TestWorld w(R"(<mujoco><worldbody><camera name="first"/>
+    <body pos="1 2 3" euler="10 20 30"><camera name="second" pos=".1 .2 .3" euler="40 50 60"/></body>
+    </worldbody></mujoco>)");
+  CameraParameterSensor camera("p", "second", 64, 48);
+  w.compute(camera);
+  const auto X = values<double>(camera, "cam2world_gl"), E = values<double>(camera, "extrinsic_cv");
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(X[4 * i + 3], w.data->cam_xpos[3 + i]);
+    for (int j = 0; j < 4; ++j) {
+      double sum = 0;
+      for (int k = 0; k < 4; ++k) sum += E[4 * i + k] * X[4 * k + j];
+      EXPECT_NEAR(sum, i == j, 1e-12) << i << " " << j;
+    }
+  }
+  EXPECT_EQ(camera.field("cam2world_gl").spec.frame, "world");
+  EXPECT_EQ(camera.field("extrinsic_cv").spec.frame, "camera");
+  EXPECT_EQ(camera.field("intrinsic_cv").spec.frame, "pixels");
+}
+
 TEST(CameraParameters, APictureHasPixels) {
   EXPECT_THROW(CameraParameterSensor("p", "camera", 0, 1), ValueError);
   EXPECT_THROW(CameraParameterSensor("p", "camera", 1, 0), ValueError);

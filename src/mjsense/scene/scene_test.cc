@@ -302,6 +302,19 @@ TEST(Scene, EveryOptionIsApplied) {
   EXPECT_EQ(o.enableflags, mjENBL_ENERGY);
 }
 
+TEST(Scene, OptionsCanChangeUntilASimulationHasTheScene) {
+  SceneCfg cfg;
+  cfg.entities = {{"ball", xml(kBall)}};
+  Scene scene(std::move(cfg));
+  OptionsCfg options;
+  options.timestep = 0.004;
+  scene.set_options(options);
+  EXPECT_EQ(scene.model()->opt.timestep, 0.004);
+  EXPECT_EQ(scene.cfg().options.timestep, 0.004);
+  const std::shared_ptr<void> claim = scene.claim();
+  EXPECT_THROW(scene.set_options({}), RuntimeError);
+}
+
 // The options of an entity that the scene would override are named to the user: none may be missing.
 TEST(Options, EachDifferenceIsNamed) {
   mjOption standard;
