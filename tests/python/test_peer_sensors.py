@@ -292,6 +292,14 @@ def test_the_robot_view_agrees_with_the_suite():
         np.testing.assert_allclose(
             view.get_move_group("gripper").leaf_frame_to_robot[:3, 3], env.rows["tcp_pose"][w][:3], atol=1e-6
         )
+        jacobian, data = view.get_move_group("arm").get_jacobian(), view.mj_data
+        (dofs,) = np.nonzero(np.abs(jacobian).sum(0))
+        assert dofs.size == 7
+        for dof in dofs:
+            joint = view.mj_model.dof_jntid[dof]
+            arm = view.get_move_group("arm").leaf_frame_to_world[:3, 3] - data.xanchor[joint]
+            np.testing.assert_allclose(jacobian[:3, dof], np.cross(data.xaxis[joint], arm), atol=1e-9)
+            np.testing.assert_allclose(jacobian[3:, dof], data.xaxis[joint], atol=1e-9)
         target = robot.last_unnoised_cmd_joint_pos()
         np.testing.assert_array_equal(target["arm"], env.rows["actions/joint_pos/arm"][w])
         pose = robot.kinematics.fk(target, np.eye(4), rel_to_base=True)["arm"]
