@@ -3,7 +3,9 @@
 
 All mutants are first judged by the fast tests of their own room, a few seconds each: the tests of the mutated file, then the rest. Those that
 survive are then judged by the slow tests of the room and by the fast tests of the rooms that use it: those that include the mutated header
-first. Results are kept after each mutant; a run that is stopped goes on where it was.
+first.
+Results are kept after each mutant: a run that is stopped goes on where it was, and a later one
+judges the survivors of rooms with new tests again.
 """
 
 import hashlib
@@ -14,7 +16,7 @@ from pathlib import Path
 
 SLOW_S = 2  # a test that takes longer is slow
 # Seconds of tests, as measured without a mutant, that judge one mutant: slow ones of its own room, fast ones of other rooms.
-SLOW_OWN_S, OTHERS_S = 20, 40
+SLOW_OWN_S, OTHERS_S = 20, 30
 OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
 
 
@@ -36,12 +38,15 @@ class Judge:
         self.seconds: dict[str, dict[str, float]] = {}  # program: test: seconds
         self.tests: dict[str, dict[str, str]] = {}  # room: suite: text of the file with its tests
         self.uses: dict[str, set[str]] = {}  # room: what its files include, code and tests
+        self.version: dict[str, str] = {}  # room: hash of its tests
         for room in self.rooms:
             files = list((root / "src/mjsense" / room).rglob("*.cc")) + list((root / "src/mjsense" / room).rglob("*.h"))
             texts = {f: f.read_text() for f in files}
             self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense/([^"]+)"', text, re.M)}
-            self.tests[room] = {suite: f"{f.parent}\n{text}" for f, text in texts.items() if f.name.endswith("_test.cc")
+            self.tests[room] = {suite: f"{f.parent.relative_to(root)}\n{text}" for f, text in texts.items() if f.name.endswith("_test.cc")
                                 for suite in re.findall(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),", text, re.M)}
+
+            self.version[room] = hashlib.sha256("".join(self.tests[room][s] for s in sorted(self.tests[room])).encode()).hexdigest()[:8]
 
     def digest(self, program: str) -> str:
         return hashlib.sha256((self.build / program).read_bytes()).hexdigest()
@@ -76,7 +81,7 @@ class Judge:
         header = re.sub(r"\.cc$", ".h", file.removeprefix("src/"))
         texts, names = self.tests[room], list(self.seconds[f"{room}_test"])
         suites = {s for s, text in texts.items() if f'"{header}"' in text}
-        suites = suites or {s for s, text in texts.items() if text.startswith(f"{(self.root / file).parent}\n")}
+        suites = suites or {s for s, text in texts.items() if text.startswith(f"{Path(file).parent}\n")}
         near = [n for n in names if n.split(".")[0].split("/")[-1] in suites]
         return near, [n for n in names if n not in set(near)]
 
@@ -159,9 +164,17 @@ class Judge:
 
 def judge_all(judge: Judge, mutants: list, results_file: Path, tree: Path, failure: type[Exception]) -> dict[str, dict]:
     results = json.loads(results_file.read_text()) if results_file.exists() else {}
+
+    def is_due(mutant, others: bool) -> bool:
+        known = results.get(mutant.id)
+        if not known or known["digest"] != mutant.digest:
+            return True
+        if known["outcome"] != "survived" or mutant.room == "python":
+            return False
+        return not known["others"] if others else known["tests"] != judge.version.get(mutant.room)
+
     for others in (False, True):
-        due = [m for m in mutants if not (r := results.get(m.id)) or r["digest"] != m.digest or
-               (others and r["outcome"] == "survived" and not r["others"] and m.room != "python")]
+        due = [m for m in mutants if is_due(m, others)]
         for i, mutant in enumerate(due):
             path, start = tree / mutant.file, time.time()
             original = path.read_text()
@@ -172,8 +185,10 @@ def judge_all(judge: Judge, mutants: list, results_file: Path, tree: Path, failu
                 outcome, test = "not compiled", ""
             finally:
                 path.write_text(original)
-            results[mutant.id] = {"digest": mutant.digest, "room": mutant.room, "outcome": outcome, "test": test, "others": others,
-                                  "seconds": round(time.time() - start, 1)}
+            known = results.get(mutant.id, {})
+            results[mutant.id] = {"digest": mutant.digest, "room": mutant.room, "outcome": outcome, "test": test,
+                                  "others": others or (known.get("digest") == mutant.digest and known["others"]),
+                                  "tests": judge.version.get(mutant.room), "seconds": round(time.time() - start, 1)}
             results_file.write_text(json.dumps(results, indent=1))
             print(f"[{i + 1}/{len(due)}] {mutant.file}:{mutant.line}: {mutant.what}: {outcome} {test}", flush=True)
     return results
