@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judges the mutants that draw.py makes: the tests of the mutant's room, then those of the rooms that use it.
 
-All mutants are first judged by the fast tests of their own room, a few seconds each: the tests of the mutated file, then the rest. Those that
-survive are then judged by the slow tests of the room and by the fast tests of the rooms that use it: those that include the mutated header
-first.
-Results are kept after each mutant: a run that is stopped goes on where it was, and a later one
-judges the survivors of rooms with new tests again.
+All mutants are first judged by the fast tests of their own room, a few seconds each: the tests of the mutated file, then the rest. Those
+that survive are then judged by the slow tests of the room, and by the fast tests of the rooms that use it, of which those that include the
+mutated header come first. Results are kept after each mutant: a run that was stopped continues, and a later one judges the survivors of
+rooms with new tests again.
 """
 
 import hashlib
