@@ -6,6 +6,7 @@ import pathlib
 import re
 import shutil
 import struct
+import types
 import zlib
 
 import gymnasium
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import mjsense as mjs
+from mjsense._code_checksums import checksums
 
 MODELS = pathlib.Path(__file__).parents[2] / "models"
 CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv 0 0 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nf 1 3 2\nf 1 4 3\n"
@@ -301,3 +303,16 @@ def test_a_recorder_compares_the_model(tmp_path):
     assert again.kept == 1
     record(again, 1)
     again.complete()
+
+
+VALUES = (1, 1.0, "1", b"1", True, None, [1], [2], (1,), {1}, {1, 2}, {1, 3}, frozenset(), {"a": 1}, {"a": 2}, {"b": 1}, np.zeros(2),
+          np.zeros(3), np.zeros(2, np.float32), lambda: 1, lambda: 2, property(lambda self: 1), property(lambda self: 2))  # fmt: skip
+
+
+def test_attributes_that_differ_have_different_checksums():
+    def checksum(value):
+        return checksums(types.SimpleNamespace(value=value), "policy")["value"]
+
+    found = [checksum(value) for value in VALUES]
+    assert len(set(found)) == len(VALUES)
+    assert checksum({1, 2, 3}) == checksum({3, 2, 1})

@@ -312,7 +312,10 @@ TEST(CameraSystem, FrozenCamerasAreThoseOfTheEpisode) {
   Bench bench(cfg);
   ASSERT_EQ(bench.place(0, {4}), "");
   const std::string text = bench.cameras.frozen(0);
-  const Bench again(read_frozen(text, "robot_0/", "obs_scene"));
+  const CameraSystemCfg frozen = read_frozen(text, "robot_0/", "obs_scene");
+  EXPECT_EQ(frozen.cameras.at(0).body, "base");
+  EXPECT_EQ(frozen.cameras.at(1).body, "");
+  const Bench again(frozen);
   for (const char* name : {"shoulder", "exo"}) {
     expect_near(again.pose(name).p, bench.pose(name).p, 1e-9);
     EXPECT_NEAR(angle_between(again.pose(name).q, bench.pose(name).q), 0, 1e-6) << name;
