@@ -189,6 +189,27 @@ TEST(EnvStates, AbsentActorsAreMasked) {
   EXPECT_FALSE(states.fields()[3].data.row<bool>(0)[0]);
 }
 
+// Every tree of joints, with the precision of the simulation: the robot, and other articulated objects.
+TEST(EnvStates, ArticulationsHaveAllTheirJoints) {
+  TestWorld w(R"(<mujoco><worldbody>
+    <body name="robot/base"><joint axis="0 0 1"/><geom size=".1"/></body>
+    <body name="room/drawer" pos="1 0 0"><joint type="slide"/><geom size=".1"/>
+      <body><joint type="ball"/><geom size=".1"/></body></body>
+    <body name="room/cup" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
+  w.data->qpos[0] = 0.1;
+  w.data->qvel[0] = -0.2;
+  w.data->qpos[1] = 0.3;
+  w.data->qvel[1] = 0.4;
+  EnvStatesSensor states("env_states", "", {}, 0, "robot/base", "panda");
+  w.compute(states);
+  std::vector<std::string> names;
+  for (const Field& f : states.fields()) names.push_back(f.name);
+  EXPECT_THAT(names, ElementsAre("actors/cup", "articulations/panda", "articulations/room_drawer"));
+  EXPECT_THAT(values<double>(states, "articulations/panda"), ElementsAre(0.1, -0.2));
+  EXPECT_THAT(values<double>(states, "articulations/room_drawer"),
+              ElementsAre(0.3, 1, 0, 0, 0, 0.4, 0, 0, 0));
+}
+
 // Actors whose bodies have the same local name are distinguished by the names of their entities.
 TEST(EnvStates, ActorsWithTheSameNameKeepTheirEntities) {
   TestWorld w(R"(<mujoco><worldbody><body name="left/cup"><freejoint/><geom size=".1"/></body>
