@@ -276,6 +276,13 @@ def test_mj_datas_are_the_worlds():
     env.close()
 
 
+def bodies_in(peer, mask):
+    """Bodies that the wrist camera shows where `mask` is true."""
+    types, geoms = np.moveaxis(peer.render_segmentation_frame("wrist_camera")[mask], -1, 0)[::-1]
+    assert (types == int(mujoco.mjtObj.mjOBJ_GEOM)).all()
+    return set(peer.mj_model.geom_bodyid[geoms])
+
+
 def test_the_robot_view_agrees_with_the_suite():
     env = mjs.make_vec(num_envs=2, policy="planner", cameras=["wrist_camera"], **SMALL)
     env.reset()
@@ -310,7 +317,9 @@ def test_the_robot_view_agrees_with_the_suite():
         env.sim.add(sensor)
         np.testing.assert_allclose(camera.get_pose(), sensor.data["cam2world_gl"][w], atol=1e-12)
         np.testing.assert_array_equal(peer.render_rgb_frame("wrist_camera"), env.rows["wrist_camera"][w])
-        assert peer.get_segmentation_mask_of_object("robot_0/gripper/base", "wrist_camera", w).any()
+        mask = peer.get_segmentation_mask_of_object("robot_0/gripper/base", "wrist_camera", w)
+        names = {peer.mj_model.body(body).name for body in bodies_in(peer, mask)}
+        assert names and all(name.startswith("robot_0/gripper/") for name in names)
     with pytest.raises(ValueError, match="out of range"):
         peer.current_batch_index = 2
     env.close()
