@@ -7,7 +7,7 @@
     python tests/mutation/run.py --judge pytest scan-in-world    ask this judge alone
     python tests/mutation/run.py --check          only whether every mutant still applies
     python tests/mutation/run.py --report         the figures so far, and who survived
-    python tests/mutation/run.py --draw 60 --seed 1 [ROOMS]    mutants that draw.py makes, asked of their room's own tests
+    python tests/mutation/run.py --draw 60 --seed 1 [ROOMS]    mutants that draw.py makes, judged by drawn.py
 
 The copy is build/mutation/tree with a build folder of its own; results are kept in build/mutation/results.json. A mutant is
 noticed by the first judge that fails: its room's test program, then the golden hashes, then the other rooms' programs, those that
@@ -51,6 +51,14 @@ PYTESTS = {
 LIMIT_S = 600  # a judge that takes longer has noticed: nothing takes a tenth of this
 MEMORY = 64 << 30  # bytes of address space of a test: a mutant may allocate without end; two thousand worlds take half of it
 DRAWN = WORK / "drawn.json"
+# Of PYTESTS, those of seconds: for drawn mutants that the C++ tests have not noticed.
+QUICK_PYTESTS = {
+    "hdf5": ["tests/record/test_files.py"],
+    "record": ["tests/record/test_files.py"],
+    "rollout": ["tests/program/test_record.py"],
+    "replay": ["tests/record/test_files.py", "tests/program/test_usage.py"],
+    "app": ["tests/program/test_usage.py", "tests/program/test_streams.py", "tests/program/test_scan.py"],
+}
 
 
 class Failure(Exception):
@@ -153,11 +161,11 @@ class Runner:
     def __init__(self, prefix: list[str], jobs: int, limit: float = LIMIT_S) -> None:
         self.prefix, self.jobs, self.limit = prefix, jobs, limit
 
-    def run(self, command: list[str], limit: float = 0, **env: str) -> tuple[int, str]:
-        """Exit status (-SIGKILL: took too long) and output. Without a limit of its own it is a test, with the limit of tests."""
+    def run(self, command: list[str], limit: float = 0, test: bool = False, **env: str) -> tuple[int, str]:
+        """Exit status (-SIGKILL: took too long) and output. The memory of a test is limited; without a limit of its own it is a test."""
         process = subprocess.Popen([*self.prefix, *command], cwd=TREE, env={**os.environ, **env}, stdout=subprocess.PIPE,
                                    stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True,
-                                   preexec_fn=None if limit else limit_memory)
+                                   preexec_fn=None if limit and not test else limit_memory)
         try:
             out = process.communicate(timeout=limit or self.limit)[0]
         except subprocess.TimeoutExpired:
@@ -171,9 +179,10 @@ class Runner:
             errors = [line for line in out.splitlines() if "error" in line]
             raise Failure("does not compile:\n" + "\n".join(errors[:5] or [out[-500:]]))
 
-    def program(self, name: str) -> str:
-        """"" or the test that failed."""
-        code, out = self.run([str(BUILD / name), "--gtest_fail_fast"])
+    def program(self, name: str, tests: list[str] = [], limit: float = 0) -> str:  # noqa: B006
+        """"" or the test that failed; all tests if none are named."""
+        only = ["--gtest_filter=" + ":".join(tests)] if tests else []
+        code, out = self.run([str(BUILD / name), "--gtest_fail_fast", *only], limit, test=True)
         if code == 0:
             return ""
         failed = re.findall(r"^\[  FAILED  \] ([\w/]+\.[\w/]+)", out, re.M)
@@ -204,7 +213,10 @@ class Runner:
 
     def configure(self) -> None:
         if not (BUILD / "build.ninja").exists():
-            code, out = self.run(["cmake", "--preset", "dev", "-Wno-dev"], 600)
+            # Without debug information, which has the columns of the source, a mutant that changes nothing gives the same program.
+            link = "-Wl,-S" + " -fuse-ld=lld" * bool(shutil.which("ld.lld"))
+            flags = [f"-DCMAKE_{kind}_LINKER_FLAGS={link}" for kind in ("EXE", "MODULE")]
+            code, out = self.run(["cmake", "--preset", "dev", "-Wno-dev", *flags], 600)
             if code != 0:
                 raise Failure(out[-2000:])
 
@@ -245,47 +257,22 @@ class Runner:
             path.write_text(original)
 
 
+def module(name: str):
+    """A file beside this one, under a name of its own: other folders of tests have a run.py too."""
+    spec = importlib.util.spec_from_file_location(f"mutation_{name}", HERE / f"{name}.py")
+    loaded = sys.modules[f"mutation_{name}"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
 def drawn(rooms: list[str], count: int, seed: int) -> list[Mutant]:
-    spec = importlib.util.spec_from_file_location("mutation_draw", HERE / "draw.py")
-    draw = sys.modules["mutation_draw"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(draw)
     found = []
-    for _, site in draw.draw(ROOT, rooms, count, seed):
+    for _, site in module("draw").draw(ROOT, rooms, count, seed):
         file = str(site.file.relative_to(ROOT))
         old = site.file.read_text().split("\n")[site.line - 1]
         name = hashlib.sha256(f"{file}\0{old}\0{site.new}".encode()).hexdigest()[:8]
         found.append(Mutant(f"{Path(file).name}:{site.line}:{name}", file, site.what, old, site.new, site.line))
     return found
-
-
-def run_drawn(runner: Runner, mutants: list[Mutant]) -> int:
-    """Asks each room's own tests; a mutant that gives the same program to the bit changes nothing."""
-    results = json.loads(DRAWN.read_text()) if DRAWN.exists() else {}
-    due = [m for m in mutants if results.get(m.id, {}).get("digest") != m.digest]
-    runner.baseline({m.room for m in due}, own=True)
-    programs = {room: BUILD / f"{room}_test" for room in {m.room for m in due} & set(PROGRAMS)}
-    original = {room: hashlib.sha256(path.read_bytes()).hexdigest() for room, path in programs.items()}
-    for i, mutant in enumerate(due):
-        try:
-            result = runner.ask(mutant, own=True, only="")
-            path = programs.get(mutant.room)
-            same = not result["noticed"] and path and hashlib.sha256(path.read_bytes()).hexdigest() == original[mutant.room]
-            outcome = "noticed" if result["noticed"] else "same program" if same else "survived"
-        except Failure:
-            result, outcome = {}, "not compiled"
-        results[mutant.id] = {"digest": mutant.digest, "room": mutant.room, "outcome": outcome, **result}
-        DRAWN.write_text(json.dumps(results, indent=1))
-        print(f"[{i + 1}/{len(due)}] {mutant.file}:{mutant.line}: {mutant.what}: {outcome} {result.get('test', '')}", flush=True)
-    outcomes = ["noticed", "survived", "same program", "not compiled"]
-    mine = [(m, results[m.id]) for m in mutants]
-    print("| room | " + " | ".join(outcomes) + " |\n|" + " --- |" * (len(outcomes) + 1))
-    for room in [*[r for r in ROOMS if any(m.room == r for m in mutants)], ""]:
-        counts = [sum(r["outcome"] == o and room in ("", m.room) for m, r in mine) for o in outcomes]
-        print(f"| {room or 'all'} | " + " | ".join(map(str, counts)) + " |")
-    survivors = [m for m, r in mine if r["outcome"] == "survived"]
-    for m in survivors:
-        print(f"survived: {m.file}:{m.line}: {m.what}\n  - {m.old.strip()}\n  + {m.new.strip()}")
-    return 0
 
 
 def report(mutants: list[Mutant], results: dict) -> str:
@@ -317,6 +304,7 @@ def main() -> int:
     parser.add_argument("--no-baseline", action="store_true", help="trust that the tests pass without a mutant")
     parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
     parser.add_argument("--draw", type=int, default=0, help="so many mutants made by draw.py, spread over the rooms")
+    parser.add_argument("--part", default="1/1", help="of --draw: the first half is 1/2; each part is run in a checkout of its own")
     parser.add_argument("--seed", type=int, default=0, help="of --draw")
     parser.add_argument("--limit", type=float, default=LIMIT_S, help="seconds for a judge; one that takes longer has noticed (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")
@@ -329,7 +317,7 @@ def main() -> int:
         print(f"all {len(mutants)} mutants apply")
         return 0
     results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    if options.report:
+    if options.report and not options.draw:
         print(report(mutants, results))
         return 0
     if options.draw:
@@ -339,7 +327,16 @@ def main() -> int:
         copy_tree()
         runner = Runner(options.prefix.split(), options.jobs, options.limit)
         runner.configure()
-        return run_drawn(runner, drawn(options.which or ROOMS, options.draw, options.seed))
+        judging, mutants = module("drawn"), drawn(options.which or ROOMS, options.draw, options.seed)
+        if options.report:
+            print(judging.report(mutants, json.loads(DRAWN.read_text()), ROOMS))
+            return 0
+        judge = judging.Judge(runner, ROOT, BUILD, ROOMS, QUICK_PYTESTS)
+        judge.baseline(WORK / "times.json")
+        part, parts = map(int, options.part.split("/"))
+        judging.judge_all(judge, mutants[part - 1 :: parts], DRAWN, TREE, Failure)
+        print(judging.report(mutants, json.loads(DRAWN.read_text()), ROOMS))
+        return 0
     chosen = [m for m in mutants if not options.which or any(w == m.room if w in ROOMS else w in m.id for w in options.which)]
 
     def due(m: Mutant) -> bool:

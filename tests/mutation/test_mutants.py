@@ -39,3 +39,47 @@ def test_duplicate_ids_are_rejected(tmp_path):
     twice.write_text(text + text[text.index("[[mutant]]") : text.index("[[mutant]]", 40 + text.index("[[mutant]]"))])
     with pytest.raises(Failure, match="two mutants have this id"):
         load(twice)
+
+
+CODE = """
+struct Cfg { int depth = 3; };
+template <class V> void visit_fields(V& v, Cfg& c) {
+  v("depth", c.depth, "Depth.")
+      .within(0, 9);
+}
+int clamped(const Cfg& c, double x, double y, std::vector<int>& out) {
+  if (c.depth == 0)
+    throw ValueError(fmt::format("depth is {}", c.depth + 1));
+  out.reserve(c.depth + 1);
+  double row[9];
+  if (x < y) out.clear();
+  for (int i = 0; i < c.depth; ++i)
+    out.push_back(i * i);
+  call(one,
+       other);
+  return c.depth;
+}
+"""
+
+
+def test_what_is_drawn(tmp_path):
+    """Conditions, statements and arithmetic of function bodies; no declarations, messages, reserved memory or parts of a call."""
+    (tmp_path / "x.cc").write_text(CODE)
+    found = {(CODE.split("\n")[site.line - 1].strip(), site.what) for site in mutation.module("draw").sites(tmp_path / "x.cc")}
+    assert found == {
+        ("if (c.depth == 0)", "== becomes !="),
+        ("if (c.depth == 0)", "0 becomes 1"),
+        ("if (x < y) out.clear();", "< becomes >="),
+        ("if (x < y) out.clear();", "the condition is negated"),
+        ("for (int i = 0; i < c.depth; ++i)", "0 becomes 1"),
+        ("for (int i = 0; i < c.depth; ++i)", "< becomes <="),
+        ("for (int i = 0; i < c.depth; ++i)", "< becomes >="),
+        ("out.push_back(i * i);", "* becomes /"),
+        ("out.push_back(i * i);", "a statement is removed"),
+    }
+
+
+def test_a_seed_draws_the_same_mutants():
+    draw = mutation.module("draw").draw
+    rooms = ["core", "python"]
+    assert draw(mutation.ROOT, rooms, 20, 7) == draw(mutation.ROOT, rooms, 20, 7) != draw(mutation.ROOT, rooms, 20, 8)

@@ -276,6 +276,13 @@ def test_mj_datas_equal_the_worlds():
     env.close()
 
 
+def bodies_in(peer, mask):
+    """Bodies that the wrist camera shows where `mask` is true."""
+    types, geoms = np.moveaxis(peer.render_segmentation_frame("wrist_camera")[mask], -1, 0)[::-1]
+    assert (types == int(mujoco.mjtObj.mjOBJ_GEOM)).all()
+    return set(peer.mj_model.geom_bodyid[geoms])
+
+
 def test_the_robot_view_agrees_with_the_suite():
     env = mjs.make_vec(num_envs=2, policy="planner", cameras=["wrist_camera"], **SMALL)
     env.reset()
@@ -292,6 +299,14 @@ def test_the_robot_view_agrees_with_the_suite():
         np.testing.assert_allclose(
             view.get_move_group("gripper").leaf_frame_to_robot[:3, 3], env.rows["tcp_pose"][w][:3], atol=1e-6
         )
+        jacobian, data = view.get_move_group("arm").get_jacobian(), view.mj_data
+        (dofs,) = np.nonzero(np.abs(jacobian).sum(0))
+        assert dofs.size == 7
+        for dof in dofs:
+            joint = view.mj_model.dof_jntid[dof]
+            arm = view.get_move_group("arm").leaf_frame_to_world[:3, 3] - data.xanchor[joint]
+            np.testing.assert_allclose(jacobian[:3, dof], np.cross(data.xaxis[joint], arm), atol=1e-9)
+            np.testing.assert_allclose(jacobian[3:, dof], data.xaxis[joint], atol=1e-9)
         target = robot.last_unnoised_cmd_joint_pos()
         np.testing.assert_array_equal(target["arm"], env.rows["actions/joint_pos/arm"][w])
         pose = robot.kinematics.fk(target, np.eye(4), rel_to_base=True)["arm"]
@@ -302,7 +317,9 @@ def test_the_robot_view_agrees_with_the_suite():
         env.sim.add(sensor)
         np.testing.assert_allclose(camera.get_pose(), sensor.data["cam2world_gl"][w], atol=1e-12)
         np.testing.assert_array_equal(peer.render_rgb_frame("wrist_camera"), env.rows["wrist_camera"][w])
-        assert peer.get_segmentation_mask_of_object("robot_0/gripper/base", "wrist_camera", w).any()
+        mask = peer.get_segmentation_mask_of_object("robot_0/gripper/base", "wrist_camera", w)
+        names = {peer.mj_model.body(body).name for body in bodies_in(peer, mask)}
+        assert names and all(name.startswith("robot_0/gripper/") for name in names)
     with pytest.raises(ValueError, match="out of range"):
         peer.current_batch_index = 2
     env.close()

@@ -6,11 +6,13 @@ import pathlib
 import re
 import shutil
 import struct
+import types
 import zlib
 
 import gymnasium
 import numpy as np
 import pytest
+from mjsense._code_checksums import checksums
 
 import mjsense as mjs
 
@@ -323,3 +325,16 @@ def test_a_sensor_of_a_robot_toml_is_compared_by_its_class(lab, monkeypatch):
         mjs.record(**{**options, "policy": Still(), "sensors": [Height()], "resume": True})
     resumed_sensors.Grip.compute = compute
     assert mjs.record(**{**options, "policy": Still(), "sensors": [Height()], "resume": True}).enough
+
+
+VALUES = (1, 1.0, "1", b"1", True, None, [1], [2], (1,), {1}, {1, 2}, {1, 3}, frozenset(), {"a": 1}, {"a": 2}, {"b": 1}, np.zeros(2),
+          np.zeros(3), np.zeros(2, np.float32), lambda: 1, lambda: 2, property(lambda self: 1), property(lambda self: 2))  # fmt: skip
+
+
+def test_attributes_that_differ_have_different_checksums():
+    def checksum(value):
+        return checksums(types.SimpleNamespace(value=value), "policy")["value"]
+
+    found = [checksum(value) for value in VALUES]
+    assert len(set(found)) == len(VALUES)
+    assert checksum({1, 2, 3}) == checksum({3, 2, 1})

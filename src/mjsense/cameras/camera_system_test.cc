@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "mjsense/cameras/frozen_cameras.h"
 #include "mjsense/cameras/visibility.h"
 #include "mjsense/core/error.h"
 #include "mjsense/rays/ray_scene.h"
@@ -142,6 +143,34 @@ TEST(CameraSystem, MountsHaveTheConfiguredPoses) {
   expect_near(forward(bench.pose("corner")), {0, 1, 0}, 1e-12);
 }
 
+TEST(CameraSystem, TheFieldOfViewIsTheConfiguredOneOrThatOfTheCamera) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("shoulder", MountKind::kBody),
+                 mount("narrow", MountKind::kBody), mount("narrow_wrist", MountKind::kMjcf)};
+  cfg.cameras[2].fovy = 20;
+  cfg.cameras[3].fovy = 20;
+  Bench bench(cfg);
+  const auto frozen = nlohmann::json::parse(bench.cameras.frozen(0));
+  EXPECT_EQ(frozen["wrist"]["fovy"], 50);  // of the MJCF camera
+  EXPECT_EQ(frozen["shoulder"]["fovy"], 45);
+  EXPECT_EQ(frozen["narrow"]["fovy"], 20);
+  EXPECT_EQ(frozen["narrow_wrist"]["fovy"], 20);
+}
+
+// Before the first episode an orbit camera looks at its target from the largest distance and height.
+TEST(CameraSystem, BeforeAnEpisodeAnOrbitCameraShowsItsTarget) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("exo", MountKind::kOrbit)};
+  cfg.cameras[0].distance_range = {.6, 1};
+  cfg.cameras[0].height_range = {-.1, .2};
+  cfg.cameras[0].target = {0, .5, .1};
+  Bench bench(cfg);
+  const Pose pose = bench.pose("exo");
+  expect_near(pose.p, {1, 0, .2}, 1e-9);
+  expect_near(forward(pose), normalized(Vec3{-1, .5, -.1}), 1e-9);
+  EXPECT_GT(up(pose).z, .9);
+}
+
 TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("corner", MountKind::kFixed)};
@@ -251,6 +280,57 @@ TEST(CameraSystem, OrbitCamerasSeeTheObject) {
     expect_near(forward(pose), normalized(-pose.p), 1e-9);
     EXPECT_LT(pose.p.x, .4);  // not behind the wall
   }
+}
+
+TEST(CameraSystem, TheFieldOfViewOfAnOrbitCameraVaries) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("exo", MountKind::kOrbit)};
+  cfg.cameras[0].fovy = 50;
+  cfg.cameras[0].fovy_noise = 4;
+  Bench bench(cfg);
+  double least = 50, most = 50;
+  for (std::uint64_t episode = 0; episode < 20; ++episode) {
+    ASSERT_EQ(bench.place(0, {episode}), "");
+    const double fovy = nlohmann::json::parse(bench.cameras.frozen(0))["exo"]["fovy"];
+    least = std::min(least, fovy);
+    most = std::max(most, fovy);
+  }
+  EXPECT_GE(least, 46);
+  EXPECT_LT(least, 48);
+  EXPECT_GT(most, 52);
+  EXPECT_LE(most, 54);
+}
+
+// A recorded episode can be rendered again.
+TEST(CameraSystem, FrozenCamerasAreThoseOfTheEpisode) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("shoulder", MountKind::kBody), mount("exo", MountKind::kOrbit)};
+  cfg.cameras[0].pos = {.1, .2, .3};
+  cfg.cameras[0].quat = {.8, .6, 0, 0};
+  cfg.cameras[0].pos_noise = {.05, .05, .05};
+  cfg.cameras[0].rot_noise = {5, 5, 5};
+  cfg.cameras[0].fovy_noise = 3;
+  Bench bench(cfg);
+  ASSERT_EQ(bench.place(0, {4}), "");
+  const std::string text = bench.cameras.frozen(0);
+  const CameraSystemCfg frozen = read_frozen(text, "robot_0/", "obs_scene");
+  EXPECT_EQ(frozen.cameras.at(0).body, "base");
+  EXPECT_EQ(frozen.cameras.at(1).body, "");
+  const Bench again(frozen);
+  for (const char* name : {"shoulder", "exo"}) {
+    expect_near(again.pose(name).p, bench.pose(name).p, 1e-9);
+    EXPECT_NEAR(angle_between(again.pose(name).q, bench.pose(name).q), 0, 1e-6) << name;
+  }
+  EXPECT_EQ(nlohmann::json::parse(again.cameras.frozen(0))["shoulder"]["fovy"],
+            nlohmann::json::parse(text)["shoulder"]["fovy"]);
+}
+
+TEST(CameraSystem, FrozenTextThatIsNotOfCamerasIsRefused) {
+  for (const char* text :
+       {"", "{}", "[]", "3", R"({"exo": 3})", R"({"exo": {"pos": [0, 0, 0]}})",
+        R"({"exo": {"pos": [0, 0], "fovy": 45, "forward": [1, 0, 0], "up": [0, 0, 1]}})",
+        R"({"exo": {"pos": [0, 0, 0], "fovy": 45, "body": "robot_1/base", "quat": [1, 0, 0, 0]}})"})
+    EXPECT_THROW((void)read_frozen(text, "robot_0/", "obs_scene"), ValueError) << text;
 }
 
 TEST(CameraSystem, WithoutAVisiblePoseItFailsOrUsesTheBest) {

@@ -14,6 +14,7 @@
 #include "mjsense/core/json.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/core/utf8.h"
 
 namespace mjsense {
 namespace {
@@ -219,6 +220,18 @@ TEST(ThreadPool, RunsEveryItemOnceAndReportsTheFirstFailure) {
       EXPECT_STREQ(e.what(), "3");
     }
   }
+}
+
+TEST(Utf8, SizeOfTheFirstCharacter) {
+  EXPECT_EQ(utf8_size("a"), 1u);
+  EXPECT_EQ(utf8_size("\u00e9x"), 2u);
+  EXPECT_EQ(utf8_size("\u20acx"), 3u);
+  EXPECT_EQ(utf8_size("\U0001f600x"), 4u);
+  // No continuation, truncated, overlong, a surrogate, beyond U+10FFFF, a continuation first.
+  for (const char* text :
+       {"\xC3x", "\xE2\x82x", "\xE2x\xAC", "\xF0\x9F\x98x", "\xE2\x82", "\xC0\x80", "\xE0\x80\x80",
+        "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xF5\x80\x80\x80", "\x80"})
+    EXPECT_EQ(utf8_size(text), 0u) << text;
 }
 
 }  // namespace

@@ -75,6 +75,47 @@ TEST(EffectSensor, CleanSensorIsUnchangedAndDelayIsInSeconds) {
   EXPECT_EQ(scene->sensor("late").field().spec.unit, scene->sensor("robot/gyro").field().spec.unit);
 }
 
+// A history has the value of each step, also of steps at which the sensor is not read.
+TEST(EffectSensor, AHistoryHasEveryStep) {
+  EffectSensorCfg cfg;
+  cfg.name = "past";
+  cfg.sensor = "robot/gyro";
+  cfg.history_length = 3;
+  auto scene = make_scene(cfg);
+  Simulation sim(scene, {});
+  std::vector<float> clean;
+  for (int k = 0; k < 6; ++k) {
+    sim.step();
+    sim.refresh(scene->sensor("robot/gyro"));
+    clean.push_back(scene->sensor("robot/gyro").field().data.row<float>(0)[1]);
+  }
+  sim.refresh(scene->sensor("past"));
+  const auto past = scene->sensor("past").field().data.row<float>(0);
+  ASSERT_EQ(past.size(), 9u);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(past[3 * k + 1], clean[3 + k]) << k;
+  EXPECT_NE(clean[3], clean[4]);
+}
+
+// Two sensors with the same noise have different numbers.
+TEST(EffectSensor, NoiseDependsOnTheNameOfTheSensor) {
+  SceneCfg scene_cfg;
+  EntityCfg arm;
+  arm.model.xml = kPendulum;
+  scene_cfg.entities.emplace_back("robot", arm);
+  for (const char* name : {"one", "other"}) {
+    auto cfg = std::make_shared<EffectSensorCfg>();
+    cfg->name = name;
+    cfg->sensor = "robot/gyro";
+    cfg->effects = {std::make_shared<Noise>(Draw::gaussian({1}))};
+    scene_cfg.sensors.push_back(cfg);
+  }
+  auto scene = std::make_shared<Scene>(scene_cfg);
+  Simulation sim(scene, {});
+  Sensor* both[] = {&scene->sensor("one"), &scene->sensor("other")};
+  sim.refresh(both);
+  EXPECT_NE(both[0]->field().data.row<float>(0)[0], both[1]->field().data.row<float>(0)[0]);
+}
+
 TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
   constexpr int kWorlds = 16, kAlone = 5;
   std::vector<std::shared_ptr<Scene>> scenes;

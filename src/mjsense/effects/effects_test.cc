@@ -549,6 +549,22 @@ TEST(Chain, ErrorsNameSensorEffectAndValue) {
               HasSubstr("max_lag is 2147483647: must be at most 100000"));
 }
 
+// Integers have no NaN and are not clipped. They can be held or be zero.
+TEST(Chain, EffectsThatComputeNeedRealNumbers) {
+  SensorSpec spec;
+  spec.dtype = DType::kInt32;
+  spec.shape = {1};
+  const auto chain = [&](Effects effects) {
+    EffectChain("test", spec, EffectChainCfg{std::move(effects)}, 1, kPeriod, kPeriod);
+  };
+  for (const Effects& wrong : {one(Clip({0}, {1})), one(Dropout(0.1, Dropout::Mode::kNan)),
+                               one(Noise(Draw::gaussian({1})))})
+    EXPECT_THROW(chain(wrong), ValueError);
+  EXPECT_NO_THROW(chain(one(Dropout(0.1, Dropout::Mode::kHold))));
+  EXPECT_NO_THROW(chain(one(Dropout(0.1, Dropout::Mode::kZero))));
+  EXPECT_NO_THROW(chain(one(Rate(10))));
+}
+
 TEST(EffectSensor, InvalidEffectsAreRefusedAtBuild) {
   const auto message = [](Effects effects) -> std::string {
     EffectSensorCfg cfg;

@@ -189,6 +189,27 @@ TEST(EnvStates, AbsentActorsAreMasked) {
   EXPECT_FALSE(states.fields()[3].data.row<bool>(0)[0]);
 }
 
+// Every tree of joints, with the precision of the simulation: the robot, and other articulated objects.
+TEST(EnvStates, ArticulationsHaveAllTheirJoints) {
+  TestWorld w(R"(<mujoco><worldbody>
+    <body name="robot/base"><joint axis="0 0 1"/><geom size=".1"/></body>
+    <body name="room/drawer" pos="1 0 0"><joint type="slide"/><geom size=".1"/>
+      <body><joint type="ball"/><geom size=".1"/></body></body>
+    <body name="room/cup" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
+  w.data->qpos[0] = 0.1;
+  w.data->qvel[0] = -0.2;
+  w.data->qpos[1] = 0.3;
+  w.data->qvel[1] = 0.4;
+  EnvStatesSensor states("env_states", "", {}, 0, "robot/base", "panda");
+  w.compute(states);
+  std::vector<std::string> names;
+  for (const Field& f : states.fields()) names.push_back(f.name);
+  EXPECT_THAT(names, ElementsAre("actors/cup", "articulations/panda", "articulations/room_drawer"));
+  EXPECT_THAT(values<double>(states, "articulations/panda"), ElementsAre(0.1, -0.2));
+  EXPECT_THAT(values<double>(states, "articulations/room_drawer"),
+              ElementsAre(0.3, 1, 0, 0, 0, 0.4, 0, 0, 0));
+}
+
 // Actors whose bodies have the same local name are distinguished by the names of their entities.
 TEST(EnvStates, ActorsWithTheSameNameKeepTheirEntities) {
   TestWorld w(R"(<mujoco><worldbody><body name="left/cup"><freejoint/><geom size=".1"/></body>
@@ -230,6 +251,33 @@ TEST(CameraParameters, ProjectKnownPoints) {
       project(2, -.5, 1 + 2 * std::tan(std::numbers::pi / 6));  // at the right, on the upper edge
   EXPECT_NEAR(u1, 320 + f / 4, 1e-4);
   EXPECT_NEAR(v1, 0, 1e-4);
+}
+
+// A turned camera that is not the model's first.
+TEST(CameraParameters, TheTwoPosesAreInverse) {
+  TestWorld w(R"(<mujoco><worldbody><camera name="first"/>
+    <body pos="1 2 3" euler="10 20 30"><camera name="second" pos=".1 .2 .3" euler="40 50 60"/></body>
+    </worldbody></mujoco>)");
+  CameraParameterSensor camera("p", "second", 64, 48);
+  w.compute(camera);
+  const auto X = values<double>(camera, "cam2world_gl"), E = values<double>(camera, "extrinsic_cv");
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(X[4 * i + 3], w.data->cam_xpos[3 + i]);
+    for (int j = 0; j < 4; ++j) {
+      double sum = 0;
+      for (int k = 0; k < 4; ++k) sum += E[4 * i + k] * X[4 * k + j];
+      EXPECT_NEAR(sum, i == j, 1e-12) << i << " " << j;
+    }
+  }
+  EXPECT_EQ(camera.field("cam2world_gl").spec.frame, "world");
+  EXPECT_EQ(camera.field("extrinsic_cv").spec.frame, "camera");
+  EXPECT_EQ(camera.field("intrinsic_cv").spec.frame, "pixels");
+}
+
+TEST(CameraParameters, APictureHasPixels) {
+  EXPECT_THROW(CameraParameterSensor("p", "camera", 0, 1), ValueError);
+  EXPECT_THROW(CameraParameterSensor("p", "camera", 1, 0), ValueError);
+  EXPECT_NO_THROW(CameraParameterSensor("p", "camera", 1, 1));
 }
 
 TEST(CameraParameters, MatrixOfACameraWithASensor) {

@@ -6,6 +6,8 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/shared_field.h"
 #include "mjsense/observe/testing/world.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sim/simulation.h"
 
 namespace mjsense {
 namespace {
@@ -59,6 +61,16 @@ TEST(Suite, SelectKeepsTheGivenSensorsInOrder) {
   EXPECT_EQ(error_of([&] { suite.select(twice); }), "suite: sensor 'c' is given twice");
   EXPECT_THAT(error_of([&] { suite.select(unknown); }), testing::HasSubstr("no sensor named 'd'"));
   EXPECT_EQ(suite.size(), 2u) << "as it was";
+}
+
+TEST(Suite, BelongsToOneSimulation) {
+  SceneCfg cfg;
+  cfg.base.xml = "<mujoco><worldbody><body><geom size='.1'/></body></worldbody></mujoco>";
+  Simulation one(std::make_shared<Scene>(cfg), {}), other(std::make_shared<Scene>(cfg), {});
+  SensorSuite suite;
+  suite.bind(one);
+  EXPECT_EQ(error_of([&] { suite.bind(one); }), "");
+  EXPECT_THAT(error_of([&] { suite.bind(other); }), testing::HasSubstr("one simulation"));
 }
 
 TEST(Suite, ExtendKeepsSensorsBeforeADuplicate) {

@@ -83,19 +83,20 @@ TEST(FlexShapes, FacesAndNormalsEqualMuJoCo) {
 }
 
 // Three materials: one part per material, equal to what MuJoCo draws in that material.
-TEST(FlexShapes, EveryMaterialHasAPart) {
+void expect_a_part_for_each(const std::string& materials, int count) {
   const TestModel m(
       R"(<mujoco><asset><material name="a" rgba="1 0 0 1"/><material name="b" rgba="0 1 0 1"/>
     <material name="c" rgba="0 0 1 1"/></asset><worldbody><camera/></worldbody>
-    <deformable><flex name="f" dim="2" body="world" radius=".01" material="b a c b"
+    <deformable><flex name="f" dim="2" body="world" radius=".01" material=")" +
+      materials + R"("
       vertex="0 0 1 1 0 1 0 1 1 1 1 1 2 0 1 2 1 1" element="0 1 2 1 3 2 1 4 3 4 5 3"/></deformable></mujoco>)");
   const SharedGeometry shared(m.model);
   FlexShapes shapes(shared.device.get(), shared.flexes, m.model);
   shapes.update(m.model, m.data);
   const Drawn drawn(m);
-  ASSERT_EQ(drawn.scene.ngeom, 3);
-  ASSERT_EQ(shapes.parts().size(), 3u);
-  for (int i = 0; i < 3; ++i) {
+  ASSERT_EQ(drawn.scene.ngeom, count);
+  ASSERT_EQ(static_cast<int>(shapes.parts().size()), count);
+  for (int i = 0; i < count; ++i) {
     const mjvGeom& g = drawn.scene.geoms[i];  // size: radius, first face, number of faces
     const FlexSurface::Part& part = shared.flexes[0].parts[i];
     EXPECT_EQ(part.first, g.size[1]);
@@ -104,6 +105,11 @@ TEST(FlexShapes, EveryMaterialHasAPart) {
       EXPECT_EQ(m.model->mat_rgba[4 * shapes.parts()[i].material + k], g.rgba[k]);
     EXPECT_NE(shapes.parts()[i].scene, shapes.scenes()[0]);
   }
+}
+
+TEST(FlexShapes, EveryMaterialHasAPart) {
+  expect_a_part_for_each("b a c b", 3);
+  expect_a_part_for_each("b a b b", 2);
 }
 
 // A strip of 12 vertices along x with two bones; the second is bound at an angle.

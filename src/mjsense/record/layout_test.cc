@@ -99,6 +99,7 @@ TEST(Layout, FramesPerSecondAreExact) {
   EXPECT_EQ(Fps::from_period_ms(66), (Fps{500, 33}));
   EXPECT_EQ(Fps::from_period_ms(100), (Fps{10, 1}));
   EXPECT_EQ(Fps::from_period_ms(66).str(), "500/33");
+  EXPECT_EQ(Fps::from_period_ms(500).str(), "2");
   EXPECT_THROW(Fps::from_period_ms(0), ValueError);
 }
 

@@ -11,6 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/pose.h"
+#include "mjsense/scene/options.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -299,6 +300,61 @@ TEST(Scene, EveryOptionIsApplied) {
   EXPECT_EQ(o.ccd_iterations, 23);
   EXPECT_EQ(o.disableflags, mjDSBL_CONTACT);
   EXPECT_EQ(o.enableflags, mjENBL_ENERGY);
+}
+
+TEST(Scene, OptionsCanChangeUntilASimulationHasTheScene) {
+  SceneCfg cfg;
+  cfg.entities = {{"ball", xml(kBall)}};
+  Scene scene(std::move(cfg));
+  OptionsCfg options;
+  options.timestep = 0.004;
+  scene.set_options(options);
+  EXPECT_EQ(scene.model()->opt.timestep, 0.004);
+  EXPECT_EQ(scene.cfg().options.timestep, 0.004);
+  const std::shared_ptr<void> claim = scene.claim();
+  EXPECT_THROW(scene.set_options({}), RuntimeError);
+}
+
+// The options of an entity that the scene would override are named to the user: none may be missing.
+TEST(Options, EachDifferenceIsNamed) {
+  mjOption standard;
+  mj_defaultOption(&standard);
+  EXPECT_THAT(differing_options(standard, standard), ElementsAre());
+  const auto expect_named = [&](const char* name, auto change) {
+    mjOption option = standard;
+    change(option);
+    EXPECT_THAT(differing_options(option, standard), ElementsAre(name));
+  };
+#define EXPECT_NAMED(field) expect_named(#field, [](mjOption& o) { o.field += 1; })
+#define EXPECT_LIST_NAMED(field) \
+  expect_named(#field, [](mjOption& o) { *std::rbegin(o.field) += 1; })
+  EXPECT_NAMED(timestep);
+  EXPECT_NAMED(integrator);
+  EXPECT_NAMED(cone);
+  EXPECT_NAMED(solver);
+  EXPECT_NAMED(jacobian);
+  EXPECT_NAMED(impratio);
+  EXPECT_NAMED(iterations);
+  EXPECT_NAMED(tolerance);
+  EXPECT_NAMED(ls_iterations);
+  EXPECT_NAMED(ls_tolerance);
+  EXPECT_NAMED(noslip_iterations);
+  EXPECT_NAMED(noslip_tolerance);
+  EXPECT_NAMED(ccd_iterations);
+  EXPECT_NAMED(ccd_tolerance);
+  EXPECT_NAMED(density);
+  EXPECT_NAMED(viscosity);
+  EXPECT_NAMED(disableflags);
+  EXPECT_NAMED(enableflags);
+  EXPECT_NAMED(o_margin);
+  EXPECT_LIST_NAMED(gravity);
+  EXPECT_LIST_NAMED(wind);
+  EXPECT_LIST_NAMED(magnetic);
+  EXPECT_LIST_NAMED(o_solref);
+  EXPECT_LIST_NAMED(o_solimp);
+  EXPECT_LIST_NAMED(o_friction);
+#undef EXPECT_NAMED
+#undef EXPECT_LIST_NAMED
 }
 
 TEST(Scene, JoinsKeyframes) {

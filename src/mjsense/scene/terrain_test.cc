@@ -155,6 +155,28 @@ TEST(Terrain, IsDeterministicAndDistributesColumns) {
   EXPECT_EQ(one.scene().env_origins(160), two.scene().env_origins(160));
 }
 
+// Difficult tiles are redder, boxes and height fields alike.
+TEST(Terrain, TheColourIsThatOfTheDifficulty) {
+  for (const SubTerrainCfg& kind : {SubTerrainCfg{.kind = "stairs"}, {.kind = "rough"}}) {
+    TerrainCfg cfg;
+    cfg.terrain_type = "generator";
+    cfg.levels = 4;
+    cfg.types = 1;
+    cfg.sub_terrains = {{"a", kind}};
+    const Generated generated(cfg);
+    const mjModel* m = generated.scene().model();
+    int first = -1, last = -1;  // along x
+    for (int g = 0; g < m->ngeom; ++g) {
+      if (m->geom_rgba[4 * g] == m->geom_rgba[4 * g + 1]) continue;  // the border is grey
+      if (first < 0 || m->geom_pos[3 * g] < m->geom_pos[3 * first]) first = g;
+      if (last < 0 || m->geom_pos[3 * g] > m->geom_pos[3 * last]) last = g;
+    }
+    const auto redness = [&](int g) { return m->geom_rgba[4 * g] - m->geom_rgba[4 * g + 1]; };
+    ASSERT_GE(first, 0);
+    EXPECT_GT(redness(last), redness(first) + 0.2);
+  }
+}
+
 TEST(Terrain, ErrorsNameTheSetting) {
   const auto fault = [](TerrainCfg cfg) -> std::string {
     try {

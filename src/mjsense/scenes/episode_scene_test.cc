@@ -394,6 +394,7 @@ TEST(EpisodeScene, FaultsNameTheSetting) {
               }),
               HasSubstr("vary light"));
   EXPECT_THAT(fault([](auto& c) { c.entities[1].name = "b"; }), HasSubstr("two entities"));
+  EXPECT_THAT(fault([](auto& c) { c.entities[1].name = "room"; }), HasSubstr("two entities"));
 }
 
 // Absent objects neither move nor touch anything, though the floor extends to where they are.

@@ -224,6 +224,10 @@ TEST(Simulation, EagerSensorsAndTheirInputsRunEveryControlStep) {
   EXPECT_THAT(filter->computes, Each(5));
   EXPECT_THAT(in->computes, Each(5));
   EXPECT_THAT(filter->substeps, Each(15));
+  const int ids[] = {1};
+  sim.forward(ids);
+  EXPECT_THAT(filter->computes, ElementsAre(5, 6));
+  EXPECT_THAT(in->computes, ElementsAre(5, 6));
 }
 
 // A sensor that counts control steps and cannot compute the rows of some worlds.

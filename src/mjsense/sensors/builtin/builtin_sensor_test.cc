@@ -281,7 +281,7 @@ TEST(BuiltinSensor, DeclaresBounds) {
   };
   const std::vector<Case> cases = {
       {"gyro", in_robot("site", "imu"), {}, 0, -kNone, kNone},
-      {"gyro", in_robot("site", "imu"), {}, 3, -3, 3},
+      {"gyro", in_robot("site", "imu"), {}, 0.5, -0.5, 0.5},
       {"touch", in_robot("site", "imu"), {}, 0, 0, kNone},
       {"touch", in_robot("site", "imu"), {}, 5, 0, 5},
       {"framezaxis", in_robot("body", "hand"), {}, 0, -1, 1},

@@ -9,11 +9,13 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/episode/testing/played_task.h"
+#include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 struct Played : PlayedTask<DoorOpeningTask> {
@@ -116,6 +118,48 @@ TEST(DoorOpening, DoorStateIsCurrent) {
     EXPECT_NEAR(norm(handle - vec3(p.data->geom_xpos + 3 * geom)), 0, 1e-9);
     EXPECT_NEAR(std::hypot(handle.x - hinge.x, handle.y - hinge.y), std::hypot(0.9, 0.02), 0.15);
   }
+}
+
+TEST(DoorOpening, ObjectPosesAreMatricesInTheBaseFrame) {
+  Played p;
+  p.start(1);
+  for (const std::shared_ptr<Sensor>& sensor : p.task.create_task_sensors()) {
+    if (sensor->name() != "object_poses") continue;
+    sensor->initialize({.model = p.model, .num_worlds = 2});
+    sensor->compute(p.world);
+    const auto row = sensor->fields()[0].data.row<std::uint8_t>(0);
+    const auto poses =
+        nlohmann::json::parse(std::string(reinterpret_cast<const char*>(row.data())));
+    ASSERT_EQ(poses.size(), 2u);
+    const Pose base = p.task.robot().base_pose(p.world);
+    for (const auto& [name, body] :
+         {std::pair{"door", p.task.door(0).body}, {"door_handle", p.task.door(0).handle}}) {
+      const auto& matrix = poses[name];
+      ASSERT_EQ(matrix.size(), 4u) << name;
+      EXPECT_EQ(matrix[3], nlohmann::json({0, 0, 0, 1}));
+      const Pose in_base =
+          inverse(base) * Pose{vec3(p.data->xpos + 3 * body), quat(p.data->xquat + 4 * body)};
+      const Vec3 axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_NEAR(matrix[i][3].get<double>(), in_base.p[i], 1e-9) << name;
+        for (int j = 0; j < 3; ++j)
+          EXPECT_NEAR(matrix[i][j].get<double>(), rotate(in_base.q, axes[j])[i], 1e-9) << name;
+      }
+    }
+    return;
+  }
+  FAIL() << "there is no sensor 'object_poses'";
+}
+
+// Door recordings have the tools' poses under their own names. Other sensors stay, in their order.
+TEST(DoorOpening, TheSuiteHasEachToolPoseOnce) {
+  Played p;
+  SensorSuite suite;
+  suite.extend(p.task.robot().create_robot_sensors());
+  suite.extend(p.task.create_task_sensors());
+  p.task.edit_suite(suite);
+  EXPECT_THAT(suite.names(), ElementsAre("door_state", "left_tcp_pose", "right_tcp_pose",
+                                         "grasp_state_door_handle", "object_poses"));
 }
 
 TEST(DoorOpening, SceneWithoutADoorIsRejected) {
