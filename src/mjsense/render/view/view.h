@@ -52,6 +52,7 @@ struct alignas(64) ViewGeom {
   int id;                 // id among geoms, parts of flexes and skins, unique in the model
   int object_id, object;  // for segmentation: id and mjtObj
   bool fixed;             // belongs to the layer View::fixed
+  bool casts = true;      // casts shadows
   bool transparent;       // blended over what is behind it; casts shadows and receives none
   // A plane seen from below: drawn as a faint veil, absent in depth and segmentation.
   bool behind;
