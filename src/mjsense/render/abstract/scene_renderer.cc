@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <tuple>
 
 #include "mjsense/core/error.h"
 
@@ -20,6 +21,15 @@ constexpr int kSpot = 0, kDirectional = 1;  // mjtLightType, the same in all ver
 
 bool finite(std::span<const float> values) {
   return std::ranges::all_of(values, [](float x) { return std::isfinite(x); });
+}
+
+// Depth that mujoco.Renderer gives where nothing is seen: the far plane's, with the error of single
+// precision that its conversion has.
+float far_depth(float near, float far, bool orthographic) {
+  if (orthographic) return far;
+  const float c = -0.5f * (-(far + near) / (far - near)) - 0.5f;
+  const float d = -0.5f * (-(2.0f * far * near) / (far - near));
+  return static_cast<float>(static_cast<double>(d) / c);
 }
 
 void set_box(float x, float y, float z, RayGeom& shape) {
@@ -97,17 +107,17 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
     ImageTargets images = targets;
     images.depth = nullptr;
     images.segmentation = nullptr;
-    images.samples = settings_.samples;
+    images.samples = std::min(settings_.samples, ImageTargets::kMostMultisamples);
+    images.multisampled = images.samples > 1;
     draw(images, true);
   }
   if (targets.depth || targets.segmentation) {
     ImageTargets images = targets;
     images.rgb = nullptr;
     draw(images, false);
-    // Where nothing is seen, MuJoCo's depth is that of the far plane.
     if (targets.depth)
       std::replace(targets.depth, targets.depth + static_cast<std::size_t>(width) * height, 0.0f,
-                   far_);
+                   far_depth(near_, far_, grid_.orthographic));
   }
 }
 
@@ -115,9 +125,12 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
 void SceneRenderer::read(const SceneMemory& scene, bool all) {
   drawn_.clear();
   decorations_.clear();
+  segments_.assign(scene.num_geoms + 1, {-1, -1});
   for (int i = 0; i < scene.num_geoms; ++i) {
     AbstractGeom geom;
     geom_reader_.read(scene.geoms + i * scene.geom_stride, geom);
+    if (geom.segid >= 0 && geom.segid <= scene.num_geoms)
+      segments_[geom.segid] = {geom.objid, geom.objtype};
     if (!finite(geom.pos) || !finite(geom.mat) || !finite(geom.size))
       throw ValueError(
           fmt::format("geom {} of the scene (object type {}, id {}) has a pose or size that is not "
@@ -131,13 +144,20 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
           i, geom.objtype, geom.objid));
     add(geom, scene);
   }
+  // A segment belongs to the last geom that has its id, which matters for decoration geoms that
+  // users add without an id of their own.
+  for (DrawnGeom& drawn : drawn_) {
+    const int segment = drawn.object_id;
+    std::tie(drawn.object_id, drawn.object) =
+        segment >= 0 && segment <= scene.num_geoms ? segments_[segment] : std::pair(-1, -1);
+  }
 }
 
 void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
   DrawnGeom out{};
   std::copy_n(geom.rgba, 4, out.rgba);
   out.object = geom.objtype;
-  out.object_id = geom.objid;
+  out.object_id = geom.segid;
   out.casts = geom.category != mjCAT_DECOR && geom.type != mjGEOM_LINE;
   out.material = {.specular = geom.specular,
                   .shininess = geom.shininess,

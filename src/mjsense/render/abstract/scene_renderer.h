@@ -83,6 +83,7 @@ class SceneRenderer {
   std::shared_ptr<RTCDeviceTy> device_;
   // The current scene.
   std::vector<DrawnGeom> drawn_;
+  std::vector<std::pair<int, int>> segments_;  // object id and type by segmentation id
   std::vector<ViewLight> lights_;
   double position_[3], rotation_[9];
   PixelGrid grid_;

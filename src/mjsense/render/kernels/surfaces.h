@@ -59,6 +59,7 @@ inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixe
   const bool ortho = view.grid.orthographic;
   const Float zero = splat(0.0f), one = splat(1.0f);
   const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k), splat(-1.0f)};
+  if (g.behind) n = {-n.x, -n.y, -n.z};
   const Float inverse = one / min(dot(n, d), splat(-1e-4f));
   const Float scale = ortho ? one : load(hits.t + k);
   const auto step = [&](Float along_n, Float ex, Float ey, float size) {

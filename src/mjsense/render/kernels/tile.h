@@ -64,8 +64,9 @@ struct TileLists {
 // visible geoms are listed.
 inline void find_row(const View& view, int ty, TileScratch& scratch) {
   const PixelGrid& grid = view.grid;
-  const float high = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
-  const float low = high + grid.dy * kTileSize;
+  const float top = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
+  const float reach = 0.5f * grid.dy;  // of samples
+  const float high = top - reach, low = top + grid.dy * kTileSize + reach;
   scratch.row_count = 0;
   for (int i = 0; i < view.num_opaque + view.num_transparent; ++i) {
     const float* w = view.geoms[i].window;
@@ -124,18 +125,195 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrore
 struct TileSpace {
   Tile tile;
   Mirrored mirrored;
+  Tile sampled[ImageTargets::kMostMultisamples];
 };
+
+// Sample offsets of OpenGL's multisampling: for four samples those that all common implementations
+// use.
+inline void multisample_shift(int index, int samples, float& x, float& y) {
+  constexpr float kFour[4][2] = {{-1, -3}, {3, -1}, {-3, 1}, {1, 3}};
+  if (samples != 4) return sample_shift(index, samples, x, y);
+  x = kFour[index][0] / 8;
+  y = -kFour[index][1] / 8;  // OpenGL counts rows from the bottom
+}
+
+// Sets the pixels of a tile at (x0, y0), `across` packets wide, and clears its hits.
+inline void start_tile(const View& view, int x0, int y0, int across, int packets, float shift_x,
+                       float shift_y, Tile& tile) {
+  const float far = view.far > 0 ? view.far : kInfinity;
+  float* window = tile.around;
+  window[0] = window[2] = kInfinity;
+  window[1] = window[3] = -kInfinity;
+  for (int q = 0; q < packets; ++q) {
+    fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
+                tile.pixels[q]);
+    const float* w = tile.pixels[q].window;
+    for (int c = 0; c < 4; c += 2) {
+      window[c] = w[c] < window[c] ? w[c] : window[c];
+      window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
+    }
+    for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
+    tile.farthest[q] = far;
+    clear(tile.hits[q], far);
+  }
+  for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
+  tile.depth = far;
+}
+
+// Computes the colours of packet `q` with transparent geoms. `color`: where to store them.
+inline void shade_pixels(const View& view, const FixedTile* fixed, const Mirrored& mirrored, int q,
+                         const TileLists& lists, const TileScratch& scratch, Tile& tile,
+                         Shadows& shadows, Colors& colors) {
+  shade_packet(view, fixed, mirrored, q, tile.pixels[q], tile.hits[q], shadows, colors);
+  if (lists.transparent)
+    shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.hits[q],
+                      colors);
+}
+
+// Packets in which the samples of a pixel may see different surfaces than its centre. `reach`: the
+// distance of samples from the centre, in pixels.
+inline PacketMask packets_with_edges(const View& view, const TileLists& lists, int packets,
+                                     float reach, const TileScratch& scratch, Tile& tile) {
+  const PixelGrid& grid = view.grid;
+  const float x = reach * grid.dx, y = -reach * grid.dy;
+  PacketMask edges = 0;
+  for (int q = 0; q < packets; ++q) {
+    const Int first = int_of(tile.hits[q].geom[0]);
+    std::uint32_t equal = 0;
+    for (int k = 0; k < kLanes; k += kWidth)
+      equal |= bits(load(tile.hits[q].geom + k) == first) << k;
+    if (equal != 0xffffu) edges |= 1u << q;
+  }
+  const auto add = [&](const ViewGeom& g) {
+    const float window[4] = {g.window[0] - x, g.window[1] + x, g.window[2] - y, g.window[3] + y};
+    edges |= packets_in_reach(window, g.nearest, tile);
+  };
+  for (int i = 0; i < lists.opaque; ++i) {
+    const ViewGeom& g = view.geoms[scratch.opaque[i]];
+    if (g.type != mjGEOM_PLANE || g.size[0] > 0 || g.size[1] > 0) add(g);
+  }
+  for (int i = 0; i < lists.transparent; ++i) add(view.geoms[scratch.transparent[i]]);
+  return edges;
+}
+
+// If the mean of 1/t over a pixel's samples differs from that of its centre by more than this times
+// the size of a pixel, the pixel shows an edge within one geom.
+constexpr float kBend = 0.06f;
+
+// Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
+// samples see different surfaces.
+inline void render_multisampled(const View& view, const ImageTargets& targets, int x0, int y0,
+                                TileScratch& scratch) {
+  auto& [tile, mirrored, sampled] = *static_cast<TileSpace*>(scratch.tile);
+  const PixelGrid& grid = view.grid;
+  const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
+  const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
+  const int packets = across * down, samples = targets.samples;
+  constexpr float kReach = 0.5f;
+  tile.shaded = true;
+  start_tile(view, x0, y0, across, packets, 0, 0, tile);
+  TileLists lists = find_geoms(view, tile.around, scratch);
+  trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  Shadows shadows;
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
+  if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+  Colors centers[kTilePackets];
+  PacketMask blended = 0;  // packets that are shaded for every sample
+  for (int q = 0; q < packets; ++q) {
+    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, centers[q]);
+    // Edges of what is reflected.
+    if (view.reflection && mirrored.lanes[q] && hit_lanes(mirrored.tile.hits[q]))
+      blended |= 1u << q;
+  }
+  // Geoms that only samples see are outside tile.around.
+  float around[4];
+  for (int c = 0; c < 4; ++c)
+    around[c] = tile.around[c] + (c % 2 ? 1 : -1) * kReach * (c < 2 ? grid.dx : -grid.dy);
+  lists = find_geoms(view, around, scratch);
+  const PacketMask edges =
+      (packets_with_edges(view, lists, packets, kReach, scratch, tile) | blended);
+  for (int i = 0; i < lists.transparent; ++i)
+    blended |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
+  if (edges) {
+    alignas(64) float mean[kTilePackets][kLanes];
+    std::uint32_t differ[kTilePackets] = {};
+    for (int i = 0; i < samples; ++i) {
+      Tile& t = sampled[i];
+      t.shaded = true;
+      float shift_x, shift_y;
+      multisample_shift(i, samples, shift_x, shift_y);
+      start_tile(view, x0, y0, across, packets, shift_x, shift_y, t);
+      for (int q = 0; q < packets; ++q)
+        if (!(edges >> q & 1u)) t.farthest[q] = -kInfinity;
+      trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, t);
+      for (PacketMask rest = edges; rest; rest &= rest - 1) {
+        const int q = __builtin_ctz(rest);
+        for (int k = 0; k < kLanes; k += kWidth) {
+          const Mask same = load(t.hits[q].geom + k) == load(tile.hits[q].geom + k);
+          differ[q] |= (~bits(same) & kAllLanes) << k;
+          const Float nearness = splat(1.0f / samples) / load(t.hits[q].t + k);
+          store(mean[q] + k, i == 0 ? nearness : load(mean[q] + k) + nearness);
+        }
+      }
+    }
+    for (PacketMask rest = edges; rest; rest &= rest - 1) {
+      const int q = __builtin_ctz(rest);
+      for (int k = 0; k < kLanes; k += kWidth) {
+        const Float nearness = splat(1.0f) / load(tile.hits[q].t + k);
+        const Float bend = abs(load(mean[q] + k) - nearness);
+        differ[q] |= bits(splat(kBend * grid.dx) * nearness < bend) << k;
+      }
+      if (blended >> q & 1u) differ[q] = 0xffffu;
+      for (int k = 0; k < kLanes; k += kWidth) {
+        const Mask keep = mask_of(~differ[q] >> k & kAllLanes);
+        for (auto& c : centers[q].rgb) store(c + k, select(keep, load(c + k), splat(0.0f)));
+      }
+    }
+    for (int i = 0; i < samples; ++i) {
+      Tile& t = sampled[i];
+      PacketMask shaded = 0;
+      for (PacketMask rest = edges; rest; rest &= rest - 1) {
+        const int q = __builtin_ctz(rest);
+        if (!differ[q]) continue;
+        shaded |= 1u << q;
+        for (int k = 0; k < kLanes; ++k)
+          if (!(differ[q] >> k & 1u)) {
+            t.hits[q].t[k] = kInfinity;
+            t.hits[q].geom[k] = t.hits[q].id[k] = -1;
+          }
+      }
+      if (!shaded) break;
+      for (int q = 0; q < packets; ++q)
+        if (!(shaded >> q & 1u)) clear(t.hits[q], kInfinity);
+      if (view.shadows) find_all_casters(view, nullptr, t, packets, scratch, shadows);
+      if (view.reflection) look_through_mirror(view, packets, t, mirrored);
+      for (; shaded; shaded &= shaded - 1) {
+        const int q = __builtin_ctz(shaded);
+        Colors colors;
+        shade_pixels(view, nullptr, mirrored, q, lists, scratch, t, shadows, colors);
+        for (int k = 0; k < kLanes; k += kWidth) {
+          const Mask add = mask_of(differ[q] >> k & kAllLanes);
+          for (int c = 0; c < 3; ++c)
+            store(centers[q].rgb[c] + k,
+                  load(centers[q].rgb[c] + k) +
+                      select(add, load(colors.rgb[c] + k) * splat(1.0f / samples), splat(0.0f)));
+        }
+      }
+    }
+  }
+  for (int q = 0; q < packets; ++q)
+    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), centers[q].rgb, 1);
+}
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  auto& [tile, mirrored] = *static_cast<TileSpace*>(scratch.tile);
+  auto& [tile, mirrored, sampled] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
   const int packets = across * down;
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
-  const float far = view.far > 0 ? view.far : kInfinity;
   tile.shaded = targets.rgb || targets.normals || targets.fixed;
   const int samples = targets.rgb ? targets.samples : 1;
   alignas(64) float sum[kTilePackets][3][kLanes];
@@ -146,24 +324,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     const bool centered = sample == samples || samples == 1;
     float shift_x = 0, shift_y = 0;
     if (!centered) sample_shift(sample, samples, shift_x, shift_y);
-    float* window = tile.around;
-    window[0] = window[2] = kInfinity;
-    window[1] = window[3] = -kInfinity;
-    for (int q = 0; q < packets; ++q) {
-      fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
-                  tile.pixels[q]);
-      const float* w = tile.pixels[q].window;
-      for (int c = 0; c < 4; c += 2) {
-        window[c] = w[c] < window[c] ? w[c] : window[c];
-        window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
-      }
-      for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
-      tile.farthest[q] = far;
-      clear(tile.hits[q], far);
-    }
-    for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
-    tile.depth = far;
-    const TileLists lists = find_geoms(view, window, scratch);
+    start_tile(view, x0, y0, across, packets, shift_x, shift_y, tile);
+    const TileLists lists = find_geoms(view, tile.around, scratch);
     const FixedTile* fixed = nullptr;  // the tile's cached layer
     if (!view.layered || samples > 1) {
       trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
@@ -189,10 +351,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
       for (int q = 0; q < packets; ++q) {
         Colors colors;
-        shade_packet(view, fixed, mirrored, q, tile.pixels[q], tile.hits[q], shadows, colors);
-        if (lists.transparent)
-          shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q],
-                            tile.hits[q], colors);
+        shade_pixels(view, fixed, mirrored, q, lists, scratch, tile, shadows, colors);
         for (int c = 0; c < 3; ++c)
           for (int k = 0; k < kLanes; k += kWidth) {
             const Float color = load(colors.rgb[c] + k);
@@ -218,7 +377,13 @@ inline void render_tiles(const View& view, const ImageTargets& targets, int firs
   const int across = (view.grid.width + kTileSize - 1) / kTileSize;
   for (int ty = first; ty < last; ++ty) {
     find_row(view, ty, scratch);
-    for (int tx = 0; tx < across; ++tx) render_tile(view, targets, tx, ty, scratch);
+    for (int tx = 0; tx < across; ++tx) {
+      if (targets.multisampled) {
+        render_multisampled(view, targets, tx * kTileSize, ty * kTileSize, scratch);
+      } else {
+        render_tile(view, targets, tx, ty, scratch);
+      }
+    }
   }
 }
 

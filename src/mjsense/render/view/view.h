@@ -132,6 +132,7 @@ struct View {
   bool layered = false;
   const FixedTile* fixed = nullptr;
   const int* index_of_id = nullptr;  // index in `geoms` by id, for visible geoms
+  bool backs = false;  // depth and segmentation include planes seen from behind
   float global_ambient = 0;
   const Texture* skybox = nullptr;
   float r_wc[9] = {};      // for the skybox
@@ -159,6 +160,9 @@ struct ImageTargets {
   bool ray_depth = false;                // depth along the ray instead of planar depth
   int samples = 1;                       // samples per pixel, for rgb
   FixedTile* fixed = nullptr;            // not null: write these tiles and no image
+  // As with multisampling in OpenGL, use the samples for edges only, and write rgb only.
+  static constexpr int kMostMultisamples = 8;
+  bool multisampled = false;
 };
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels

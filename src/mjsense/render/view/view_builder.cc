@@ -237,6 +237,7 @@ ViewBuilder::ViewBuilder(std::size_t geoms, std::size_t lights)
 const View& ViewBuilder::build(const DrawnScene& scene, const double position[3],
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
+  view_.backs = true;
   view_.near = scene.near;
   view_.far = scene.far;
   view_.shadows = scene.shadows;
