@@ -158,7 +158,8 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
   std::copy_n(geom.rgba, 4, out.rgba);
   out.object = geom.objtype;
   out.object_id = geom.segid;
-  out.casts = geom.category != mjCAT_DECOR && geom.type != mjGEOM_LINE;
+  out.casts = geom.category != mjCAT_DECOR && geom.type != mjGEOM_LINE &&
+              geom.type != mjGEOM_LINEBOX;
   out.material = {.specular = geom.specular,
                   .shininess = geom.shininess,
                   .emission = geom.emission,
