@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python package. It names no libmujoco: that of the installed mujoco-core is loaded before (mjsense/_libmujoco.py). The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
+# The Python package. The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
 # nanobind-backend), so that one wheel serves every CPython from 3.11 on. It is made of
 # python/bindings, which stands above every room of C++.
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
@@ -25,7 +25,26 @@ foreach(archive ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC})
 endforeach()
 add_custom_target(mjsense_python_hdf5 DEPENDS ${MJSENSE_PY_HDF5})
 add_dependencies(mjsense_python mjsense_python_hdf5)
-target_link_libraries(mjsense_python PRIVATE mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_PRIVATE_LIBS})
+
+# The extension needs libmj_mjsense.so, a copy of libmujoco under a name of its own (cmake/private_mujoco.py). Where the environment's
+# mujoco is of the same series, mjsense/_libmujoco.py loads that one's libmujoco and shared/libmj_mjsense.so, an empty library of the same
+# name, before the extension: the dynamic linker then takes the functions from the libmujoco that `import mujoco` uses.
+set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
+set(MJSENSE_PY_LIB ${MJSENSE_PY_DIR}/_lib)
+file(GLOB MUJOCO_PLUGINS ${MUJOCO_DIR}/plugin/*.so)
+add_custom_command(OUTPUT ${MJSENSE_PY_LIB}/libmj_mjsense.so
+                   COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/cmake/private_mujoco.py ${MUJOCO_DIR} ${MUJOCO_LIBRARY}
+                           ${MJSENSE_PY_LIB}
+                   DEPENDS ${PROJECT_SOURCE_DIR}/cmake/private_mujoco.py ${MUJOCO_LIBRARY} ${MUJOCO_PLUGINS}
+                   COMMENT "Copying libmujoco under a name of its own")
+file(WRITE ${PROJECT_BINARY_DIR}/empty.c "")
+add_library(mjsense_shared_mujoco SHARED ${PROJECT_BINARY_DIR}/empty.c)
+target_link_options(mjsense_shared_mujoco PRIVATE -nostdlib)
+set_target_properties(mjsense_shared_mujoco PROPERTIES OUTPUT_NAME mj_mjsense LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_LIB}/shared)
+add_custom_target(mjsense_private_mujoco DEPENDS ${MJSENSE_PY_LIB}/libmj_mjsense.so)
+add_dependencies(mjsense_private_mujoco mjsense_shared_mujoco)
+add_dependencies(mjsense_python mjsense_private_mujoco)
+target_link_libraries(mjsense_python PRIVATE mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_PRIVATE_LIBS} ${MJSENSE_PY_LIB}/libmj_mjsense.so)
 target_link_options(mjsense_python PRIVATE -Wl,--exclude-libs,ALL -Wl,-Bsymbolic)
 if(MJSENSE_STATIC)
   target_sources(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR}/packaging/old_glibc.cc)
@@ -33,9 +52,8 @@ if(MJSENSE_STATIC)
 endif()
 
 # build/<preset>/python is a ready package: the extension, and links to the Python files. PYTHONPATH=build/dev/python.
-set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
 set_target_properties(mjsense_python PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_DIR}
-                                                MJSENSE_MUJOCO_LATER ON SKIP_BUILD_RPATH ON)
+                                                MJSENSE_MUJOCO_LATER ON INSTALL_RPATH "$ORIGIN/_lib" BUILD_WITH_INSTALL_RPATH ON)
 file(GLOB_RECURSE MJSENSE_PY_FILES CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/python/mjsense
      ${PROJECT_SOURCE_DIR}/python/mjsense/*.py ${PROJECT_SOURCE_DIR}/python/mjsense/py.typed)
 foreach(file IN LISTS MJSENSE_PY_FILES)
@@ -49,4 +67,5 @@ nanobind_add_stub(mjsense_stub MODULE mjsense._core OUTPUT ${MJSENSE_PY_DIR}/_co
 
 # scikit-build-core takes python/mjsense itself (pyproject.toml); CMake adds what is built.
 install(TARGETS mjsense_python LIBRARY DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL)
+install(DIRECTORY ${MJSENSE_PY_LIB} DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL USE_SOURCE_PERMISSIONS)
 install(FILES ${MJSENSE_PY_DIR}/_core.pyi DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL)

@@ -27,12 +27,12 @@ EOF
 # Every kind of CPU that Embree is compiled for, up to this one.
 for isa in sse2 avx2 avx512; do
   MJSENSE_EMBREE=max_isa=$isa python - <<'EOF'
-import os, mujoco
+import os
 import mjsense as mjs
 # A wall of triangles at 2 m, between a lamp and a plate.
-model = mujoco.MjSpec.from_string('''<mujoco><asset><mesh name="wall" vertex="2 -1 -1  2 1 -1  2 -1 1  2 1 1  3 -1 -1  3 1 -1  3 -1 1  3 1 1"/></asset>
+model = '''<mujoco><asset><mesh name="wall" vertex="2 -1 -1  2 1 -1  2 -1 1  2 1 1  3 -1 -1  3 1 -1  3 -1 1  3 1 1"/></asset>
   <worldbody><light pos="2.5 0 5" dir="0 0 -1" castshadow="true"/><geom type="mesh" mesh="wall"/><geom type="box" pos="2.5 0 -2" size="2 2 .1"/>
-  <body name="eye"><geom size=".01"/><camera name="view" pos="-2 0 0" xyaxes="0 -1 0 0 0 1"/></body></worldbody></mujoco>''')
+  <body name="eye"><geom size=".01"/><camera name="view" pos="-2 0 0" xyaxes="0 -1 0 0 0 1"/></body></worldbody></mujoco>'''
 sensors = [mjs.RayCastSensorCfg(name="ahead", frame=mjs.ObjRef(type="body", name="eye", entity="room"),
                                 pattern=mjs.GridPatternCfg(size=(0.0, 0.0), resolution=1.0, direction=(1.0, 0.0, 0.0)))]
 sensors += [mjs.CameraSensorCfg(name=name, camera_name="room/view", width=64, height=64, use_shadows=name == "lit") for name in ("lit", "plain")]

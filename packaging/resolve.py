@@ -19,8 +19,12 @@ ENVIRONMENTS: dict[str, list[str]] = {
     "alone": [],
     "all extras": [requirement for extra in EXTRAS.values() for requirement in extra],
     "mujoco": ["mujoco>=4.0,<4.1"],
+    "mujoco 3.3": ["mujoco==3.3.*"],
+    "mujoco 3.8": ["mujoco==3.8.*"],
+    "mujoco 3.11": ["mujoco==3.11.*"],
+    "mujoco 3.17": ["mujoco==3.17.*"],
     "mujoco-warp": ["mujoco-warp", "mujoco>=4.0,<4.1"],
-    "gymnasium-robotics": ["gymnasium-robotics>=1.4", "mujoco>=4.0,<4.1"],
+    "gymnasium-robotics": ["gymnasium-robotics>=1.4", "mujoco==3.8.*"],
     "viewers": ["rerun-sdk>=0.22", "viser>=0.2"],
     "trainers": ["rsl-rl-lib", "stable-baselines3"],
 }

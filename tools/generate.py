@@ -42,13 +42,13 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import mujoco
-
 from mjsense import _config_methods
 from mjsense._dataclass import dataclass
 from mjsense._field_docs import show_field_docs
 
 if TYPE_CHECKING:
+    import mujoco
+
     from mjsense.effects import Effect
 ''',
     "effects": '''# SPDX-License-Identifier: Apache-2.0

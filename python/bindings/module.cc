@@ -11,6 +11,7 @@ NB_MODULE(_core, m) {
   // to users.
   nanobind::set_leak_warnings(false);
   mjsense::python::bind_libmujoco(m);
+  mjsense::python::bind_mujoco_views(m);
   mjsense::python::bind_core(m);
   mjsense::python::bind_scene(m);
   mjsense::python::bind_simulation(m);

@@ -29,11 +29,10 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
 from mjsense import _libmujoco
 
-_libmujoco.load()  # first, because the extension uses the libmujoco that `import mujoco` loads
+_libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses
 
 from mjsense import _core
 
-_libmujoco.check(_core)
 _core.leave_no_log_file()
 
 from mjsense import _gymnasium, assets, configs, effects, observations

@@ -8,13 +8,13 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, cast
 
-import mujoco
-
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense._arguments import KnownAttributes
 
 if TYPE_CHECKING:
     from typing import Self
+
+    import mujoco
 
 
 class Config(KnownAttributes):
@@ -42,7 +42,7 @@ class EntityCfg(Config):
     assets: Any
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.model, (str, Path, mujoco.MjSpec)) or callable(self.model)):
+        if not (isinstance(self.model, (str, Path)) or _mujoco.is_spec(self.model) or callable(self.model)):
             raise TypeError(
                 f"EntityCfg: model must be a path, XML text, a mujoco.MjSpec or a function that makes one, not {self.model!r}"
             )
@@ -53,8 +53,8 @@ class EntityCfg(Config):
         model, assets = self.model, dict(self.assets)
         if callable(model):
             model = cast(Any, model())
-        if isinstance(model, mujoco.MjSpec):
-            return "spec", model, {**model.assets, **assets}
+        if _mujoco.is_spec(model):
+            return *_mujoco.source_of(model), {**model.assets, **assets}
         if isinstance(model, str) and model.lstrip().startswith("<"):
             return "xml", model, assets
         if isinstance(model, (str, Path)):
@@ -104,12 +104,9 @@ class SceneCfg(Config):
             raise ValueError(f"SceneCfg: num_envs is {self.num_envs}: must be at least 1")
         super().__post_init__()
 
-    def _base_spec(self) -> mujoco.MjSpec:
+    def _base_spec(self) -> Any:
         """The spec in which the scene is built."""
-        if self.base is None:
-            return mujoco.MjSpec()
-        text = str(self.base)
-        return mujoco.MjSpec.from_string(text) if text.lstrip().startswith("<") else mujoco.MjSpec.from_file(text)
+        return _mujoco.new_spec(None if self.base is None else str(self.base))
 
 
 class SensorCfg(Config):

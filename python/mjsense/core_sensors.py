@@ -7,9 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import mujoco
-
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense._arguments import checked
 from mjsense._streams import nest
 from mjsense.errors import UnknownNameError
@@ -17,6 +15,8 @@ from mjsense.native_sensor import NativeSensor
 from mjsense.sensor import Sensor
 
 if TYPE_CHECKING:
+    import mujoco
+
     from mjsense.simulation import Simulation
 
 
@@ -85,22 +85,22 @@ def _sim_groups(sim: Simulation, place: str, groups: Mapping[str, Sequence[str]]
         qpos: list[int] = []
         dofs: list[int] = []
         for joint in joints:
-            i = _id(model, mujoco.mjtObj.mjOBJ_JOINT, joint, f"{place}: group '{name}'")
-            sizes = {mujoco.mjtJoint.mjJNT_FREE: (7, 6), mujoco.mjtJoint.mjJNT_BALL: (4, 3)}
-            nq, nv = sizes.get(mujoco.mjtJoint(model.jnt_type[i]), (1, 1))
+            i = _id(model, _mujoco.Obj.JOINT, joint, f"{place}: group '{name}'")
+            sizes = {_mujoco.Joint.FREE: (7, 6), _mujoco.Joint.BALL: (4, 3)}
+            nq, nv = sizes.get(_mujoco.Joint(model.jnt_type[i]), (1, 1))
             qpos += range(model.jnt_qposadr[i], model.jnt_qposadr[i] + nq)
             dofs += range(model.jnt_dofadr[i], model.jnt_dofadr[i] + nv)
         out.append((name, [int(a) for a in qpos], [int(a) for a in dofs]))
     return out
 
 
-def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, place: str) -> int:
-    found = mujoco.mj_name2id(model, kind, name)
+def _id(model: mujoco.MjModel, kind: _mujoco.Obj, name: str, place: str) -> int:
+    found = _mujoco.name2id(model, kind, name)
     if found >= 0:
         return found
-    counts = {mujoco.mjtObj.mjOBJ_JOINT: model.njnt, mujoco.mjtObj.mjOBJ_BODY: model.nbody, mujoco.mjtObj.mjOBJ_CAMERA: model.ncam}
-    names = [mujoco.mj_id2name(model, kind, i) or "" for i in range(counts[kind])]
-    raise UnknownNameError(_core.unknown_name(place, kind.name[6:].lower(), name, names))
+    counts = {_mujoco.Obj.JOINT: model.njnt, _mujoco.Obj.BODY: model.nbody, _mujoco.Obj.CAMERA: model.ncam}
+    names = [_mujoco.id2name(model, kind, i) for i in range(counts[kind])]
+    raise UnknownNameError(_core.unknown_name(place, kind.name.lower(), name, names))
 
 
 @checked
@@ -277,7 +277,7 @@ class CameraParameterSensor(CoreSensor):
     def _build(self, sim: Simulation) -> _core.SensorHandle:
         streams = {} if sim._view is None else {c["name"]: c["mjcf_camera"] for c in sim._view.cameras()}
         camera = streams.get(self._camera, self._camera)
-        _id(sim.model, mujoco.mjtObj.mjOBJ_CAMERA, camera, f"sensor '{self.name}'")
+        _id(sim.model, _mujoco.Obj.CAMERA, camera, f"sensor '{self.name}'")
         return _core.make_camera_parameters(self.name, camera, *self._size)
 
 

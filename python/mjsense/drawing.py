@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from mjsense._arguments import KnownAttributes, checked
 
-_GEOMS = {
-    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
-    "arrow": mujoco.mjtGeom.mjGEOM_ARROW,
-    "line": mujoco.mjtGeom.mjGEOM_LINE,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-}
+if TYPE_CHECKING:
+    import mujoco
+
+_GEOMS = ("sphere", "arrow", "line", "cylinder")
 _AXES = ((0.9, 0.0, 0.0), (0.0, 0.9, 0.0), (0.0, 0.0, 0.9))
 
 
@@ -95,13 +92,16 @@ class DebugShapes(KnownAttributes):
         Returns the number of shapes that did not fit; a scene holds ``maxgeom`` geoms.
         """
         # Duplicates the C++ function DebugShapes::append_to, because MuJoCo's Python bindings give no pointer to a scene.
+        import mujoco  # the one that made the scene, of any series
+
         room = min(len(self), max(0, scene.maxgeom - scene.ngeom))
         geoms, identity = scene.geoms[scene.ngeom : scene.ngeom + room], np.eye(3).ravel()
         rows = zip(geoms, self.kinds, self.positions, self.positions + self.vectors, self.widths, self.rgba, self.labels)
         for geom, kind, start, end, width, rgba, label in rows:
-            mujoco.mjv_initGeom(geom, _GEOMS[kind], np.full(3, width), start, identity, rgba)
+            shape = getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
+            mujoco.mjv_initGeom(geom, shape, np.full(3, width), start, identity, rgba)
             if kind != "sphere":
-                mujoco.mjv_connector(geom, _GEOMS[kind], width, start, end)
+                mujoco.mjv_connector(geom, shape, width, start, end)
             geom.category = mujoco.mjtCatBit.mjCAT_DECOR
             if labels:
                 geom.label = label[:99]

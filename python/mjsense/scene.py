@@ -9,12 +9,11 @@ import weakref
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense._arguments import KnownAttributes, checked
 from mjsense.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
@@ -23,6 +22,9 @@ from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.sensor import Sensor, as_sensor
+
+if TYPE_CHECKING:
+    import mujoco
 
 _CLASSES = {
     "builtin": BuiltinSensor,
@@ -216,14 +218,12 @@ class Scene(KnownAttributes):
 
     def _entities_of_spec(self) -> dict[str, Entity]:
         """The entities before compilation, with names only."""
-        kinds = {"body": "bodies", "geom": "geoms", "site": "sites", "joint": "joints", "actuator": "actuators",
-                 "tendon": "tendons", "camera": "cameras"}  # fmt: skip
+        names = {kind.name.lower(): _core.spec_names(self.spec._address, kind) for kind in _mujoco.Obj if kind != _mujoco.Obj.KEY}
         entities = {}
         for name in self.cfg.entities:
             prefix = name + "/"
             described: dict[str, Any] = {
-                f"{kind}_names": tuple(e.name[len(prefix) :] for e in getattr(self.spec, many) if e.name.startswith(prefix))
-                for kind, many in kinds.items()
+                f"{kind}_names": tuple(name[len(prefix) :] for name in found if name.startswith(prefix)) for kind, found in names.items()
             }
             described["fixed_base"] = "mocap_base" in described["body_names"]
             entities[name] = Entity(name, described)
@@ -232,7 +232,7 @@ class Scene(KnownAttributes):
     @cached_property
     def model(self) -> mujoco.MjModel:
         """A copy of the compiled model for look-ups. Changing it does not affect any simulation."""
-        return mujoco.MjModel._from_model_ptr(self._core.copy_model())
+        return _mujoco.model_of(self._core.copy_model())
 
     def to_xml(self) -> str:
         """MJCF that compiles to the same model. If ``assets()`` is not empty, write its files to the same folder."""

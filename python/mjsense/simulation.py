@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.drawing import DebugShapes
 from mjsense.errors import UnknownNameError
@@ -19,6 +18,9 @@ from mjsense.native_sensor import NativeSensor
 from mjsense.peer import PeerEnv
 from mjsense.scene import Scene
 from mjsense.sensor import Sensor, as_sensor
+
+if TYPE_CHECKING:
+    import mujoco
 
 _IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
 """Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
@@ -170,11 +172,11 @@ class Simulation(KnownAttributes):
                 keyframes of the entities; keyframes of a scene's base keep their own names and indices.
         """
         if isinstance(key, str):
-            found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, key)
+            found = _mujoco.name2id(self.model, _mujoco.Obj.KEY, key)
             if found < 0:
                 names = [self.model.key(i).name for i in range(self.model.nkey)]
                 raise ValueError(f"no keyframe '{key}'; there are {names}")
-            key = int(found)
+            key = found
         self._core.reset(_ids(world_ids), -1 if key is None else key, seed)
 
     def forward(self, world_ids: Sequence[int] | None = None) -> None:
@@ -254,7 +256,7 @@ class Simulation(KnownAttributes):
 
         Warnings that were never raised are absent. MuJoCo also prints the first warning of each name, with its world.
         """
-        counts = {mujoco.mjtWarning(i).name: np.array(row) for i, row in enumerate(self._core.warning_counts())}
+        counts = {name: np.array(row) for name, row in zip(_mujoco.WARNINGS, self._core.warning_counts())}
         return {name: row for name, row in counts.items() if row.any()}
 
     @property
@@ -262,7 +264,7 @@ class Simulation(KnownAttributes):
         """A copy of the simulated model for look-ups. It does not contain values that differ between worlds; see
         :meth:`model_of`."""
         if self._model is None:
-            self._model = mujoco.MjModel._from_model_ptr(self._core.copy_model())
+            self._model = _mujoco.model_of(self._core.copy_model())
         return self._model
 
     def model_of(self, world: int) -> mujoco.MjModel:
@@ -275,7 +277,7 @@ class Simulation(KnownAttributes):
         """
         (world,) = self._rows([world]).tolist()
         if world not in self._models:
-            self._models[world] = mujoco.MjModel._from_model_ptr(self._core.copy_model())
+            self._models[world] = _mujoco.model_of(self._core.copy_model())
         self._core.write_model(world, self._models[world]._address)
         return self._models[world]
 
@@ -320,7 +322,7 @@ class Simulation(KnownAttributes):
         if field in ("geom_type", "light_type", "cam_projection"):
             self._check_types(field, values)
         if field == "geom_dataid":
-            model, meshes = self.model, self.model.geom_type == mujoco.mjtGeom.mjGEOM_MESH
+            model, meshes = self.model, self.model.geom_type == _mujoco.Geom.MESH
             fits = np.where(meshes, (values >= 0) & (values < model.nmesh), values == model.geom_dataid)
             if not fits.all():
                 raise ValueError(f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs")
@@ -333,16 +335,15 @@ class Simulation(KnownAttributes):
             world = np.arange(self.num_worlds)[rows][world]
             raise ValueError(f"{field}: values must be quaternions; that of world {world}, element {element}, has length 0")
         target[rows] = values
-        self._core.model_changed(_ids(world_ids), field in mujoco.MjModel._setconst_inputs)
+        self._core.model_changed(_ids(world_ids), field in _core.setconst_inputs())
         self._follow_models()
         self.forward(world_ids)
 
     def _check_types(self, field: str, values: np.ndarray) -> None:
         """Geom types may change to other primitives; meshes, height fields and signed distance fields cannot change."""
         if field == "geom_type":
-            kinds = mujoco.mjtGeom
-            primitives = [int(k) for k in (kinds.mjGEOM_PLANE, kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE, kinds.mjGEOM_ELLIPSOID,
-                                           kinds.mjGEOM_CYLINDER, kinds.mjGEOM_BOX)]  # fmt: skip
+            kinds = _mujoco.Geom
+            primitives = [kinds.PLANE, kinds.SPHERE, kinds.CAPSULE, kinds.ELLIPSOID, kinds.CYLINDER, kinds.BOX]
             fits = (values == self.model.geom_type) | (np.isin(values, primitives) & np.isin(self.model.geom_type, primitives))
         else:
             fits = (values >= 0) & (values <= (1 if field == "cam_projection" else 3))

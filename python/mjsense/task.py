@@ -7,14 +7,15 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
-from mjsense import _core, _gymnasium
+from mjsense import _core, _gymnasium, _mujoco
 from mjsense._arguments import checked
 from mjsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
+    import mujoco
+
     from mjsense.configs import SceneCfg
     from mjsense.simulation import Simulation
 
@@ -303,13 +304,13 @@ class WorldState:
             velocity: Velocity of a free body ``[6]``: linear in world axes, m/s, then angular in body axes, rad/s; by default 0.
         """
         model = self.model
-        index = self._id(mujoco.mjtObj.mjOBJ_BODY, "body", body)
+        index = self._id(_mujoco.Obj.BODY, "body", body)
         mocap = model.body_mocapid[index]
         if mocap >= 0:
             self.mocap_pos[mocap], self.mocap_quat[mocap] = pos, quat
             return
         joint = model.body_jntadr[index]
-        if joint < 0 or model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+        if joint < 0 or model.jnt_type[joint] != _mujoco.Joint.FREE:
             raise ValueError(f"place: body '{body}' is neither free nor a mocap body")
         address, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
         self.qpos[address : address + 3] = pos
@@ -319,7 +320,7 @@ class WorldState:
     def set_joint(self, joint: str, value: float | Sequence[float], velocity: float | Sequence[float] = 0.0) -> None:
         """Sets a joint's position (rad or m; 7 values for a free joint) and velocity."""
         model = self.model
-        index = self._id(mujoco.mjtObj.mjOBJ_JOINT, "joint", joint)
+        index = self._id(_mujoco.Obj.JOINT, "joint", joint)
         kind = model.jnt_type[index]
         nq, nv = {0: (7, 6), 1: (4, 3)}.get(int(kind), (1, 1))
         address, dof = model.jnt_qposadr[index], model.jnt_dofadr[index]
@@ -327,12 +328,12 @@ class WorldState:
         self.qvel[dof : dof + nv] = velocity
 
     def _id(self, kind: Any, word: str, name: str) -> int:
-        index = mujoco.mj_name2id(self.model, kind, name)
+        index = _mujoco.name2id(self.model, kind, name)
         if index < 0:
             import difflib
 
             count = {"body": self.model.nbody, "joint": self.model.njnt}[word]
-            names = [mujoco.mj_id2name(self.model, kind, i) or "" for i in range(count)]
+            names = [_mujoco.id2name(self.model, kind, i) for i in range(count)]
             near = difflib.get_close_matches(name, names, 3)
             hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else f"; there are {', '.join(filter(None, names[:12]))}"
             raise UnknownNameError(f"no {word} named '{name}'{hint}")

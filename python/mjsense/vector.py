@@ -7,12 +7,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
 import gymnasium
-import mujoco
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
@@ -88,7 +87,7 @@ class TaskVectorEnv(VectorEnv):
         self.action_groups: dict[str, slice] = group_slices(layout)
         """Columns of an action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
-        low[low <= -mujoco.mjMAXVAL], high[high >= mujoco.mjMAXVAL] = -np.inf, np.inf  # no limit
+        low[low <= -_mujoco.MAXVAL], high[high >= _mujoco.MAXVAL] = -np.inf, np.inf  # no limit
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         boxes = {name: box_of(spec) for name, spec in self.specs.items()}
@@ -237,8 +236,7 @@ class TaskVectorEnv(VectorEnv):
         azimuth, elevation = np.radians([model.vis.global_.azimuth, model.vis.global_.elevation])
         forward = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
         right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
-        quat = np.zeros(4)
-        mujoco.mju_mat2Quat(quat, np.stack([right, np.cross(right, forward), -forward], axis=1).ravel())
+        quat = _core.mat_to_quat(np.stack([right, np.cross(right, forward), -forward], axis=1).ravel().tolist())
         camera = model.camera(_VIEW).id
         for field, value in (("cam_pos", model.stat.center - 1.5 * model.stat.extent * forward), ("cam_quat", quat)):
             values = self.sim.model_field(field).copy()

@@ -8,15 +8,16 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense.peer.cameras import Cameras
 from mjsense.peer.robot import PeerRobot
 from mjsense.peer.task import PeerTask
 
 if TYPE_CHECKING:
+    import mujoco
+
     from mjsense.simulation import Simulation
 
 
@@ -96,7 +97,7 @@ class PeerEnv:
     def mj_datas(self) -> Sequence[mujoco.MjData]:
         """A mujoco.MjData of each world as it is now, derived quantities and contacts included: copies, which nobody reads back."""
         if self._copies is None:
-            self._datas = [mujoco.MjData(model) for model in self.mj_models]
+            self._datas = [_mujoco.data_of(model) for model in self.mj_models]
             self._copies = self.sim._core.data_copies(self._datas)
         self._make_current()
         return self._datas
@@ -160,7 +161,7 @@ class PeerEnv:
     def get_segmentation_mask_of_object(self, object_name: str, camera_name: str, batch_index: int = 0) -> np.ndarray | None:
         """bool ``[H, W]``: where the visible geoms of the body and those below it are; None if there is no such body."""
         model = self.mj_model
-        root = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, object_name)
+        root = _mujoco.name2id(model, _mujoco.Obj.BODY, object_name)
         if root < 0:
             return None
         before, self.current_batch_index = self._world, batch_index
@@ -172,4 +173,4 @@ class PeerEnv:
         for body in range(root, model.nbody):  # parents come first
             below[body] = body == root or (body > root and below[model.body_parentid[body]])
         geoms = np.flatnonzero(below[model.geom_bodyid] & (model.geom_group < 3))
-        return (picture[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)) & np.isin(picture[..., 0], geoms)
+        return (picture[..., 1] == _mujoco.Obj.GEOM) & np.isin(picture[..., 0], geoms)

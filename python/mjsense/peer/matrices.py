@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """4x4 matrices."""
 
-import mujoco
 import numpy as np
+
+from mjsense import _core
 
 
 def matrix_of_pose(pose: np.ndarray) -> np.ndarray:
     """4x4 of position and quaternion (wxyz)."""
-    rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, pose[3:])
     out = np.eye(4)
-    out[:3, :3], out[:3, 3] = rotation.reshape(3, 3), pose[:3]
+    out[:3, :3], out[:3, 3] = np.reshape(_core.quat_to_mat(pose[3:].tolist()), (3, 3)), pose[:3]
     return out
 
 
@@ -23,6 +22,4 @@ def matrix_of(pos: np.ndarray, mat: np.ndarray) -> np.ndarray:
 
 def pose_of_matrix(matrix: np.ndarray) -> list[float]:
     """Position and quaternion (wxyz) of a 4x4."""
-    quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(matrix[:3, :3]).ravel())
-    return [*matrix[:3, 3].tolist(), *quat.tolist()]
+    return [*matrix[:3, 3].tolist(), *_core.mat_to_quat(matrix[:3, :3].ravel().tolist())]

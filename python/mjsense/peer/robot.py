@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
-from mjsense import _core
+from mjsense import _core, _mujoco
 from mjsense.peer.matrices import matrix_of, matrix_of_pose
 
 if TYPE_CHECKING:
+    import mujoco
+
     from mjsense.peer.env import PeerEnv
 
 
@@ -68,7 +69,7 @@ class MoveGroup:
         """``[n, 2]``, infinite where there are none."""
         ranges = np.tile([-np.inf, np.inf], (self.pos_dim, 1))
         for joint in self._joint_ids:
-            if self.mj_model.jnt_limited[joint] and self.mj_model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE:
+            if self.mj_model.jnt_limited[joint] and self.mj_model.jnt_type[joint] >= _mujoco.Joint.SLIDE:
                 ranges[self._joint_posadr.index(self.mj_model.jnt_qposadr[joint])] = self.mj_model.jnt_range[joint]
         return ranges
 
@@ -113,7 +114,7 @@ class MoveGroup:
         """``[6, nv]`` of the tool frame: linear, then angular, world axes."""
         jacobian = np.zeros((6, self.mj_model.nv))
         if self._leaf_site >= 0:
-            mujoco.mj_jacSite(self.mj_model, self.mj_data, jacobian[:3], jacobian[3:], self._leaf_site)
+            _core.jac_site(self.mj_model._address, self.mj_data._address, jacobian, self._leaf_site)
         return jacobian
 
 

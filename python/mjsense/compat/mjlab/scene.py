@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 
 import mjsense
-from mjsense import configs
+from mjsense import _mujoco, configs
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.compat.mjlab.entity import Entity, EntityCfg
 from mjsense.compat.mjlab.sensor import BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorCfg, SensorContext
@@ -89,7 +89,7 @@ class Scene:
         self._sensors = {name: _wrapped(sensor, by_name.get(name)) for name, sensor in self.native.sensors.items()}
         cameras = [sensor for sensor in self._sensors.values() if isinstance(sensor, CameraSensor)]
         for camera in cameras:
-            camera.camera_idx = mujoco.mj_name2id(self.native.model, mujoco.mjtObj.mjOBJ_CAMERA, camera.camera_name)
+            camera.camera_idx = _mujoco.name2id(self.native.model, _mujoco.Obj.CAMERA, camera.camera_name)
         rays = [sensor for sensor in self._sensors.values() if isinstance(sensor, RayCastSensor)]
         self._context = SensorContext(cameras, rays) if cameras or rays else None
         self._entities = {name: Entity(e, scene_cfg.entities.get(name, scene_cfg.terrain)) for name, e in self.native.entities.items()}

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
 
 from mjsense.compat.molmospaces.env.abstract_sensors import CoreSensor, Sensor
@@ -263,7 +262,7 @@ class GraspStateSensor(Sensor):
         return {name: {"touching": touches, "held": touches and not foreign} for name, touches in touching.items()}
 
 
-def _geoms_below(model: mujoco.MjModel, root: int) -> np.ndarray:
+def _geoms_below(model: Any, root: int) -> np.ndarray:
     """bool ``[ngeom]``: geoms of the body and of those below it."""
     below = np.zeros(model.nbody, bool)
     for body in range(root, model.nbody):  # parents come first

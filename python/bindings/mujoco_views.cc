@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the fields of MuJoCo's structs are, for the views of python/mjsense/_mujoco.py: MjModel and MjData without the mujoco package.
+
+#include <mujoco/mjxmacro.h>
+#include <mujoco/mujoco.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "mjsense/core/mujoco_call.h"
+#include "mjsense/scene/spec.h"
+#include "python/bindings/bindings.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+// NumPy's data type, as in the array interface.
+template <class T>
+nb::object type_of() {
+  if constexpr (std::is_same_v<T, bool>) return nb::str("|b1");
+  const char kind = std::is_floating_point_v<T> ? 'f' : std::is_signed_v<T> ? 'i' : 'u';
+  return nb::str((std::string("<") + kind + std::to_string(sizeof(T))).c_str());
+}
+
+// The data type of a struct, as the arguments of numpy.dtype().
+class StructType {
+ public:
+  explicit StructType(std::size_t size) { type_["itemsize"] = size; }
+  template <class T>
+  void add(const char* name, std::size_t offset) {
+    names_.append(name);
+    offsets_.append(offset);
+    if constexpr (std::is_array_v<T>)
+      formats_.append(
+          nb::make_tuple(type_of<std::remove_extent_t<T>>(), nb::make_tuple(std::extent_v<T>)));
+    else
+      formats_.append(type_of<T>());
+  }
+  nb::dict done() {
+    type_["names"] = names_;
+    type_["formats"] = formats_;
+    type_["offsets"] = offsets_;
+    return type_;
+  }
+
+ private:
+  nb::dict type_;
+  nb::list names_, formats_, offsets_;
+};
+
+#define FIELD(field) type.add<decltype(Struct::field)>(#field, offsetof(Struct, field));
+
+template <>
+nb::object type_of<mjContact>() {
+  using Struct = mjContact;
+  StructType type(sizeof(Struct));
+  FIELD(dist)
+  FIELD(pos)
+  FIELD(frame) FIELD(includemargin) FIELD(friction) FIELD(solref) FIELD(solreffriction)
+      FIELD(solimp) FIELD(adhesion) FIELD(surfacevel) FIELD(mu) FIELD(H) FIELD(dim) FIELD(geom1)
+          FIELD(geom2) FIELD(geom) FIELD(flex) FIELD(elem) FIELD(vert) FIELD(exclude)
+              FIELD(efc_address) return type.done();
+}
+
+template <>
+nb::object type_of<mjSolverStat>() {
+  using Struct = mjSolverStat;
+  StructType type(sizeof(Struct));
+  FIELD(improvement)
+  FIELD(gradient)
+  FIELD(lineslope) FIELD(nactive) FIELD(nchange) FIELD(neval) FIELD(nupdate) return type.done();
+}
+
+template <>
+nb::object type_of<mjWarningStat>() {
+  using Struct = mjWarningStat;
+  StructType type(sizeof(Struct));
+  FIELD(lastinfo) FIELD(number) return type.done();
+}
+
+template <>
+nb::object type_of<mjTimerStat>() {
+  using Struct = mjTimerStat;
+  StructType type(sizeof(Struct));
+  FIELD(duration) FIELD(number) return type.done();
+}
+
+// Name -> (address, data type, shape). Scalars have the shape (), and arrays one dimension if MuJoCo declares the width (the text of the
+// macro's argument) as 1.
+class Fields {
+ public:
+  template <class T>
+  void array(const char* name, const T* data, std::int64_t rows, std::int64_t columns,
+             std::string_view width) {
+    const nb::tuple shape = width == "1" ? nb::make_tuple(rows) : nb::make_tuple(rows, columns);
+    set<T>(name, data, shape);
+  }
+  template <class T>
+  void value(const char* name, const T& field) {
+    if constexpr (std::is_array_v<T>)
+      set<std::remove_extent_t<T>>(name, field, nb::make_tuple(std::extent_v<T>));
+    else
+      set<T>(name, &field, nb::make_tuple());
+  }
+  void add(const char* name, const Fields& inner) { all_[name] = inner.all_; }
+  nb::dict all() const { return all_; }
+
+ private:
+  template <class T>
+  void set(const char* name, const void* data, nb::tuple shape) {
+    all_[name] = nb::make_tuple(reinterpret_cast<std::uintptr_t>(data), type_of<T>(), shape);
+  }
+  nb::dict all_;
+};
+
+Fields option_fields(const mjOption& opt) {
+  Fields fields;
+#define X(type, name, n) fields.value(#name, opt.name);
+#define XVEC X
+  MJOPTION_FIELDS
+#undef X
+#undef XVEC
+  return fields;
+}
+
+Fields statistic_fields(const mjStatistic& stat) {
+  Fields fields;
+#define X(name, n) fields.value(#name, stat.name);
+#define XVEC X
+  MJSTATISTIC_FIELDS
+#undef X
+#undef XVEC
+  return fields;
+}
+
+Fields visual_fields(const mjVisual& vis) {
+  Fields fields;
+#define X(type, name, n) group.value(#name, part.name);
+#define XVEC X
+#define GROUP(macro, member, shown) \
+  {                                 \
+    Fields group;                   \
+    const auto& part = vis.member;  \
+    macro fields.add(shown, group); \
+  }
+  GROUP(MJVISUAL_GLOBAL_FIELDS, global, "global_")
+  GROUP(MJVISUAL_QUALITY_FIELDS, quality, "quality")
+  GROUP(MJVISUAL_HEADLIGHT_FIELDS, headlight, "headlight")
+  GROUP(MJVISUAL_MAP_FIELDS, map, "map")
+  GROUP(MJVISUAL_SCALE_FIELDS, scale, "scale")
+  GROUP(MJVISUAL_RGBA_FIELDS, rgba, "rgba")
+#undef X
+#undef XVEC
+  return fields;
+}
+
+nb::dict model_fields(std::uintptr_t address) {
+  const auto* m = reinterpret_cast<const mjModel*>(address);
+  Fields fields;
+#define X(name) fields.value(#name, m->name);
+  MJMODEL_SIZES
+  MJSETCONST_SCALARS
+#undef X
+  fields.value("signature", m->signature);
+#define X(type, name, nr, nc) fields.array<type>(#name, m->name, m->nr, nc, #nc);
+  MJMODEL_POINTERS_PREAMBLE(m)
+  MJMODEL_POINTERS
+#undef X
+  fields.add("opt", option_fields(m->opt));
+  fields.add("vis", visual_fields(m->vis));
+  fields.add("stat", statistic_fields(m->stat));
+  return fields.all();
+}
+
+nb::dict data_fields(std::uintptr_t model, std::uintptr_t address) {
+  const auto* m = reinterpret_cast<const mjModel*>(model);
+  const auto* d = reinterpret_cast<const mjData*>(address);
+  Fields fields;
+#define X(type, name, nr, nc) fields.array<type>(#name, d->name, m->nr, nc, #nc);
+  MJDATA_POINTERS
+#undef X
+#define X(type, name) fields.value(#name, d->name);
+  MJDATA_SCALAR
+#undef X
+#define X(type, name, nr, nc) fields.array<type>(#name, d->name, nr * nc, 1, "1");
+  MJDATA_VECTOR
+#undef X
+  return fields.all();
+}
+
+// Those that MuJoCo allocates anew in every step.
+nb::dict arena_fields(std::uintptr_t model, std::uintptr_t address) {
+  const auto* m = reinterpret_cast<const mjModel*>(model);
+  const auto* d = reinterpret_cast<const mjData*>(address);
+  Fields fields;
+#undef MJ_M
+#undef MJ_D
+#define MJ_M(n) m->n
+#define MJ_D(n) d->n
+#define X(type, name, nr, nc) fields.array<type>(#name, d->name, nr, nc, #nc);
+  MJDATA_ARENA_POINTERS
+#undef X
+  return fields.all();
+}
+
+// Arrays of mjModel whose change requires mj_setConst(): the first group of its computations that uses one reads it.
+std::vector<std::string> setconst_inputs() {
+  std::vector<std::string> names;
+#define X(name, fixed, kin0, inert0, spring)   \
+  if (const int first = (fixed)    ? (fixed)   \
+                        : (kin0)   ? (kin0)    \
+                        : (inert0) ? (inert0)  \
+                                   : (spring); \
+      first & mjSC_IN)                         \
+    names.emplace_back(#name);
+  MJSETCONST_ARRAYS
+#undef X
+  return names;
+}
+
+// Owns an mjModel or mjData that Python shows.
+template <class T, void (*destroy)(T*)>
+struct Owned {
+  struct Delete {
+    void operator()(T* p) const { destroy(p); }
+  };
+  std::unique_ptr<T, Delete> pointer;
+  std::uintptr_t address() const { return reinterpret_cast<std::uintptr_t>(pointer.get()); }
+};
+using OwnedModel = Owned<mjModel, mj_deleteModel>;
+using OwnedData = Owned<mjData, mj_deleteData>;
+
+struct OwnedSpec {
+  SpecPtr pointer;
+  std::uintptr_t address() const { return reinterpret_cast<std::uintptr_t>(pointer.get()); }
+};
+
+}  // namespace
+
+void bind_mujoco_views(nb::module_& m) {
+  nb::class_<OwnedModel>(m, "OwnedModel", "An mjModel.")
+      .def_static("take",
+                  [](std::uintptr_t p) {
+                    return new OwnedModel{std::unique_ptr<mjModel, OwnedModel::Delete>(
+                        reinterpret_cast<mjModel*>(p))};
+                  })
+      .def_static("copy",
+                  [](std::uintptr_t p) {
+                    return new OwnedModel{std::unique_ptr<mjModel, OwnedModel::Delete>(
+                        call_mujoco(mj_copyModel, nullptr, reinterpret_cast<const mjModel*>(p)))};
+                  })
+      .def_prop_ro("address", &OwnedModel::address);
+  nb::class_<OwnedData>(m, "OwnedData", "An mjData.")
+      .def_static("make",
+                  [](std::uintptr_t model) {
+                    return new OwnedData{std::unique_ptr<mjData, OwnedData::Delete>(
+                        call_mujoco(mj_makeData, reinterpret_cast<const mjModel*>(model)))};
+                  })
+      .def_prop_ro("address", &OwnedData::address);
+  nb::class_<OwnedSpec>(m, "Spec", "An mjSpec: empty, or of XML text or of a file.")
+      .def(
+          "__init__",
+          [](OwnedSpec* self, const std::optional<std::string>& base) {
+            if (!base) {
+              new (self) OwnedSpec{SpecPtr(mj_makeSpec())};
+              return;
+            }
+            ModelSource source;
+            const bool is_text = base->find_first_not_of(" \t\r\n") == base->find('<');
+            (is_text ? source.xml : source.path) = *base;
+            new (self) OwnedSpec{parse_model(source, "SceneCfg.base")};
+          },
+          nb::arg("base").none())
+      .def_prop_ro("address", &OwnedSpec::address);
+  m.def(
+      "spec_names",
+      [](std::uintptr_t spec, int kind) {
+        return spec_names(reinterpret_cast<const mjSpec*>(spec), static_cast<mjtObj>(kind));
+      },
+      nb::arg("spec"), nb::arg("kind"), "Names of the elements of an mjSpec, in its order.");
+  m.def("model_fields", &model_fields, nb::arg("model"),
+        "Fields of an mjModel: name -> (address, data type, shape).");
+  m.def("data_fields", &data_fields, nb::arg("model"), nb::arg("data"),
+        "Fields of an mjData that stay where they are.");
+  m.def("arena_fields", &arena_fields, nb::arg("model"), nb::arg("data"),
+        "Fields of an mjData that every step moves.");
+  m.def("setconst_inputs", &setconst_inputs,
+        "Arrays of mjModel whose change requires mj_setConst.");
+  m.def("name2id", [](std::uintptr_t model, int kind, const char* name) {
+    return mj_name2id(reinterpret_cast<const mjModel*>(model), kind, name);
+  });
+  m.def("id2name", [](std::uintptr_t model, int kind, int id) {
+    const char* name = mj_id2name(reinterpret_cast<const mjModel*>(model), kind, id);
+    return std::string(name ? name : "");
+  });
+  m.def(
+      "jac_site",
+      [](std::uintptr_t model, std::uintptr_t data,
+         nb::ndarray<double, nb::shape<6, -1>, nb::c_contig> jacobian, int site) {
+        const auto* from = reinterpret_cast<const mjModel*>(model);
+        mj_jacSite(from, reinterpret_cast<const mjData*>(data), jacobian.data(),
+                   jacobian.data() + 3 * from->nv, site);
+      },
+      nb::arg("model"), nb::arg("data"), nb::arg("jacobian"), nb::arg("site"),
+      "Writes mj_jacSite into [6, nv].");
+  m.def(
+      "quat_to_mat",
+      [](const std::array<double, 4>& quat) {
+        std::array<double, 9> mat;
+        mju_quat2Mat(mat.data(), quat.data());
+        return mat;
+      },
+      nb::arg("quat"));
+  m.def(
+      "mat_to_quat",
+      [](const std::array<double, 9>& mat) {
+        std::array<double, 4> quat;
+        mju_mat2Quat(quat.data(), mat.data());
+        return quat;
+      },
+      nb::arg("mat"));
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Views of mjModel and mjData show what mujoco's own objects show."""
+
+import copy
+import ctypes
+import gc
+import pickle
+
+import mujoco
+import numpy as np
+import pytest
+
+import mjsense as mjs
+from mjsense import _core, _libmujoco, _mujoco
+
+XML = """
+<mujoco>
+  <option timestep="0.004" wind="1 2 3"/>
+  <visual><global offwidth="321"/><rgba haze="0.1 0.2 0.3 0.4"/></visual>
+  <asset>
+    <texture name="checks" type="2d" builtin="checker" width="4" height="4"/>
+    <material name="paint" texture="checks"/>
+    <mesh name="wedge" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/>
+    <hfield name="hills" nrow="3" ncol="2" size="1 1 1 1" elevation="0 1 2 3 4 5"/>
+  </asset>
+  <worldbody>
+    <light name="sun" pos="0 0 3"/>
+    <camera name="eye" pos="0 0 2"/>
+    <geom name="floor" type="plane" size="2 2 1"/>
+    <body name="box" pos="0 0 0.1"><freejoint name="free"/><geom name="cube" type="box" size=".1 .1 .1" material="paint"/></body>
+    <body name="arm" pos="1 0 1">
+      <joint name="ball" type="ball"/><geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/>
+      <body name="hand" pos=".3 0 0">
+        <joint name="hinge" axis="0 1 0"/><geom size=".05"/><site name="tip"/><geom type="mesh" mesh="wedge" contype="0" conaffinity="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="string"><joint joint="hinge" coef="2"/></fixed></tendon>
+  <equality><connect name="held" body1="hand" body2="world" anchor="0 0 0" active="false"/></equality>
+  <actuator><position name="servo" joint="hinge" kp="2"/><general name="slow" joint="hinge" dyntype="filter" dynprm="0.1"/></actuator>
+  <sensor><framepos name="where" objtype="site" objname="tip"/><jointpos name="angle" joint="hinge"/></sensor>
+  <keyframe><key name="start" ctrl="0.5 0.1"/></keyframe>
+  <custom><numeric name="three" data="1 2 3"/><text name="word" data="hello"/></custom>
+</mujoco>
+"""
+KINDS = ("actuator", "body", "cam", "camera", "eq", "geom", "hfield", "jnt", "joint", "key", "light", "mat", "mesh", "numeric", "sensor",
+         "site", "tendon", "tex")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model():
+    return mujoco.MjModel.from_xml_string(XML)
+
+
+@pytest.fixture(scope="module")
+def data(model):
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for _ in range(50):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+@pytest.fixture(scope="module")
+def model_view(model):
+    return _mujoco.MjModelView(_core.OwnedModel.copy(model._address))
+
+
+@pytest.fixture(scope="module")
+def data_view(model_view, data):
+    # One libmujoco serves both here, so its functions can be called with addresses.
+    lib = ctypes.CDLL(_libmujoco._environment()[1])
+    view = _mujoco.MjDataView(model_view)
+    lib.mj_copyData(*(ctypes.c_void_p(address) for address in (view._address, model_view._address, data._address)))
+    return view
+
+
+def fields(real):
+    """Names of attributes that are neither methods nor structs."""
+    return [name for name in dir(type(real)) if not name.startswith("_") and not callable(getattr(real, name))]
+
+
+def check(real, view, where=""):
+    for name in fields(real):
+        if name in ("signature", "model") or where + name in ("vis.rgba.bv", "vis.rgba.bvactive"):  # mujoco shows the last two with no elements
+            continue
+        expected, found = getattr(real, name), getattr(view, name)
+        if isinstance(expected, np.ndarray):
+            assert found.shape == expected.shape, where + name
+            assert found.dtype == expected.dtype, where + name
+            np.testing.assert_array_equal(found, expected, err_msg=where + name)
+        elif isinstance(expected, (int, float, bytes, str)):
+            assert found == expected and (isinstance(found, type(expected)) or "[" in where), where + name
+        elif hasattr(expected, "__len__"):
+            assert len(found) == len(expected), where + name
+            for i in range(min(len(expected), 3)):
+                check(expected[i], found[i], f"{where}{name}[{i}].")
+        else:
+            check(expected, found, f"{where}{name}.")
+
+
+def test_every_attribute_of_a_model(model, model_view):
+    check(model, model_view)
+    assert len(fields(model)) > 500
+
+
+def test_every_attribute_of_data(data, data_view):
+    assert data.ncon > 0 and data.nefc > 0
+    check(data, data_view)
+    assert data_view.model is data_view._model
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_elements_by_name_and_id(model, data, model_view, data_view, kind):
+    for real, view in ((model, model_view), (data, data_view)):
+        if not hasattr(real, kind):
+            assert not hasattr(view, kind)
+            continue
+        index = 0
+        while True:
+            try:
+                expected = getattr(real, kind)(index)
+            except IndexError:
+                break
+            found = getattr(view, kind)(index)
+            if expected.name:
+                assert getattr(view, kind)(expected.name).id == expected.id == found.id
+            for name in dir(expected):
+                if name.startswith(("_", "J_")) or name in ("moment", "plastic"):  # sparse rows, and plasticity: views have the whole array only
+                    continue
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=f"{kind} {index} {name}")
+            index += 1
+        assert index > 0
+
+
+def test_unknown_elements(model_view, model):
+    for ask in (lambda m: m.geom("cub"), lambda m: m.geom(99), lambda m: m.body("")):
+        with pytest.raises((KeyError, IndexError)) as expected:
+            ask(model)
+        with pytest.raises(expected.type, match="Invalid"):
+            ask(model_view)
+
+
+def test_arrays_are_the_memory_and_keep_it(model):
+    view = _mujoco.MjModelView(_core.OwnedModel.copy(model._address))
+    view.geom("cube").size = [0.3, 0.2, 0.1]
+    view.opt.timestep = 0.5
+    assert view.geom_size[1].tolist() == [0.3, 0.2, 0.1] and view.opt.timestep == 0.5
+    twin = copy.deepcopy(view)
+    twin.geom_size[1] = 9
+    size = view.geom_size
+    del view
+    gc.collect()
+    assert size[1].tolist() == [0.3, 0.2, 0.1]
+
+
+def test_what_a_view_cannot_do(model_view, data_view, monkeypatch):
+    monkeypatch.setattr(_libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
+    with pytest.raises(TypeError, match=r"the installed mujoco is 3\.8\.1; pip install 'mujoco>=4\.0,<4\.1'"):
+        mujoco.mj_forward(model_view, data_view)
+    with pytest.raises(AttributeError, match=r"MjModelView has no attribute 'bind'.* the installed mujoco is 3\.8\.1; pip install"):
+        model_view.bind
+    with pytest.raises(AttributeError, match="no attribute 'geom_siz'"):
+        model_view.geom_siz = 1
+    with pytest.raises(TypeError, match="cannot be pickled"):
+        pickle.dumps(model_view)
+
+
+def test_enumerations_are_mujocos():
+    for ours, theirs, prefix in ((_mujoco.Obj, mujoco.mjtObj, "mjOBJ_"), (_mujoco.Geom, mujoco.mjtGeom, "mjGEOM_"),
+                                 (_mujoco.Joint, mujoco.mjtJoint, "mjJNT_")):  # fmt: skip
+        for value in ours:
+            assert getattr(theirs, prefix + value.name) == value
+    assert [mujoco.mjtWarning(i).name for i in range(int(mujoco.mjtWarning.mjNWARNING))] == list(_mujoco.WARNINGS)
+    assert mujoco.mjMAXVAL == _mujoco.MAXVAL
+    assert {*_core.setconst_inputs()} == {*mujoco.MjModel._setconst_inputs}
+
+
+def test_a_spec_of_another_series_goes_over_as_xml(monkeypatch, tmp_path):
+    """Files are found where the spec has found them."""
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/wedge.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
+    file = tmp_path / "robot.xml"
+    file.write_text("""<mujoco><compiler meshdir="meshes"/><asset><mesh file="wedge.obj"/><mesh name="kept" file="kept.obj"/></asset><worldbody>
+        <body name="b"><geom type="mesh" mesh="wedge"/><geom name="k" type="mesh" mesh="kept" pos="2 0 0"/></body></worldbody></mujoco>""")
+    spec = mujoco.MjSpec.from_file(str(file))
+    spec.assets = {"kept.obj": b"v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"}
+    before = spec.meshes[0].file
+    shared = mjs.Scene(mjs.SceneCfg(entities={"r": mjs.EntityCfg(model=spec)})).model
+    kind, _ = _mujoco.source_of(spec)
+    assert kind == "spec"
+    monkeypatch.setattr(_libmujoco, "shared", None)
+    kind, xml = _mujoco.source_of(spec)
+    assert kind == "xml" and "wedge.obj" in xml and spec.meshes[0].file == before
+    found = mjs.Scene(mjs.SceneCfg(entities={"r": mjs.EntityCfg(model=spec)})).model
+    assert isinstance(found, _mujoco.MjModelView)
+    np.testing.assert_allclose(found.mesh_vert, shared.mesh_vert)
+    np.testing.assert_allclose(found.body("r/b").mass, shared.body("r/b").mass)
+
+
+def test_editing_a_spec_is_an_error_that_says_why(monkeypatch):
+    monkeypatch.setattr(_libmujoco, "shared", None)
+    monkeypatch.setattr(_libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
+    with pytest.raises(AttributeError, match=r"spec\.worldbody: the spec of a scene cannot be edited.*3\.8\.1; pip install"):
+        mjs.Scene(mjs.SceneCfg(spec_fn=lambda spec: spec.worldbody.add_geom(size=[1, 1, 1])))
