@@ -125,6 +125,7 @@ struct BoundRenderer {
     const auto rgb = nb::cast<nb::tuple>(from["haze_rgb"]);
     for (int i = 0; i < 3; ++i) out.haze_rgb[i] = nb::cast<float>(rgb[i]);
     out.line_width = nb::cast<float>(from["line_width"]);
+    out.projected_textures = nb::cast<bool>(from["projected_textures"]);
     return out;
   }
 

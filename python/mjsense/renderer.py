@@ -92,6 +92,7 @@ class Renderer:
             "haze": float(model.vis.map.haze),
             "haze_rgb": tuple(float(x) for x in haze[:3]),
             "line_width": float(model.vis.global_.linewidth),
+            "projected_textures": int(self._mujoco.mj_versionString().split(".")[0]) < 4,
         }
         geoms, lights, cameras = scene.geoms, scene.lights, scene.camera
         where = {name: _scene_layout.address(value) for name, value in (

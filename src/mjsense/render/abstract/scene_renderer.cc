@@ -99,7 +99,8 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                     .sky = {0.7f * far_,
                             settings_.haze_width,
                             {settings_.haze_rgb[0], settings_.haze_rgb[1], settings_.haze_rgb[2]}},
-                    .haze = scene.haze};
+                    .haze = scene.haze,
+                    .projected_textures = settings_.projected_textures};
     const View& built = builder_->build(view, position_, rotation_, grid_);
     tiles_(built, images, 0, (height + kTileSize - 1) / kTileSize, memory_->scratch());
   };
@@ -158,8 +159,8 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
   std::copy_n(geom.rgba, 4, out.rgba);
   out.object = geom.objtype;
   out.object_id = geom.segid;
-  out.casts = geom.category != mjCAT_DECOR && geom.type != mjGEOM_LINE &&
-              geom.type != mjGEOM_LINEBOX;
+  out.casts =
+      geom.category != mjCAT_DECOR && geom.type != mjGEOM_LINE && geom.type != mjGEOM_LINEBOX;
   out.material = {.specular = geom.specular,
                   .shininess = geom.shininess,
                   .emission = geom.emission,

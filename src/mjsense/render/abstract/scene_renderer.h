@@ -21,7 +21,8 @@ struct SceneSettings {
   int samples = 1;  // per pixel of rgb
   bool shadows = true;
   float haze_width = 0, haze_rgb[3] = {};
-  float line_width = 1;  // pixels
+  float line_width = 1;             // pixels
+  bool projected_textures = false;  // DrawnScene::projected_textures
 };
 
 // Arrays of an mjvScene that hold flexes and skins; null if there are none.

@@ -170,35 +170,57 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Mirrore
                       colors);
 }
 
-// Packets in which the samples of a pixel may see different surfaces than its centre. `reach`: the
-// distance of samples from the centre, in pixels.
-inline PacketMask packets_with_edges(const View& view, const TileLists& lists, int packets,
-                                     float reach, const TileScratch& scratch, Tile& tile) {
+// If 1/t deviates from a linear function of the image by more than this times the size of a pixel,
+// relative to 1/t, there is an edge within one geom.
+constexpr float kBend = 0.06f;
+
+// Packets that show an edge: neighbouring pixels see different geoms, or planes with different
+// slopes. Geoms that are so thin that they may be between the centres of pixels are added.
+inline PacketMask packets_with_edges(const View& view, const TileLists& lists, int across, int down,
+                                     const TileScratch& scratch, Tile& tile) {
+  constexpr int kSide = kTileSize;
   const PixelGrid& grid = view.grid;
-  const float x = reach * grid.dx, y = -reach * grid.dy;
+  const int columns = 4 * across, rows = 4 * down;
+  alignas(64) int geom[kSide * kSide];
+  alignas(64) float nearness[kSide * kSide];
+  for (int q = 0; q < across * down; ++q) {
+    const int at = 4 * (q / across) * kSide + 4 * (q % across);
+    for (int r = 0; r < 4; ++r)
+      for (int i = 0; i < 4; ++i) {
+        geom[at + r * kSide + i] = tile.hits[q].geom[4 * r + i];
+        nearness[at + r * kSide + i] = 1 / tile.hits[q].t[4 * r + i];
+      }
+  }
   PacketMask edges = 0;
-  for (int q = 0; q < packets; ++q) {
-    const Int first = int_of(tile.hits[q].geom[0]);
-    std::uint32_t equal = 0;
-    for (int k = 0; k < kLanes; k += kWidth)
-      equal |= bits(load(tile.hits[q].geom + k) == first) << k;
-    if (equal != 0xffffu) edges |= 1u << q;
-  }
-  const auto add = [&](const ViewGeom& g) {
-    const float window[4] = {g.window[0] - x, g.window[1] + x, g.window[2] - y, g.window[3] + y};
+  const auto packet = [&](int x, int y) { return 1u << (y / 4 * across + x / 4); };
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const int at = y * kSide + x;
+      const auto look = [&](bool next, bool both, int step, int x2, int y2) {
+        if (!next) return;
+        if (geom[at] != geom[at + step]) {
+          edges |= packet(x, y) | packet(x2, y2);
+        } else if (both && geom[at] == geom[at - step]) {
+          const float bend = nearness[at - step] + nearness[at + step] - 2 * nearness[at];
+          if ((bend < 0 ? -bend : bend) > 4 * kBend * grid.dx * nearness[at])
+            edges |= packet(x, y) | packet(x2, y2);
+        }
+      };
+      look(x + 1 < columns, x > 0, 1, x + 1, y);
+      look(y + 1 < rows, y > 0, kSide, x, y + 1);
+    }
+  const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
+  for (int i = 0; i < lists.opaque + lists.transparent; ++i) {
+    const bool opaque = i < lists.opaque;
+    const ViewGeom& g =
+        view.geoms[opaque ? scratch.opaque[i] : scratch.transparent[i - lists.opaque]];
+    const float* w = g.window;
+    if (opaque && w[1] - w[0] > thin && w[3] - w[2] > thin) continue;
+    const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
     edges |= packets_in_reach(window, g.nearest, tile);
-  };
-  for (int i = 0; i < lists.opaque; ++i) {
-    const ViewGeom& g = view.geoms[scratch.opaque[i]];
-    if (g.type != mjGEOM_PLANE || g.size[0] > 0 || g.size[1] > 0) add(g);
   }
-  for (int i = 0; i < lists.transparent; ++i) add(view.geoms[scratch.transparent[i]]);
   return edges;
 }
-
-// If the mean of 1/t over a pixel's samples differs from that of its centre by more than this times
-// the size of a pixel, the pixel shows an edge within one geom.
-constexpr float kBend = 0.06f;
 
 // Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
 // samples see different surfaces.
@@ -230,8 +252,7 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   for (int c = 0; c < 4; ++c)
     around[c] = tile.around[c] + (c % 2 ? 1 : -1) * kReach * (c < 2 ? grid.dx : -grid.dy);
   lists = find_geoms(view, around, scratch);
-  const PacketMask edges =
-      (packets_with_edges(view, lists, packets, kReach, scratch, tile) | blended);
+  const PacketMask edges = packets_with_edges(view, lists, across, down, scratch, tile) | blended;
   for (int i = 0; i < lists.transparent; ++i)
     blended |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
   if (edges) {

@@ -35,7 +35,7 @@ struct Surface {
   float repeat[2], shift[2];  // for 2D textures: coordinates are multiplied by repeat, then shifted
   float stretch[3];           // for cube maps: multiplies the direction
   bool mapped;                // 2D texture with the mesh's own coordinates
-  bool from_above;            // 2D texture projected along z onto a mesh or height field
+  bool from_above;            // 2D texture projected along z
 };
 
 struct alignas(64) ViewGeom {

@@ -238,6 +238,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   view_.backs = true;
+  projected_ = scene.projected_textures;
   view_.near = scene.near;
   view_.far = scene.far;
   view_.shadows = scene.shadows;
@@ -403,7 +404,7 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
     return;
   }
   const std::array<float, 3> extent = drawn_extent(g);
-  s.from_above = (g.mesh && !s.mapped) || g.height_field;
+  s.from_above = (g.mesh && !s.mapped) || g.height_field || (projected_ && !g.mesh);
   const bool endless = g.type == mjGEOM_PLANE && (g.size[0] <= 0 || g.size[1] <= 0);
   for (int i = 0; i < 2; ++i) {
     s.repeat[i] = material->repeat[i];

@@ -55,6 +55,8 @@ struct DrawnScene {
   const Texture* skybox;  // null: none
   Sky sky;
   bool haze;
+  // 2D textures are projected along z onto all shapes, as MuJoCo did before 4.0.
+  bool projected_textures;
 };
 
 // Computes Surface::dull: the value below which the kernels' power() returns 0, with a margin for
@@ -131,6 +133,7 @@ class ViewBuilder {
   std::vector<int> index_of_id_;
   // By flex part, then by skin, with the world's normals.
   std::vector<MeshSurface> soft_surfaces_;
+  bool projected_ = false;                 // DrawnScene::projected_textures
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that is not shown: the mirror itself
   bool own_headlight_ = true;  // otherwise headlight_, the viewing direction of the real camera
