@@ -55,6 +55,8 @@ def _measure(structs: Any, index: int) -> Layout:
     for name in dir(struct):
         if name.startswith("_"):
             continue
+        if name == "label":
+            struct.label = ""  # the scene's memory is not initialized, and reading it as text could fail
         value = getattr(struct, name)
         if isinstance(value, np.ndarray):
             layout[name] = (address(value) - address(struct.pos), value.nbytes)

@@ -108,7 +108,8 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
     ImageTargets images = targets;
     images.depth = nullptr;
     images.segmentation = nullptr;
-    images.samples = std::min(settings_.samples, ImageTargets::kMostMultisamples);
+    images.samples = static_cast<int>(std::bit_floor(
+        static_cast<unsigned>(std::clamp(settings_.samples, 1, ImageTargets::kMostMultisamples))));
     images.multisampled = images.samples > 1;
     draw(images, true);
   }

@@ -125,7 +125,7 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrore
 struct TileSpace {
   Tile tile;
   Mirrored mirrored;
-  Tile sampled[ImageTargets::kMostMultisamples];
+  Tile sampled;
 };
 
 // Sample offsets of OpenGL's multisampling: for four samples those that all common implementations
@@ -141,6 +141,7 @@ inline void multisample_shift(int index, int samples, float& x, float& y) {
 inline void start_tile(const View& view, int x0, int y0, int across, int packets, float shift_x,
                        float shift_y, Tile& tile) {
   const float far = view.far > 0 ? view.far : kInfinity;
+  tile.regular = true;
   float* window = tile.around;
   window[0] = window[2] = kInfinity;
   window[1] = window[3] = -kInfinity;
@@ -174,10 +175,11 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Mirrore
 // relative to 1/t, there is an edge within one geom.
 constexpr float kBend = 0.06f;
 
-// Packets that show an edge: neighbouring pixels see different geoms, or planes with different
-// slopes. Geoms that are so thin that they may be between the centres of pixels are added.
-inline PacketMask packets_with_edges(const View& view, const TileLists& lists, int across, int down,
-                                     const TileScratch& scratch, Tile& tile) {
+// Sets the lanes of each packet that show an edge: neighbouring pixels see different geoms, or planes
+// with different slopes. Geoms that are so thin that they may be between the centres of pixels are
+// added.
+inline void find_edges(const View& view, const TileLists& lists, int across, int down,
+                       const TileScratch& scratch, const Tile& tile, std::uint32_t* edges) {
   constexpr int kSide = kTileSize;
   const PixelGrid& grid = view.grid;
   const int columns = 4 * across, rows = 4 * down;
@@ -191,35 +193,130 @@ inline PacketMask packets_with_edges(const View& view, const TileLists& lists, i
         nearness[at + r * kSide + i] = 1 / tile.hits[q].t[4 * r + i];
       }
   }
-  PacketMask edges = 0;
-  const auto packet = [&](int x, int y) { return 1u << (y / 4 * across + x / 4); };
+  const float most = 2 * kBend * grid.dx;
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) {
-      const int at = y * kSide + x;
-      const auto look = [&](bool next, bool both, int step, int x2, int y2) {
-        if (!next) return;
-        if (geom[at] != geom[at + step]) {
-          edges |= packet(x, y) | packet(x2, y2);
-        } else if (both && geom[at] == geom[at - step]) {
-          const float bend = nearness[at - step] + nearness[at + step] - 2 * nearness[at];
-          if ((bend < 0 ? -bend : bend) > 4 * kBend * grid.dx * nearness[at])
-            edges |= packet(x, y) | packet(x2, y2);
-        }
+      const int at = y * kSide + x, id = geom[at];
+      const auto differs = [&](bool before, bool after, int step) {
+        if ((before && geom[at - step] != id) || (after && geom[at + step] != id)) return true;
+        if (!before || !after) return false;
+        const float bend = nearness[at - step] + nearness[at + step] - 2 * nearness[at];
+        return (bend < 0 ? -bend : bend) > most * nearness[at];
       };
-      look(x + 1 < columns, x > 0, 1, x + 1, y);
-      look(y + 1 < rows, y > 0, kSide, x, y + 1);
+      if (differs(x > 0, x + 1 < columns, 1) || differs(y > 0, y + 1 < rows, kSide))
+        edges[y / 4 * across + x / 4] |= 1u << (y % 4 * 4 + x % 4);
     }
   const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
-  for (int i = 0; i < lists.opaque + lists.transparent; ++i) {
-    const bool opaque = i < lists.opaque;
-    const ViewGeom& g =
-        view.geoms[opaque ? scratch.opaque[i] : scratch.transparent[i - lists.opaque]];
+  for (int i = 0; i < lists.opaque; ++i) {
+    const ViewGeom& g = view.geoms[scratch.opaque[i]];
     const float* w = g.window;
-    if (opaque && w[1] - w[0] > thin && w[3] - w[2] > thin) continue;
+    if (w[1] - w[0] > thin && w[3] - w[2] > thin) continue;
     const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
-    edges |= packets_in_reach(window, g.nearest, tile);
+    for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
+      edges[__builtin_ctz(near)] = 0xffffu;
   }
-  return edges;
+}
+
+// Samples of some pixels of a tile, `samples` lanes for each pixel.
+struct SampledPixels {
+  int packet[kTilePackets * kLanes], lane[kTilePackets * kLanes];  // of each pixel
+  int count = 0;
+};
+
+// Starts a tile whose lanes are the samples of the pixels.
+inline void start_samples(const View& view, const Tile& centers, const SampledPixels& pixels,
+                          int samples, Tile& out) {
+  const float far = view.far > 0 ? view.far : kInfinity;
+  const int lanes = pixels.count * samples;
+  const int packets = (lanes + kLanes - 1) / kLanes;
+  out.shaded = true;
+  out.regular = false;
+  out.around[0] = out.around[2] = kInfinity;
+  out.around[1] = out.around[3] = -kInfinity;
+  for (int q = 0; q < packets; ++q) {
+    Pixels& p = out.pixels[q];
+    p.window[0] = p.window[2] = kInfinity;
+    p.window[1] = p.window[3] = -kInfinity;
+    for (int k = 0; k < kLanes; ++k) {
+      const int at = q * kLanes + k < lanes ? q * kLanes + k : lanes - 1, pixel = at / samples;
+      float shift_x, shift_y;
+      multisample_shift(at % samples, samples, shift_x, shift_y);
+      const Pixels& from = centers.pixels[pixels.packet[pixel]];
+      const float x = from.x[pixels.lane[pixel]] + shift_x * view.grid.dx;
+      const float y = from.y[pixels.lane[pixel]] + shift_y * view.grid.dy;
+      p.x[k] = x;
+      p.y[k] = y;
+      p.near[k] = view.near;
+      float* w = p.window;
+      w[0] = x < w[0] ? x : w[0];
+      w[1] = x > w[1] ? x : w[1];
+      w[2] = y < w[2] ? y : w[2];
+      w[3] = y > w[3] ? y : w[3];
+    }
+    for (int c = 0; c < 4; ++c) out.window[c][q] = p.window[c];
+    for (int c = 0; c < 4; c += 2) {
+      out.around[c] = p.window[c] < out.around[c] ? p.window[c] : out.around[c];
+      out.around[c + 1] = p.window[c + 1] > out.around[c + 1] ? p.window[c + 1] : out.around[c + 1];
+    }
+    out.farthest[q] = far;
+    clear(out.hits[q], far);
+  }
+  for (int q = packets; q < kTilePackets; ++q) out.farthest[q] = -kInfinity;
+  out.depth = far;
+}
+
+// Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
+// the surface of its centre keeps its colour, unless its packet is in `always`.
+inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
+                          const SampledPixels& pixels, int samples, PacketMask always,
+                          TileScratch& scratch, Tile& tile, Mirrored& mirrored, Colors* colors) {
+  start_samples(view, centers, pixels, samples, tile);
+  trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  const int packets = (pixels.count * samples + kLanes - 1) / kLanes;
+  PacketMask shaded = 0;
+  std::uint32_t lanes[kTilePackets] = {};
+  for (int i = 0; i < pixels.count; ++i) {
+    const int q = i * samples / kLanes, first = i * samples % kLanes;
+    Hits& hits = tile.hits[q];
+    const Hits& center = centers.hits[pixels.packet[i]];
+    const int lane = pixels.lane[i];
+    bool differs = always >> pixels.packet[i] & 1u;
+    const float nearness = 1 / center.t[lane];
+    float mean = 0;
+    for (int k = first; k < first + samples; ++k) {
+      differs |= hits.geom[k] != center.geom[lane];
+      mean += 1 / hits.t[k];
+    }
+    const float bend = mean / samples - nearness;
+    differs |= (bend < 0 ? -bend : bend) > kBend * view.grid.dx * nearness;
+    if (differs) {
+      shaded |= 1u << q;
+      lanes[q] |= ((1u << samples) - 1) << first;
+      continue;
+    }
+    for (int k = first; k < first + samples; ++k) {
+      hits.t[k] = kInfinity;
+      hits.geom[k] = hits.id[k] = -1;
+    }
+  }
+  if (!shaded) return;
+  Shadows shadows;
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
+  if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+  for (; shaded; shaded &= shaded - 1) {
+    const int q = __builtin_ctz(shaded);
+    Colors sampled;
+    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, sampled);
+    for (int k = 0; k < kLanes; k += samples) {
+      if (!(lanes[q] >> k & 1u)) continue;
+      const int pixel = (q * kLanes + k) / samples;
+      for (int c = 0; c < 3; ++c) {
+        float sum = 0;
+        for (int i = k; i < k + samples; ++i) sum += sampled.rgb[c][i];
+        colors[pixels.packet[pixel]].rgb[c][pixels.lane[pixel]] = sum / samples;
+      }
+    }
+  }
 }
 
 // Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
@@ -231,99 +328,44 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
   const int packets = across * down, samples = targets.samples;
-  constexpr float kReach = 0.5f;
   tile.shaded = true;
   start_tile(view, x0, y0, across, packets, 0, 0, tile);
-  TileLists lists = find_geoms(view, tile.around, scratch);
+  // Samples are up to half a pixel outside tile.around.
+  float around[4];
+  for (int c = 0; c < 4; ++c)
+    around[c] = tile.around[c] + (c % 2 ? 0.5f : -0.5f) * (c < 2 ? grid.dx : -grid.dy);
+  const TileLists lists = find_geoms(view, around, scratch);
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
   if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
-  Colors centers[kTilePackets];
-  PacketMask blended = 0;  // packets that are shaded for every sample
-  for (int q = 0; q < packets; ++q) {
-    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, centers[q]);
-    // Edges of what is reflected.
-    if (view.reflection && mirrored.lanes[q] && hit_lanes(mirrored.tile.hits[q]))
-      blended |= 1u << q;
-  }
-  // Geoms that only samples see are outside tile.around.
-  float around[4];
-  for (int c = 0; c < 4; ++c)
-    around[c] = tile.around[c] + (c % 2 ? 1 : -1) * kReach * (c < 2 ? grid.dx : -grid.dy);
-  lists = find_geoms(view, around, scratch);
-  const PacketMask edges = packets_with_edges(view, lists, across, down, scratch, tile) | blended;
+  std::uint32_t edges[kTilePackets] = {};
+  find_edges(view, lists, across, down, scratch, tile, edges);
+  PacketMask always = 0;
   for (int i = 0; i < lists.transparent; ++i)
-    blended |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
-  if (edges) {
-    alignas(64) float mean[kTilePackets][kLanes];
-    std::uint32_t differ[kTilePackets] = {};
-    for (int i = 0; i < samples; ++i) {
-      Tile& t = sampled[i];
-      t.shaded = true;
-      float shift_x, shift_y;
-      multisample_shift(i, samples, shift_x, shift_y);
-      start_tile(view, x0, y0, across, packets, shift_x, shift_y, t);
-      for (int q = 0; q < packets; ++q)
-        if (!(edges >> q & 1u)) t.farthest[q] = -kInfinity;
-      trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, t);
-      for (PacketMask rest = edges; rest; rest &= rest - 1) {
-        const int q = __builtin_ctz(rest);
-        for (int k = 0; k < kLanes; k += kWidth) {
-          const Mask same = load(t.hits[q].geom + k) == load(tile.hits[q].geom + k);
-          differ[q] |= (~bits(same) & kAllLanes) << k;
-          const Float nearness = splat(1.0f / samples) / load(t.hits[q].t + k);
-          store(mean[q] + k, i == 0 ? nearness : load(mean[q] + k) + nearness);
-        }
-      }
-    }
-    for (PacketMask rest = edges; rest; rest &= rest - 1) {
-      const int q = __builtin_ctz(rest);
-      for (int k = 0; k < kLanes; k += kWidth) {
-        const Float nearness = splat(1.0f) / load(tile.hits[q].t + k);
-        const Float bend = abs(load(mean[q] + k) - nearness);
-        differ[q] |= bits(splat(kBend * grid.dx) * nearness < bend) << k;
-      }
-      if (blended >> q & 1u) differ[q] = 0xffffu;
-      for (int k = 0; k < kLanes; k += kWidth) {
-        const Mask keep = mask_of(~differ[q] >> k & kAllLanes);
-        for (auto& c : centers[q].rgb) store(c + k, select(keep, load(c + k), splat(0.0f)));
-      }
-    }
-    for (int i = 0; i < samples; ++i) {
-      Tile& t = sampled[i];
-      PacketMask shaded = 0;
-      for (PacketMask rest = edges; rest; rest &= rest - 1) {
-        const int q = __builtin_ctz(rest);
-        if (!differ[q]) continue;
-        shaded |= 1u << q;
-        for (int k = 0; k < kLanes; ++k)
-          if (!(differ[q] >> k & 1u)) {
-            t.hits[q].t[k] = kInfinity;
-            t.hits[q].geom[k] = t.hits[q].id[k] = -1;
-          }
-      }
-      if (!shaded) break;
-      for (int q = 0; q < packets; ++q)
-        if (!(shaded >> q & 1u)) clear(t.hits[q], kInfinity);
-      if (view.shadows) find_all_casters(view, nullptr, t, packets, scratch, shadows);
-      if (view.reflection) look_through_mirror(view, packets, t, mirrored);
-      for (; shaded; shaded &= shaded - 1) {
-        const int q = __builtin_ctz(shaded);
-        Colors colors;
-        shade_pixels(view, nullptr, mirrored, q, lists, scratch, t, shadows, colors);
-        for (int k = 0; k < kLanes; k += kWidth) {
-          const Mask add = mask_of(differ[q] >> k & kAllLanes);
-          for (int c = 0; c < 3; ++c)
-            store(centers[q].rgb[c] + k,
-                  load(centers[q].rgb[c] + k) +
-                      select(add, load(colors.rgb[c] + k) * splat(1.0f / samples), splat(0.0f)));
-        }
-      }
+    always |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
+  Colors colors[kTilePackets];
+  for (int q = 0; q < packets; ++q) {
+    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, colors[q]);
+    // Edges of what is reflected.
+    if (view.reflection && mirrored.lanes[q] && hit_lanes(mirrored.tile.hits[q])) always |= 1u << q;
+    if (always >> q & 1u) edges[q] = 0xffffu;
+  }
+  const int most = kTilePackets * kLanes / samples;  // pixels in a tile of samples
+  SampledPixels pixels;
+  for (int q = 0; q < packets; ++q) {
+    for (std::uint32_t lanes = edges[q]; lanes; lanes &= lanes - 1) {
+      pixels.packet[pixels.count] = q;
+      pixels.lane[pixels.count++] = __builtin_ctz(lanes);
+      if (pixels.count < most) continue;
+      shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, mirrored, colors);
+      pixels.count = 0;
     }
   }
+  if (pixels.count)
+    shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, mirrored, colors);
   for (int q = 0; q < packets; ++q)
-    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), centers[q].rgb, 1);
+    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
 }
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,

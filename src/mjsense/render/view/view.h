@@ -160,8 +160,9 @@ struct ImageTargets {
   bool ray_depth = false;                // depth along the ray instead of planar depth
   int samples = 1;                       // samples per pixel, for rgb
   FixedTile* fixed = nullptr;            // not null: write these tiles and no image
-  // As with multisampling in OpenGL, use the samples for edges only, and write rgb only.
-  static constexpr int kMostMultisamples = 8;
+  // As with multisampling in OpenGL, use the samples for edges only, and write rgb only. `samples`
+  // must be a power of two up to kMostMultisamples.
+  static constexpr int kMostMultisamples = 16;
   bool multisampled = false;
 };
 
