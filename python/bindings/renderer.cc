@@ -7,6 +7,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <mutex>
 #include <string>
 
 #include "mjsense/core/error.h"
@@ -107,6 +108,7 @@ SceneMemory memory_of(const nb::dict& scene) {
 struct BoundRenderer {
   SceneRenderer renderer;
   SceneMemory memory;
+  std::mutex mutex;  // held while rendering
 
   BoundRenderer(const nb::dict& model, const nb::dict& settings, const nb::dict& layouts,
                 const nb::dict& scene, const nb::dict& soft)
@@ -142,6 +144,10 @@ struct BoundRenderer {
     targets.depth = reinterpret_cast<float*>(depth);
     targets.segmentation = reinterpret_cast<std::int32_t*>(segmentation);
     const nb::gil_scoped_release release;
+    const std::unique_lock lock(mutex, std::try_to_lock);
+    if (!lock)
+      throw RuntimeError(
+          "Renderer: another thread is rendering with it; use one renderer per thread");
     renderer.render(scene, width, height, targets);
   }
 };

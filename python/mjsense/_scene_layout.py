@@ -7,6 +7,7 @@ MuJoCo's Python bindings, and the bytes of the struct that change are the field'
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 from typing import Any
@@ -33,10 +34,8 @@ def _place(struct: Any, name: str, before: int, memory: ctypes.Array[ctypes.c_ui
     changed = np.flatnonzero(bytes_with(low) != bytes_with(high))
     size = 1
     if len(changed) and not isinstance(old, str):
-        try:
+        with contextlib.suppress(TypeError):  # an unsigned byte cannot be -1
             size = len(np.flatnonzero(bytes_with(low) != bytes_with(type(old)(-1))))
-        except TypeError:
-            pass  # an unsigned byte
     setattr(struct, name, old)
     if not len(changed):
         return None

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/abstract/scene_assets.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <span>
+#include <utility>
 
 namespace mjsense {
 namespace {
@@ -17,7 +21,49 @@ mjModel part_of(const mjModel* model, bool height_fields) {
 
 }  // namespace
 
-SceneAssets::SceneAssets(const mjModel* model) : model_(model) { reload(); }
+SceneAssets::SceneAssets(const mjModel* model)
+    : model_(model),
+      mesh_stamps_(model->nmesh),
+      texture_stamps_(model->ntex),
+      height_field_stamps_(model->nhfield) {
+  reload();
+  reload_changed();
+}
+
+bool SceneAssets::Stamp::changed(const void* data, std::size_t bytes) {
+  const auto* at = static_cast<const unsigned char*>(data);
+  const std::size_t words = bytes / sizeof(std::uint64_t);
+  const std::size_t step = std::max<std::size_t>(1, words / kPlaces);
+  std::uint64_t hash = bytes;
+  for (std::size_t i = 0; i < words; i += step) {
+    std::uint64_t word;
+    std::memcpy(&word, at + i * sizeof word, sizeof word);
+    hash = std::rotl((hash ^ word) * 0x9E3779B97F4A7C15u, 29);
+  }
+  for (std::size_t i = words * sizeof(std::uint64_t); i < bytes; ++i) hash = hash * 31 + at[i];
+  return std::exchange(value, hash) != hash;
+}
+
+void SceneAssets::reload_changed() {
+  const mjModel* m = model_;
+  for (int i = 0; i < m->nmesh; ++i) {
+    if (!mesh_stamps_[i].changed(m->mesh_vert + 3 * m->mesh_vertadr[i],
+                                 3 * sizeof(float) * m->mesh_vertnum[i]))
+      continue;
+    meshes_[2 * i].reset();
+    meshes_[2 * i + 1].reset();
+  }
+  for (int i = 0; i < m->ntex; ++i) {
+    const std::size_t bytes =
+        static_cast<std::size_t>(m->tex_width[i]) * m->tex_height[i] * m->tex_nchannel[i];
+    if (texture_stamps_[i].changed(m->tex_data + m->tex_adr[i], bytes)) textures_[i].reset();
+  }
+  for (int i = 0; i < m->nhfield; ++i) {
+    const std::size_t values = static_cast<std::size_t>(m->hfield_nrow[i]) * m->hfield_ncol[i];
+    if (height_field_stamps_[i].changed(m->hfield_data + m->hfield_adr[i], values * sizeof(float)))
+      height_fields_.reset();
+  }
+}
 
 void SceneAssets::reload() {
   meshes_.clear();

@@ -5,6 +5,7 @@
 #include <mujoco/mujoco.h>
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -36,15 +37,25 @@ class SceneAssets {
   // Texture coordinates of the skin's faces; null if it has none.
   const MeshSurface& skin(int id);
 
-  // Prepares all that was drawn before again, from the current contents of the model's arrays.
+  // Makes the next image show the current contents of the model's arrays.
   void reload();
+  // Reloads the textures, height fields and meshes whose arrays have changed at one of the places
+  // that are compared: every value of a small array, and kPlaces spread over a large one.
+  static constexpr int kPlaces = 128;
+  void reload_changed();
 
  private:
+  struct Stamp {
+    std::uint64_t value = 0;
+    // Whether the contents differ from those of the last call.
+    bool changed(const void* data, std::size_t bytes);
+  };
   DrawnMesh hull(int mesh) const;
 
   const mjModel* model_;
   std::vector<std::unique_ptr<DrawnMesh>> meshes_;  // [2 * nmesh]
   std::vector<std::shared_ptr<const StoredTexture>> textures_;
+  std::vector<Stamp> mesh_stamps_, texture_stamps_, height_field_stamps_;
   std::unique_ptr<SharedGeometry> height_fields_;
   std::unique_ptr<SurfaceAssets> skins_;
 };

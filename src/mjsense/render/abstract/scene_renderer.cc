@@ -79,6 +79,7 @@ SceneRenderer::~SceneRenderer() = default;
 
 void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                            const ImageTargets& targets) {
+  assets_.reload_changed();
   read_camera(scene, width, height);
   read_lights(scene);
   const bool color = targets.rgb != nullptr;
