@@ -119,10 +119,26 @@ class Renderer:
         for name, value in (("height", height), ("width", width)):
             if int(value) < 1:
                 raise ValueError(f"Renderer: {name} must be at least 1, got {value}")
+        self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
+
+    @classmethod
+    def of_scene(cls, model: mujoco.MjModel, scene: mujoco.MjvScene, height: int, width: int) -> Renderer:
+        """A renderer of a scene that the caller updates with ``mujoco.mjv_updateScene``; ``render()`` draws its current contents.
+
+        `scene` must have room for at least two geoms.
+        """
+        made = cls.__new__(cls)
+        made._native = made._batch = None
+        made._set_up(model, height, width, scene)
+        return made
+
+    def _set_up(self, model: mujoco.MjModel, height: int, width: int, scene: mujoco.MjvScene) -> None:
+        import mujoco
+
         self._mujoco = mujoco
         self._model = model
         self._height, self._width = int(height), int(width)
-        self._scene = mujoco.MjvScene(model, max(int(max_geom), 2))
+        self._scene = scene
         self._scene_option = mujoco.MjvOption()
         self._depth = self._segmentation = False
         self._sizes = self._sizes_of(model)
