@@ -22,7 +22,6 @@ os.environ.setdefault("LP_NUM_THREADS", "1")  # llvmpipe's; CPU time counts all 
 import gymnasium
 import mujoco
 import numpy as np
-
 from mjsense.compat import gymnasium as adapter
 
 ENVIRONMENTS = (

@@ -75,11 +75,8 @@ class Viewer(OffScreenViewer):
     def _depth_buffer(self, depth: np.ndarray) -> np.ndarray:
         camera = self.scn.camera[0]
         near, far = camera.frustum_near, camera.frustum_far
-        if camera.orthographic:
-            buffer = (depth - near) / (far - near)
-        else:
-            buffer = far / (far - near) * (1 - near / depth)
-        return np.clip(buffer, 0, 1).astype(np.float32)
+        window = depth - near if camera.orthographic else far * (1 - near / depth)
+        return np.clip(window / (far - near), 0, 1).astype(np.float32)
 
 
 def use(env: Any) -> Any:
@@ -88,7 +85,9 @@ def use(env: Any) -> Any:
     inner = getattr(inner, "robot_env", inner)  # gymnasium-robotics' kitchen
     renderer = getattr(inner, "mujoco_renderer", None)
     if not isinstance(renderer, MujocoRenderer):
-        raise TypeError(f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer")
+        raise TypeError(
+            f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer"
+        )
     get_viewer = renderer._get_viewer
 
     def viewer_of(render_mode: str | None) -> Any:
