@@ -15,6 +15,7 @@ void bind_simulation(nanobind::module_& m);
 void bind_contact(nanobind::module_& m);
 void bind_effects(nanobind::module_& m);
 void bind_raycast(nanobind::module_& m);
+void bind_renderer(nanobind::module_& m);
 void bind_recorder(nanobind::module_& m);
 void bind_robot(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);

@@ -19,6 +19,7 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_contact(m);
   mjsense::python::bind_effects(m);
   mjsense::python::bind_raycast(m);
+  mjsense::python::bind_renderer(m);
   mjsense::python::bind_recorder(m);
   mjsense::python::bind_robot(m);
   mjsense::python::bind_core_sensors(m);

@@ -66,6 +66,7 @@ from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.recorder import Recorder
+from mjsense.renderer import Renderer
 from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import Sensor
@@ -85,7 +86,7 @@ __all__ = [
     "ContactSensor", "DebugShapes", "EffectSensorCfg", "Entity", "EnvStatesSensor", "FunctionSensor",
     "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
     "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Robot", "RobotBasePoseSensor", "RobotCamera",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "Robot", "RobotBasePoseSensor", "RobotCamera",
     "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Task", "TaskEnv",
     "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError", "WorldState", "effects",
     "embedded_models", "make", "make_vec", "observations", "policy_names", "record", "register_policy", "register_task",

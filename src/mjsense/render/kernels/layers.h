@@ -91,6 +91,7 @@ inline void look_through_mirror(const View& view, int packets, const Tile& tile,
   }
   if (!through) return;
   for (int q = packets; q < kTilePackets; ++q) out.tile.farthest[q] = -kInfinity;
+  out.tile.regular = tile.regular;
   __builtin_memcpy(out.tile.window, tile.window, sizeof tile.window);
   const View& beyond = *view.reflection;
   for (int i = 0; i < beyond.num_opaque; ++i) {

@@ -69,7 +69,7 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, const TriangleB
     shown = shown & (low[0] <= splat(tile.around[1])) & (splat(tile.around[0]) <= high[0]) &
             (low[1] <= splat(tile.around[3])) & (splat(tile.around[2]) <= high[1]) &
             (splat(0.0f) < farthest);
-    if (!grid.bent) {
+    if (!grid.bent && tile.regular) {
       const Mask over = holds_center(low[0], high[0], tile.around[0], grid.dx) &
                         holds_center(low[1], high[1], tile.around[3], grid.dy);
       shown = shown & (over | ~ahead);

@@ -59,6 +59,7 @@ inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixe
   const bool ortho = view.grid.orthographic;
   const Float zero = splat(0.0f), one = splat(1.0f);
   const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k), splat(-1.0f)};
+  if (g.behind) n = {-n.x, -n.y, -n.z};
   const Float inverse = one / min(dot(n, d), splat(-1e-4f));
   const Float scale = ortho ? one : load(hits.t + k);
   const auto step = [&](Float along_n, Float ex, Float ey, float size) {
@@ -101,8 +102,9 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   const Texture& texture = *s.texture;
   const float width = texture.width[0], height = texture.height[0];
   const bool plane = g.type == mjGEOM_PLANE;
-  const bool curved = g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID ||
-                      g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
+  const bool round = g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
+  const bool curved =
+      !s.from_above && (round || g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID);
   Mapped mapped;
   if (!texture.cube && (curved || s.mapped)) map_lanes(g, hits, lanes, local, normal, mapped);
   for (int k = 0; k < kLanes; k += kWidth) {
@@ -122,9 +124,10 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
       Float u, v, footprint;
       if (plane || s.from_above) {
         const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
-        const float sy = g.size[1] > 0 ? 0.5f / g.size[1] : 0.5f;
-        u = fma(q.x, splat(sx), splat(plane && g.size[0] > 0 ? 0.5f : 0.0f));
-        v = fma(q.y, splat(-sy), splat(plane && g.size[1] > 0 ? 0.5f : 0.0f));
+        const float size_y = round ? g.size[0] : g.size[1];
+        const float sy = size_y > 0 ? 0.5f / size_y : 0.5f;
+        u = fma(q.x, splat(sx), splat(!s.from_above && g.size[0] > 0 ? 0.5f : 0.0f));
+        v = fma(q.y, splat(-sy), splat(!s.from_above && g.size[1] > 0 ? 0.5f : 0.0f));
         const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
         // Maximum component, as in Mesa; it gives a sharper image than the length of the vector.
         const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };

@@ -64,8 +64,9 @@ struct TileLists {
 // visible geoms are listed.
 inline void find_row(const View& view, int ty, TileScratch& scratch) {
   const PixelGrid& grid = view.grid;
-  const float high = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
-  const float low = high + grid.dy * kTileSize;
+  const float top = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
+  const float reach = 0.5f * grid.dy;  // of samples
+  const float high = top - reach, low = top + grid.dy * kTileSize + reach;
   scratch.row_count = 0;
   for (int i = 0; i < view.num_opaque + view.num_transparent; ++i) {
     const float* w = view.geoms[i].window;
@@ -124,18 +125,258 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrore
 struct TileSpace {
   Tile tile;
   Mirrored mirrored;
+  Tile sampled;
 };
+
+// Sample offsets of OpenGL's multisampling: for four samples those that all common implementations
+// use.
+inline void multisample_shift(int index, int samples, float& x, float& y) {
+  constexpr float kFour[4][2] = {{-1, -3}, {3, -1}, {-3, 1}, {1, 3}};
+  if (samples != 4) return sample_shift(index, samples, x, y);
+  x = kFour[index][0] / 8;
+  y = -kFour[index][1] / 8;  // OpenGL counts rows from the bottom
+}
+
+// Sets the pixels of a tile at (x0, y0), `across` packets wide, and clears its hits.
+inline void start_tile(const View& view, int x0, int y0, int across, int packets, float shift_x,
+                       float shift_y, Tile& tile) {
+  const float far = view.far > 0 ? view.far : kInfinity;
+  tile.regular = true;
+  float* window = tile.around;
+  window[0] = window[2] = kInfinity;
+  window[1] = window[3] = -kInfinity;
+  for (int q = 0; q < packets; ++q) {
+    fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
+                tile.pixels[q]);
+    const float* w = tile.pixels[q].window;
+    for (int c = 0; c < 4; c += 2) {
+      window[c] = w[c] < window[c] ? w[c] : window[c];
+      window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
+    }
+    for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
+    tile.farthest[q] = far;
+    clear(tile.hits[q], far);
+  }
+  for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
+  tile.depth = far;
+}
+
+// Computes the colours of packet `q` with transparent geoms. `color`: where to store them.
+inline void shade_pixels(const View& view, const FixedTile* fixed, const Mirrored& mirrored, int q,
+                         const TileLists& lists, const TileScratch& scratch, Tile& tile,
+                         Shadows& shadows, Colors& colors) {
+  shade_packet(view, fixed, mirrored, q, tile.pixels[q], tile.hits[q], shadows, colors);
+  if (lists.transparent)
+    shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.hits[q],
+                      colors);
+}
+
+// If 1/t deviates from a linear function of the image by more than this times the size of a pixel,
+// relative to 1/t, there is an edge within one geom.
+constexpr float kBend = 0.06f;
+
+// Sets the lanes of each packet that show an edge: neighbouring pixels see different geoms, or planes
+// with different slopes. Geoms that are so thin that they may be between the centres of pixels are
+// added.
+inline void find_edges(const View& view, const TileLists& lists, int across, int down,
+                       const TileScratch& scratch, const Tile& tile, std::uint32_t* edges) {
+  constexpr int kSide = kTileSize;
+  const PixelGrid& grid = view.grid;
+  const int columns = 4 * across, rows = 4 * down;
+  alignas(64) int geom[kSide * kSide];
+  alignas(64) float nearness[kSide * kSide];
+  for (int q = 0; q < across * down; ++q) {
+    const int at = 4 * (q / across) * kSide + 4 * (q % across);
+    for (int r = 0; r < 4; ++r)
+      for (int i = 0; i < 4; ++i) {
+        geom[at + r * kSide + i] = tile.hits[q].geom[4 * r + i];
+        nearness[at + r * kSide + i] = 1 / tile.hits[q].t[4 * r + i];
+      }
+  }
+  const float most = 2 * kBend * grid.dx;
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const int at = y * kSide + x, id = geom[at];
+      const auto differs = [&](bool before, bool after, int step) {
+        if ((before && geom[at - step] != id) || (after && geom[at + step] != id)) return true;
+        if (!before || !after) return false;
+        const float bend = nearness[at - step] + nearness[at + step] - 2 * nearness[at];
+        return (bend < 0 ? -bend : bend) > most * nearness[at];
+      };
+      if (differs(x > 0, x + 1 < columns, 1) || differs(y > 0, y + 1 < rows, kSide))
+        edges[y / 4 * across + x / 4] |= 1u << (y % 4 * 4 + x % 4);
+    }
+  const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
+  for (int i = 0; i < lists.opaque; ++i) {
+    const ViewGeom& g = view.geoms[scratch.opaque[i]];
+    const float* w = g.window;
+    if (w[1] - w[0] > thin && w[3] - w[2] > thin) continue;
+    const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
+    for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
+      edges[__builtin_ctz(near)] = 0xffffu;
+  }
+}
+
+// Samples of some pixels of a tile, `samples` lanes for each pixel.
+struct SampledPixels {
+  int packet[kTilePackets * kLanes], lane[kTilePackets * kLanes];  // of each pixel
+  int count = 0;
+};
+
+// Starts a tile whose lanes are the samples of the pixels.
+inline void start_samples(const View& view, const Tile& centers, const SampledPixels& pixels,
+                          int samples, Tile& out) {
+  const float far = view.far > 0 ? view.far : kInfinity;
+  const int lanes = pixels.count * samples;
+  const int packets = (lanes + kLanes - 1) / kLanes;
+  out.shaded = true;
+  out.regular = false;
+  out.around[0] = out.around[2] = kInfinity;
+  out.around[1] = out.around[3] = -kInfinity;
+  for (int q = 0; q < packets; ++q) {
+    Pixels& p = out.pixels[q];
+    p.window[0] = p.window[2] = kInfinity;
+    p.window[1] = p.window[3] = -kInfinity;
+    for (int k = 0; k < kLanes; ++k) {
+      const int at = q * kLanes + k < lanes ? q * kLanes + k : lanes - 1, pixel = at / samples;
+      float shift_x, shift_y;
+      multisample_shift(at % samples, samples, shift_x, shift_y);
+      const Pixels& from = centers.pixels[pixels.packet[pixel]];
+      const float x = from.x[pixels.lane[pixel]] + shift_x * view.grid.dx;
+      const float y = from.y[pixels.lane[pixel]] + shift_y * view.grid.dy;
+      p.x[k] = x;
+      p.y[k] = y;
+      p.near[k] = view.near;
+      float* w = p.window;
+      w[0] = x < w[0] ? x : w[0];
+      w[1] = x > w[1] ? x : w[1];
+      w[2] = y < w[2] ? y : w[2];
+      w[3] = y > w[3] ? y : w[3];
+    }
+    for (int c = 0; c < 4; ++c) out.window[c][q] = p.window[c];
+    for (int c = 0; c < 4; c += 2) {
+      out.around[c] = p.window[c] < out.around[c] ? p.window[c] : out.around[c];
+      out.around[c + 1] = p.window[c + 1] > out.around[c + 1] ? p.window[c + 1] : out.around[c + 1];
+    }
+    out.farthest[q] = far;
+    clear(out.hits[q], far);
+  }
+  for (int q = packets; q < kTilePackets; ++q) out.farthest[q] = -kInfinity;
+  out.depth = far;
+}
+
+// Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
+// the surface of its centre keeps its colour, unless its packet is in `always`.
+inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
+                          const SampledPixels& pixels, int samples, PacketMask always,
+                          TileScratch& scratch, Tile& tile, Mirrored& mirrored, Colors* colors) {
+  start_samples(view, centers, pixels, samples, tile);
+  trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  const int packets = (pixels.count * samples + kLanes - 1) / kLanes;
+  PacketMask shaded = 0;
+  std::uint32_t lanes[kTilePackets] = {};
+  for (int i = 0; i < pixels.count; ++i) {
+    const int q = i * samples / kLanes, first = i * samples % kLanes;
+    Hits& hits = tile.hits[q];
+    const Hits& center = centers.hits[pixels.packet[i]];
+    const int lane = pixels.lane[i];
+    bool differs = always >> pixels.packet[i] & 1u;
+    const float nearness = 1 / center.t[lane];
+    float mean = 0;
+    for (int k = first; k < first + samples; ++k) {
+      differs |= hits.geom[k] != center.geom[lane];
+      mean += 1 / hits.t[k];
+    }
+    const float bend = mean / samples - nearness;
+    differs |= (bend < 0 ? -bend : bend) > kBend * view.grid.dx * nearness;
+    if (differs) {
+      shaded |= 1u << q;
+      lanes[q] |= ((1u << samples) - 1) << first;
+      continue;
+    }
+    for (int k = first; k < first + samples; ++k) {
+      hits.t[k] = kInfinity;
+      hits.geom[k] = hits.id[k] = -1;
+    }
+  }
+  if (!shaded) return;
+  Shadows shadows;
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
+  if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+  for (; shaded; shaded &= shaded - 1) {
+    const int q = __builtin_ctz(shaded);
+    Colors sampled;
+    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, sampled);
+    for (int k = 0; k < kLanes; k += samples) {
+      if (!(lanes[q] >> k & 1u)) continue;
+      const int pixel = (q * kLanes + k) / samples;
+      for (int c = 0; c < 3; ++c) {
+        float sum = 0;
+        for (int i = k; i < k + samples; ++i) sum += sampled.rgb[c][i];
+        colors[pixels.packet[pixel]].rgb[c][pixels.lane[pixel]] = sum / samples;
+      }
+    }
+  }
+}
+
+// Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
+// samples see different surfaces.
+inline void render_multisampled(const View& view, const ImageTargets& targets, int x0, int y0,
+                                TileScratch& scratch) {
+  auto& [tile, mirrored, sampled] = *static_cast<TileSpace*>(scratch.tile);
+  const PixelGrid& grid = view.grid;
+  const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
+  const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
+  const int packets = across * down, samples = targets.samples;
+  tile.shaded = true;
+  start_tile(view, x0, y0, across, packets, 0, 0, tile);
+  // Samples are up to half a pixel outside tile.around.
+  float around[4];
+  for (int c = 0; c < 4; ++c)
+    around[c] = tile.around[c] + (c % 2 ? 0.5f : -0.5f) * (c < 2 ? grid.dx : -grid.dy);
+  const TileLists lists = find_geoms(view, around, scratch);
+  trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  Shadows shadows;
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
+  if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+  std::uint32_t edges[kTilePackets] = {};
+  find_edges(view, lists, across, down, scratch, tile, edges);
+  PacketMask always = 0;
+  for (int i = 0; i < lists.transparent; ++i)
+    always |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
+  Colors colors[kTilePackets];
+  for (int q = 0; q < packets; ++q) {
+    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, colors[q]);
+    // Edges of what is reflected.
+    if (view.reflection && mirrored.lanes[q] && hit_lanes(mirrored.tile.hits[q])) always |= 1u << q;
+    if (always >> q & 1u) edges[q] = 0xffffu;
+  }
+  const int most = kTilePackets * kLanes / samples;  // pixels in a tile of samples
+  SampledPixels pixels;
+  for (int q = 0; q < packets; ++q) {
+    for (std::uint32_t lanes = edges[q]; lanes; lanes &= lanes - 1) {
+      pixels.packet[pixels.count] = q;
+      pixels.lane[pixels.count++] = __builtin_ctz(lanes);
+      if (pixels.count < most) continue;
+      shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, mirrored, colors);
+      pixels.count = 0;
+    }
+  }
+  if (pixels.count)
+    shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, mirrored, colors);
+  for (int q = 0; q < packets; ++q)
+    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
+}
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  auto& [tile, mirrored] = *static_cast<TileSpace*>(scratch.tile);
+  auto& [tile, mirrored, sampled] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
   const int packets = across * down;
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
-  const float far = view.far > 0 ? view.far : kInfinity;
   tile.shaded = targets.rgb || targets.normals || targets.fixed;
   const int samples = targets.rgb ? targets.samples : 1;
   alignas(64) float sum[kTilePackets][3][kLanes];
@@ -146,24 +387,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     const bool centered = sample == samples || samples == 1;
     float shift_x = 0, shift_y = 0;
     if (!centered) sample_shift(sample, samples, shift_x, shift_y);
-    float* window = tile.around;
-    window[0] = window[2] = kInfinity;
-    window[1] = window[3] = -kInfinity;
-    for (int q = 0; q < packets; ++q) {
-      fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
-                  tile.pixels[q]);
-      const float* w = tile.pixels[q].window;
-      for (int c = 0; c < 4; c += 2) {
-        window[c] = w[c] < window[c] ? w[c] : window[c];
-        window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
-      }
-      for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
-      tile.farthest[q] = far;
-      clear(tile.hits[q], far);
-    }
-    for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
-    tile.depth = far;
-    const TileLists lists = find_geoms(view, window, scratch);
+    start_tile(view, x0, y0, across, packets, shift_x, shift_y, tile);
+    const TileLists lists = find_geoms(view, tile.around, scratch);
     const FixedTile* fixed = nullptr;  // the tile's cached layer
     if (!view.layered || samples > 1) {
       trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
@@ -189,10 +414,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
       for (int q = 0; q < packets; ++q) {
         Colors colors;
-        shade_packet(view, fixed, mirrored, q, tile.pixels[q], tile.hits[q], shadows, colors);
-        if (lists.transparent)
-          shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q],
-                            tile.hits[q], colors);
+        shade_pixels(view, fixed, mirrored, q, lists, scratch, tile, shadows, colors);
         for (int c = 0; c < 3; ++c)
           for (int k = 0; k < kLanes; k += kWidth) {
             const Float color = load(colors.rgb[c] + k);
@@ -218,7 +440,13 @@ inline void render_tiles(const View& view, const ImageTargets& targets, int firs
   const int across = (view.grid.width + kTileSize - 1) / kTileSize;
   for (int ty = first; ty < last; ++ty) {
     find_row(view, ty, scratch);
-    for (int tx = 0; tx < across; ++tx) render_tile(view, targets, tx, ty, scratch);
+    for (int tx = 0; tx < across; ++tx) {
+      if (targets.multisampled) {
+        render_multisampled(view, targets, tx * kTileSize, ty * kTileSize, scratch);
+      } else {
+        render_tile(view, targets, tx, ty, scratch);
+      }
+    }
   }
 }
 

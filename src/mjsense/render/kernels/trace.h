@@ -37,6 +37,7 @@ struct alignas(64) Tile {
   float farthest[kTilePackets];
   float around[4];  // union of all windows
   float depth;      // maximum of `farthest`
+  bool regular;     // the pixels are on the view's grid
   bool shaded;      // outputs other than depth and ids are requested
 };
 

@@ -48,11 +48,11 @@ inline void trace_tile(const View& view, Part part, const int* list, int count, 
 }
 
 // Adds transparent geoms to the hits, because depth and segmentation include them. A plane seen
-// from behind is skipped.
+// from behind is skipped unless the view says otherwise.
 inline void trace_transparent(const View& view, const int* list, int count, Tile& tile) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
-    if (g.type == mjGEOM_PLANE && g.behind) continue;
+    if (g.type == mjGEOM_PLANE && g.behind && !view.backs) continue;
     const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
     if (packets) draw_or_trace(view, list[i], packets, tile);
   }

@@ -45,6 +45,7 @@ struct Window {
 
 Window window_of(const LightFrame& f, const ViewGeom& g) {
   Window out;
+  if (!g.casts) return {{kEndless, kEndless}, {-kEndless, -kEndless}, kEndless};
   if (g.type == mjGEOM_PLANE) return out;
   const float error = kLightError * (length(f.origin) + length(g.center) + g.radius) + lift(g);
   float corners[8][3], seen[3][8];

@@ -86,6 +86,91 @@ void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord 
   }
 }
 
+void fill_texture(const mjModel* model, int id, StoredTexture& out) {
+  Texture& texture = out.texture;
+  const int channels = model->tex_nchannel[id];
+  texture.cube = model->tex_type[id] != mjTEXTURE_2D;
+  const int width = model->tex_width[id];
+  // A cube texture with a square image repeats that image on all faces.
+  const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
+  const int height = texture.cube ? width : model->tex_height[id];
+  const int faces = texture.cube ? 6 : 1;
+  const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
+  const mjtByte* data = model->tex_data + model->tex_adr[id];
+  const std::array<std::uint8_t, 256> linear = linear_values();
+
+  std::size_t total = 0, padded = 0;
+  for (int w = width, h = height, n = 0; n < Texture::kMaxLevels; ++n) {
+    total += static_cast<std::size_t>(faces) * w * h;
+    padded += static_cast<std::size_t>(faces) * (w + 1) * h;
+    ++texture.levels;
+    if (w == 1 && h == 1) break;
+    w = std::max(1, w / 2);
+    h = std::max(1, h / 2);
+  }
+  std::vector<std::uint32_t> texels(total);
+  for (int f = 0; f < faces; ++f) {
+    const mjtByte* image =
+        data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
+    std::uint32_t* out = texels.data() + static_cast<std::size_t>(f) * width * height;
+    for (int i = 0; i < width * height; ++i) {
+      std::uint32_t texel = 255u << 24;
+      for (int c = 0; c < 3; ++c) {
+        const mjtByte v = image[i * channels + c];
+        texel |= static_cast<std::uint32_t>(srgb ? linear[v] : v) << (8 * c);
+      }
+      if (channels == 4)
+        texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
+      out[i] = texel;
+    }
+  }
+  std::vector<std::uint32_t>& rows = out.texels;
+  rows.resize(padded);
+  texture.texels = rows.data();
+  std::uint32_t* row = rows.data();
+  for (int n = 0, w = width, h = height, at = 0; n < texture.levels; ++n) {
+    texture.width[n] = static_cast<float>(w);
+    texture.height[n] = static_cast<float>(h);
+    texture.offset[n] = static_cast<int>(row - rows.data());
+    const int size = w * h, w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
+    std::uint32_t* image = texels.data() + at;
+    for (int y = 0; y < faces * h; ++y, row += w + 1) {
+      std::copy_n(image + y * w, w, row);
+      row[w] = row[texture.cube ? w - 1 : 0];
+    }
+    at += faces * size;
+    for (int f = 0; f < faces && n + 1 < texture.levels; ++f)
+      halve(image + f * size, w, h, texels.data() + at + f * w2 * h2, w2, h2);
+    w = w2;
+    h = h2;
+  }
+}
+
+}  // namespace
+
+void add_coordinates(MeshTables& tables, int count, const float* vert, const int* faces,
+                     const float* texcoord, const int* texcoords) {
+  add_coordinates(
+      tables, count, [&](int f, int k) { return vert + 3 * faces[3 * f + k]; },
+      [&](int f, int k) { return texcoord + 2 * texcoords[3 * f + k]; });
+}
+
+std::shared_ptr<const StoredTexture> stored_texture(const mjModel* m, int id) {
+  static ByContent<StoredTexture> all;
+  const int channels = m->tex_nchannel[id], width = m->tex_width[id], height = m->tex_height[id];
+  // Textures with another number of channels are encoded for another renderer and ignored.
+  if (channels != 3 && channels != 4) return std::make_shared<const StoredTexture>();
+  const int form[] = {m->tex_type[id], m->tex_colorspace[id], channels, width, height};
+  const std::size_t bytes = static_cast<std::size_t>(width) * height * channels;
+  const ContentKey key =
+      ContentKey().add(std::span<const int>(form)).add(std::span(m->tex_data + m->tex_adr[id], bytes));
+  return all.get(key, [&] {
+    auto made = std::make_shared<StoredTexture>();
+    fill_texture(m, id, *made);
+    return made;
+  });
+}
+
 std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id) {
   const int faces = m->mesh_facenum[id], first = m->mesh_faceadr[id];
   const bool has_uv = m->mesh_texcoordadr[id] >= 0;
@@ -124,14 +209,11 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id) {
       }
     }
     if (has_uv)
-      add_coordinates(
-          *tables, faces, [&](int f, int k) { return &vert[3 * vertices[3 * f + k]]; },
-          [&](int f, int k) { return &texcoord[2 * texcoords[3 * f + k]]; });
+      add_coordinates(*tables, faces, vert.data(), vertices.data(), texcoord.data(),
+                      texcoords.data());
     return tables;
   });
 }
-
-}  // namespace
 
 MeshSurface MeshTables::surface() const {
   const auto data = [](const std::vector<float>& v) { return v.empty() ? nullptr : v.data(); };
@@ -149,71 +231,11 @@ SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
   skins_.resize(model->nskin);
   for (int i = 0; i < model->nflex; ++i) add_flex(model, i, textures);
   for (int i = 0; i < model->nskin && textures; ++i) add_skin(model, i);
-  for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
+  for (int i = 0; i < model->ntex && textures; ++i)
+    textures_[i] = stored_.emplace_back(stored_texture(model, i))->texture;
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
   for (int i = 0; i < model->nmesh && meshes; ++i) keep(mesh_tables(model, i), meshes_[i]);
-}
-
-void SurfaceAssets::add_texture(const mjModel* model, int id) {
-  Texture& texture = textures_[id];
-  const int channels = model->tex_nchannel[id];
-  if (channels != 3 && channels != 4)
-    return;  // encoded for another renderer; the texture is ignored
-  texture.cube = model->tex_type[id] != mjTEXTURE_2D;
-  const int width = model->tex_width[id];
-  // A cube texture with a square image repeats that image on all faces.
-  const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
-  const int height = texture.cube ? width : model->tex_height[id];
-  const int faces = texture.cube ? 6 : 1;
-  const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
-  const mjtByte* data = model->tex_data + model->tex_adr[id];
-  const std::array<std::uint8_t, 256> linear = linear_values();
-
-  std::size_t total = 0, padded = 0;
-  for (int w = width, h = height, n = 0; n < Texture::kMaxLevels; ++n) {
-    total += static_cast<std::size_t>(faces) * w * h;
-    padded += static_cast<std::size_t>(faces) * (w + 1) * h;
-    ++texture.levels;
-    if (w == 1 && h == 1) break;
-    w = std::max(1, w / 2);
-    h = std::max(1, h / 2);
-  }
-  std::vector<std::uint32_t> texels(total);
-  for (int f = 0; f < faces; ++f) {
-    const mjtByte* image =
-        data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
-    std::uint32_t* out = texels.data() + static_cast<std::size_t>(f) * width * height;
-    for (int i = 0; i < width * height; ++i) {
-      std::uint32_t texel = 255u << 24;
-      for (int c = 0; c < 3; ++c) {
-        const mjtByte v = image[i * channels + c];
-        texel |= static_cast<std::uint32_t>(srgb ? linear[v] : v) << (8 * c);
-      }
-      if (channels == 4)
-        texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
-      out[i] = texel;
-    }
-  }
-  std::vector<std::uint32_t>& rows = texels_.emplace_back(padded);
-  texture.texels = rows.data();
-  std::uint32_t* row = rows.data();
-  for (int n = 0, w = width, h = height, at = 0; n < texture.levels; ++n) {
-    texture.width[n] = static_cast<float>(w);
-    texture.height[n] = static_cast<float>(h);
-    texture.offset[n] = static_cast<int>(row - rows.data());
-    const int size = w * h, w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
-    std::uint32_t* image = texels.data() + at;
-    for (int y = 0; y < faces * h; ++y, row += w + 1) {
-      std::copy_n(image + y * w, w, row);
-      row[w] = row[texture.cube ? w - 1 : 0];
-    }
-    at += faces * size;
-    for (int f = 0; f < faces && n + 1 < texture.levels; ++f)
-      halve(image + f * size, w, h, texels.data() + at + f * w2 * h2, w2, h2);
-    w = w2;
-    h = h2;
-  }
 }
 
 void SurfaceAssets::add_flex(const mjModel* model, int id, bool textures) {
@@ -238,9 +260,7 @@ void SurfaceAssets::add_skin(const mjModel* model, int id) {
   const float* texcoord = model->skin_texcoord + 2 * model->skin_texcoordadr[id];
   const int* face = model->skin_face + 3 * model->skin_faceadr[id];
   auto tables = std::make_shared<MeshTables>();
-  add_coordinates(
-      *tables, model->skin_facenum[id], [&](int f, int k) { return vert + 3 * face[3 * f + k]; },
-      [&](int f, int k) { return texcoord + 2 * face[3 * f + k]; });
+  add_coordinates(*tables, model->skin_facenum[id], vert, face, texcoord, face);
   keep(std::move(tables), skins_[id]);
 }
 

@@ -42,6 +42,23 @@ struct MeshTables {
   MeshSurface surface() const;
 };
 
+// Fills uvs and density of `count` faces. Corner k of face f has the position vert[faces[3 f + k]]
+// (m) and the texture coordinates texcoord[texcoords[3 f + k]].
+void add_coordinates(MeshTables& tables, int count, const float* vert, const int* faces,
+                     const float* texcoord, const int* texcoords);
+
+// Tables of the model's mesh `id`, shared by all models of the process that have an equal mesh.
+std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id);
+
+// A texture with its memory.
+struct StoredTexture {
+  Texture texture;
+  std::vector<std::uint32_t> texels;
+};
+
+// The model's texture `id`, shared by all models of the process that have an equal texture.
+std::shared_ptr<const StoredTexture> stored_texture(const mjModel* model, int id);
+
 class SurfaceAssets {
  public:
   // `meshes`: prepare all meshes, including those that no geom uses, because a world may change a
@@ -60,14 +77,13 @@ class SurfaceAssets {
   const Texture* skybox() const { return skybox_; }  // null if the model has none
 
  private:
-  void add_texture(const mjModel* model, int id);
   void add_flex(const mjModel* model, int id, bool textures);
   void add_skin(const mjModel* model, int id);
   void keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface);
 
   std::vector<Texture> textures_;
   std::vector<MeshSurface> meshes_, flex_parts_, skins_;
-  std::vector<std::vector<std::uint32_t>> texels_;
+  std::vector<std::shared_ptr<const StoredTexture>> stored_;
   // Tables of meshes are shared by all models of the process that have equal meshes.
   std::vector<std::shared_ptr<const MeshTables>> tables_;
   const Texture* skybox_ = nullptr;

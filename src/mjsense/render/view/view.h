@@ -35,7 +35,7 @@ struct Surface {
   float repeat[2], shift[2];  // for 2D textures: coordinates are multiplied by repeat, then shifted
   float stretch[3];           // for cube maps: multiplies the direction
   bool mapped;                // 2D texture with the mesh's own coordinates
-  bool from_above;            // 2D texture projected along z onto a mesh or height field
+  bool from_above;            // 2D texture projected along z
 };
 
 struct alignas(64) ViewGeom {
@@ -52,6 +52,7 @@ struct alignas(64) ViewGeom {
   int id;                 // id among geoms, parts of flexes and skins, unique in the model
   int object_id, object;  // for segmentation: id and mjtObj
   bool fixed;             // belongs to the layer View::fixed
+  bool casts = true;      // casts shadows
   bool transparent;       // blended over what is behind it; casts shadows and receives none
   // A plane seen from below: drawn as a faint veil, absent in depth and segmentation.
   bool behind;
@@ -131,6 +132,7 @@ struct View {
   bool layered = false;
   const FixedTile* fixed = nullptr;
   const int* index_of_id = nullptr;  // index in `geoms` by id, for visible geoms
+  bool backs = false;  // depth and segmentation include planes seen from behind
   float global_ambient = 0;
   const Texture* skybox = nullptr;
   float r_wc[9] = {};      // for the skybox
@@ -158,6 +160,10 @@ struct ImageTargets {
   bool ray_depth = false;                // depth along the ray instead of planar depth
   int samples = 1;                       // samples per pixel, for rgb
   FixedTile* fixed = nullptr;            // not null: write these tiles and no image
+  // As with multisampling in OpenGL, use the samples for edges only, and write rgb only. `samples`
+  // must be a power of two up to kMostMultisamples.
+  static constexpr int kMostMultisamples = 16;
+  bool multisampled = false;
 };
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels

@@ -89,6 +89,50 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   }
 }
 
+template <class SetShape>
+void ViewBuilder::add_shape(const RayGeom& source, int id, const float* rgba,
+                            const Material* material, const double position[3],
+                            const double rotation[9], SetShape shape) {
+  const int index = static_cast<int>(order_.size());
+  ViewGeom& g = unsorted_[index];
+  g.id = id;
+  g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
+  place(source, position, rotation, g);
+  const Texture* texture = shape(g);
+  const bool sight = find_window(view_, g);
+  if (!sight && !view_.shadows) return;
+  set_surface(source, rgba, material, texture, g);
+  Order order{sight ? g.transparent : 2, g.nearest, index};
+  if (order.rank == 1) {
+    const float* p = g.pos;
+    const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
+    const float reach = soft ? 0 : g.radius;  // as in MuJoCo
+    order.key =
+        g.type == mjGEOM_PLANE ? 1e10f : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
+  }
+  order_.push_back(order);
+}
+
+void ViewBuilder::sort_geoms(const double rotation[9]) {
+  std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
+    if (a.rank != b.rank) return a.rank < b.rank;
+    if (a.key != b.key) return a.key < b.key;
+    return a.index < b.index;
+  });
+  view_.num_opaque = view_.num_transparent = 0;
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
+    if (view_.layered) index_of_id_[g.id] = static_cast<int>(i);
+    view_.num_opaque += order_[i].rank == 0;
+    view_.num_transparent += order_[i].rank == 1;
+  }
+  view_.geoms = sorted_.data();
+  view_.index_of_id = index_of_id_.data();
+  view_.fixed = nullptr;
+  view_.num_geoms = static_cast<int>(order_.size());
+  for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
+}
+
 const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes,
                                const Appearance& appearance, std::span<const Marker> markers,
                                const double position[3], const double rotation[9],
@@ -96,28 +140,8 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   view_.grid = grid;
   order_.clear();
   const RayGeom* endless = nullptr;  // the first infinite plane
-  // shape(g) sets the fields that depend on the kind of object.
-  const auto add_shape = [&](const RayGeom& source, int id, const float* rgba,
-                             const Material* material, auto shape) {
-    const int index = static_cast<int>(order_.size());
-    ViewGeom& g = unsorted_[index];
-    g.id = id;
-    g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
-    place(source, position, rotation, g);
-    shape(g);
-    const bool sight = find_window(view_, g);
-    if (!sight && !options_.shadows) return;
-    set_surface(source, rgba, material, g);
-    Order order{sight ? g.transparent : 2, g.nearest, index};
-    if (order.rank == 1) {
-      const float* p = g.pos;
-      const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
-      const float reach = soft ? 0 : g.radius;  // as in MuJoCo
-      order.key = g.type == mjGEOM_PLANE
-                      ? 1e10f
-                      : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
-    }
-    order_.push_back(order);
+  const auto texture_of = [&](const Material& material) {
+    return assets_->texture(material.texture);
   };
   const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
@@ -125,7 +149,10 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
       endless = &source;
     add_shape(source, id, rgba, material < 0 ? nullptr : &appearance.materials()[material],
-              [&](ViewGeom& g) { set_shape(world, shapes, source, g); });
+              position, rotation, [&](ViewGeom& g) {
+                set_shape(world, shapes, source, g);
+                return material < 0 ? nullptr : texture_of(appearance.materials()[material]);
+              });
   };
   const auto add_geom = [&](int id) {
     add(world.geom(id), id, world.flags()[id], world.materials()[id]);
@@ -160,30 +187,107 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   id = first_marker();
   for (const Marker& marker : markers) {
     if (id++ == left_out_) continue;
-    add_shape(marker.shape, id - 1, marker.rgba, &marker.material,
-              [&](ViewGeom& g) { set_primitive(marker.shape.type, marker.object, marker.id, g); });
+    add_shape(marker.shape, id - 1, marker.rgba, &marker.material, position, rotation,
+              [&](ViewGeom& g) {
+                set_primitive(marker.shape.type, marker.object, marker.id, g);
+                return texture_of(marker.material);
+              });
   }
-  std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
-    if (a.rank != b.rank) return a.rank < b.rank;
-    if (a.key != b.key) return a.key < b.key;
-    return a.index < b.index;
-  });
-  view_.num_opaque = view_.num_transparent = 0;
-  for (std::size_t i = 0; i < order_.size(); ++i) {
-    const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
-    if (view_.layered) index_of_id_[g.id] = static_cast<int>(i);
-    view_.num_opaque += order_[i].rank == 0;
-    view_.num_transparent += order_[i].rank == 1;
-  }
-  view_.geoms = sorted_.data();
-  view_.index_of_id = index_of_id_.data();
-  view_.fixed = nullptr;
-  view_.num_geoms = static_cast<int>(order_.size());
-  for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
+  sort_geoms(rotation);
   set_lights(world, appearance, position, rotation);
   if (options_.shadows) light_space_.fill(view_);
   if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
   if (mirrored_) set_mirror(world, shapes, appearance, markers, position, rotation);
+  return view_;
+}
+
+template <class Build>
+bool ViewBuilder::ends_mirror_search(const RayGeom& g, int id, float alpha, float reflectance,
+                                     const double position[3], const double rotation[9],
+                                     Build build) {
+  if (g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) return false;
+  if (reflectance <= 0 || alpha < kOpaque) return false;
+  const double normal[3] = {g.mat[2], g.mat[5], g.mat[8]};
+  const double top = g.type == mjGEOM_BOX ? g.size[2] : 0;
+  double above = -top;
+  for (int k = 0; k < 3; ++k) above += (position[k] - g.pos[k]) * normal[k];
+  // Below a mirror: a box ends the search; a plane, which is drawn as a veil, is skipped.
+  if (above < 0) return g.type == mjGEOM_BOX;
+  double p[3], r[9];
+  for (int k = 0; k < 3; ++k) p[k] = position[k] - 2 * above * normal[k];
+  for (int j = 0; j < 3; ++j) {
+    double along = 0;
+    for (int k = 0; k < 3; ++k) along += normal[k] * rotation[3 * k + j];
+    for (int k = 0; k < 3; ++k) r[3 * k + j] = rotation[3 * k + j] - 2 * along * normal[k];
+  }
+  mirrored_->left_out_ = id;
+  mirrored_->own_headlight_ = false;
+  for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
+  mirrored_->tint_ = reflectance;
+  view_.reflection = &build(p, r);
+  view_.mirror = id;
+  return true;
+}
+
+ViewBuilder::ViewBuilder(std::size_t geoms, std::size_t lights)
+    : unsorted_(geoms), sorted_(geoms), light_space_(static_cast<int>(lights), geoms) {
+  order_.reserve(geoms);
+}
+
+const View& ViewBuilder::build(const DrawnScene& scene, const double position[3],
+                               const double rotation[9], const PixelGrid& grid) {
+  view_.grid = grid;
+  view_.backs = true;
+  projected_ = scene.projected_textures;
+  view_.near = scene.near;
+  view_.far = scene.far;
+  view_.shadows = scene.shadows;
+  view_.skybox = scene.skybox;
+  order_.clear();
+  const RayGeom* endless = nullptr;  // the first infinite plane
+  int id = 0;
+  for (const DrawnGeom& geom : scene.geoms) {
+    const RayGeom& shape = geom.shape;
+    if (!endless && shape.type == mjGEOM_PLANE && shape.size[0] == 0 && shape.size[1] == 0)
+      endless = &shape;
+    if (id++ == left_out_) continue;
+    add_shape(shape, id - 1, geom.rgba, &geom.material, position, rotation, [&](ViewGeom& g) {
+      set_primitive(shape.type, geom.object, geom.object_id, g);
+      if (geom.bvh) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
+      g.casts = geom.casts;
+      g.bvh = geom.bvh;
+      g.clusters = geom.clusters;
+      g.horizons = geom.horizons;
+      g.mesh = geom.mesh;
+      g.height_field = geom.height_field;
+      return geom.texture;
+    });
+  }
+  sort_geoms(rotation);
+  view_.num_lights = static_cast<int>(scene.lights.size());
+  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;
+  for (int i = 0; i < view_.num_lights; ++i) {
+    const ViewLight& light = view_.lights[i] = scene.lights[i];
+    const double from[3] = {light.pos[0], light.pos[1], light.pos[2]};
+    const double to[3] = {light.dir[0], light.dir[1], light.dir[2]};
+    place_light(from, to, position, rotation, view_.lights[i]);
+  }
+  if (view_.shadows) light_space_.fill(view_);
+  view_.sky_distance = 0;
+  if (view_.skybox) set_sky(scene.haze ? endless : nullptr, scene.sky, position, rotation);
+  view_.mirror = -1;
+  view_.reflection = nullptr;
+  if (!scene.reflections) return view_;
+  if (!mirrored_) mirrored_ = std::make_unique<ViewBuilder>(unsorted_.size(), 0);
+  DrawnScene flat = scene;
+  flat.reflections = flat.shadows = false;
+  id = 0;
+  for (const DrawnGeom& geom : scene.geoms)
+    if (ends_mirror_search(geom.shape, id++, geom.rgba[3], geom.material.reflectance, position,
+                           rotation, [&](const double p[3], const double r[9]) -> const View& {
+                             return mirrored_->build(flat, p, r, grid);
+                           }))
+      break;
   return view_;
 }
 
@@ -196,28 +300,11 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
   view_.reflection = nullptr;
   // Returns true if the search is over. As in MuJoCo, there is at most one mirror.
   const auto settles = [&](const RayGeom& g, int id, float alpha, float reflectance) {
-    if (g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) return false;
-    if (reflectance <= 0 || alpha < kOpaque) return false;
-    const double normal[3] = {g.mat[2], g.mat[5], g.mat[8]};
-    const double top = g.type == mjGEOM_BOX ? g.size[2] : 0;
-    double above = -top;
-    for (int k = 0; k < 3; ++k) above += (position[k] - g.pos[k]) * normal[k];
-    // Below a mirror: a box ends the search; a plane, which is drawn as a veil, is skipped.
-    if (above < 0) return g.type == mjGEOM_BOX;
-    double p[3], r[9];
-    for (int k = 0; k < 3; ++k) p[k] = position[k] - 2 * above * normal[k];
-    for (int j = 0; j < 3; ++j) {
-      double along = 0;
-      for (int k = 0; k < 3; ++k) along += normal[k] * rotation[3 * k + j];
-      for (int k = 0; k < 3; ++k) r[3 * k + j] = rotation[3 * k + j] - 2 * along * normal[k];
-    }
-    mirrored_->left_out_ = id;
-    mirrored_->own_headlight_ = false;
-    for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
-    mirrored_->tint_ = reflectance;
-    view_.reflection = &mirrored_->build(world, shapes, appearance, markers, p, r, view_.grid);
-    view_.mirror = id;
-    return true;
+    return ends_mirror_search(g, id, alpha, reflectance, position, rotation,
+                              [&](const double p[3], const double r[9]) -> const View& {
+                                return mirrored_->build(world, shapes, appearance, markers, p, r,
+                                                        view_.grid);
+                              });
   };
   for (int id = 0; id < world.num_geoms(); ++id) {
     const int material = world.materials()[id];
@@ -293,7 +380,7 @@ const MeshSurface* ViewBuilder::soft_surface(int index, const MeshSurface& share
 }
 
 void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Material* material,
-                              ViewGeom& g) const {
+                              const Texture* texture, ViewGeom& g) const {
   Surface& s = g.surface;
   s = {};
   std::copy_n(rgba, 4, s.rgba);
@@ -307,8 +394,7 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
   s.specular = material->specular;
   s.emission = material->emission;
   if (!options_.textures) return;
-  s.texture = assets_->texture(material->texture);
-  if (s.texture && s.texture->levels == 0) s.texture = nullptr;
+  s.texture = texture && texture->levels > 0 ? texture : nullptr;
   if (!s.texture) return;
   const bool uniform = material->uniform;
   s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
@@ -318,7 +404,7 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
     return;
   }
   const std::array<float, 3> extent = drawn_extent(g);
-  s.from_above = (g.mesh && !s.mapped) || g.height_field;
+  s.from_above = (g.mesh && !s.mapped) || g.height_field || (projected_ && !g.mesh);
   const bool endless = g.type == mjGEOM_PLANE && (g.size[0] <= 0 || g.size[1] <= 0);
   for (int i = 0; i < 2; ++i) {
     s.repeat[i] = material->repeat[i];
@@ -387,15 +473,21 @@ void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance
       continue;
     }
     const RayLight& source = world.lights()[id];
-    const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
-                              source.pos[2] - position[2]};
-    double p[3], d[3];
-    rotate_back(rotation, offset, p);
-    rotate_back(rotation, source.dir, d);
-    for (int k = 0; k < 3; ++k) {
-      light.pos[k] = static_cast<float>(p[k]);
-      light.dir[k] = static_cast<float>(d[k]);
-    }
+    place_light(source.pos, source.dir, position, rotation, light);
+  }
+}
+
+void ViewBuilder::place_light(const double light_position[3], const double direction[3],
+                              const double position[3], const double rotation[9],
+                              ViewLight& light) {
+  const double offset[3] = {light_position[0] - position[0], light_position[1] - position[1],
+                            light_position[2] - position[2]};
+  double p[3], d[3];
+  rotate_back(rotation, offset, p);
+  rotate_back(rotation, direction, d);
+  for (int k = 0; k < 3; ++k) {
+    light.pos[k] = static_cast<float>(p[k]);
+    light.dir[k] = static_cast<float>(d[k]);
   }
 }
 

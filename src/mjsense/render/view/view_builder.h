@@ -32,6 +32,33 @@ struct ViewOptions {
   bool everything = false;  // disables culling, for tests
 };
 
+// A geom with everything that its image depends on; used where the geoms do not come from a RayWorld.
+struct DrawnGeom {
+  RayGeom shape;  // `center` and `half` are set
+  float rgba[4];
+  Material material;
+  const Texture* texture;   // null: none
+  int object_id, object;    // for segmentation
+  bool casts;               // casts shadows
+  const MeshSurface* mesh;  // null unless the shape has triangles
+  void* bvh;                // as in ViewGeom
+  const Clusters* clusters;
+  const Horizons* horizons;
+  const HeightField* height_field;
+};
+
+struct DrawnScene {
+  std::span<const DrawnGeom> geoms;
+  std::span<const ViewLight> lights;  // poses in the world frame
+  float near, far;                    // m
+  bool shadows, reflections;
+  const Texture* skybox;  // null: none
+  Sky sky;
+  bool haze;
+  // 2D textures are projected along z onto all shapes, as MuJoCo did before 4.0.
+  bool projected_textures;
+};
+
 // Computes Surface::dull: the value below which the kernels' power() returns 0, with a margin for
 // rounding. power() returns 0 for x below 0.3 if the exponent is at least 4, and where x^exponent
 // is below e^-32.3.
@@ -46,6 +73,12 @@ class ViewBuilder {
   const View& build(const RayWorld& world, const SharedGeometry& shapes,
                     const Appearance& appearance, std::span<const Marker> markers,
                     const double position[3], const double rotation[9], const PixelGrid& grid);
+
+  // For scenes of at most `geoms` geoms and `lights` lights.
+  ViewBuilder(std::size_t geoms, std::size_t lights);
+  const View& build(const DrawnScene& scene, const double position[3], const double rotation[9],
+                    const PixelGrid& grid);
+
   const View& view() const { return view_; }
   void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // tiles of the last view built
   // Without markers.
@@ -67,7 +100,17 @@ class ViewBuilder {
   int first_marker() const { return static_cast<int>(unsorted_.size() - options_.markers); }
   const MeshSurface* soft_surface(int index, const MeshSurface& shared, const float* normals);
   void set_surface(const RayGeom& source, const float* rgba, const Material* material,
-                   ViewGeom& g) const;
+                   const Texture* texture, ViewGeom& g) const;
+  // shape(g) sets the fields that depend on the kind of object.
+  template <class SetShape>
+  void add_shape(const RayGeom& source, int id, const float* rgba, const Material* material,
+                 const double position[3], const double rotation[9], SetShape shape);
+  void sort_geoms(const double rotation[9]);
+  // Whether the geom ends the search for the mirror. If it reflects, build(p, r) must return the
+  // view from the mirrored camera pose.
+  template <class Build>
+  bool ends_mirror_search(const RayGeom& geom, int id, float alpha, float reflectance,
+                          const double position[3], const double rotation[9], Build build);
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
                   std::span<const Marker> markers, const double position[3],
                   const double rotation[9]);
@@ -76,8 +119,10 @@ class ViewBuilder {
                const double rotation[9]);
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
                   const double rotation[9]);
+  static void place_light(const double light_position[3], const double direction[3],
+                          const double position[3], const double rotation[9], ViewLight& light);
 
-  const SurfaceAssets* assets_;
+  const SurfaceAssets* assets_ = nullptr;
   ViewOptions options_;
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
@@ -88,6 +133,7 @@ class ViewBuilder {
   std::vector<int> index_of_id_;
   // By flex part, then by skin, with the world's normals.
   std::vector<MeshSurface> soft_surfaces_;
+  bool projected_ = false;                 // DrawnScene::projected_textures
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that is not shown: the mirror itself
   bool own_headlight_ = true;  // otherwise headlight_, the viewing direction of the real camera

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bindings of images of abstract scenes. python/mjsense/renderer.py defines the public class.
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+
+#include <bit>
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include "mjsense/core/error.h"
+#include "mjsense/render/abstract/scene_renderer.h"
+#include "python/bindings/bindings.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+using Array = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
+
+NamedArrays named_arrays(const nb::dict& arrays) {
+  NamedArrays out;
+  for (auto [key, value] : arrays) {
+    const auto name = nb::cast<std::string>(key);
+    Array array;
+    if (!nb::try_cast<Array>(value, array))
+      throw ValueError("the model's field '" + name + "' is not a contiguous array");
+    NamedArray& named = out[name];
+    named.data = const_cast<void*>(static_cast<const void*>(array.data()));
+    for (std::size_t i = 0; i < array.ndim(); ++i)
+      named.shape.push_back(static_cast<std::int64_t>(array.shape(i)));
+    const nb::dlpack::dtype type = array.dtype();
+    const auto code = static_cast<nb::dlpack::dtype_code>(type.code);
+    named.kind = code == nb::dlpack::dtype_code::Float  ? 'f'
+                 : code == nb::dlpack::dtype_code::Int  ? 'i'
+                 : code == nb::dlpack::dtype_code::UInt ? 'u'
+                                                        : 'b';
+    named.bytes = type.bits / 8;
+  }
+  return out;
+}
+
+// {field: (offset, bytes)}
+StructLayout layout_of(const nb::dict& fields) {
+  StructLayout out;
+  for (auto [key, value] : fields) {
+    const auto place = nb::cast<nb::tuple>(value);
+    out[nb::cast<std::string>(key)] = {nb::cast<std::ptrdiff_t>(place[0]),
+                                       nb::cast<std::size_t>(place[1])};
+  }
+  return out;
+}
+
+template <class T>
+void bind_soft(const NamedArrays& arrays, const char* name, const T*& out) {
+  const auto found = arrays.find(name);
+  if (found == arrays.end()) throw ValueError(std::string("MjvScene has no field '") + name + "'");
+  if (found->second.bytes != static_cast<int>(sizeof(T)))
+    throw ValueError(std::string("MjvScene.") + name + " has elements of " +
+                     std::to_string(found->second.bytes) + " bytes");
+  out = static_cast<const T*>(found->second.data);
+}
+
+SoftArrays soft_arrays(const nb::dict& fields) {
+  const NamedArrays arrays = named_arrays(fields);
+  SoftArrays soft;
+#define MJSENSE_SOFT(name) bind_soft(arrays, #name, soft.name)
+  MJSENSE_SOFT(flexedgeadr);
+  MJSENSE_SOFT(flexedgenum);
+  MJSENSE_SOFT(flexedge);
+  MJSENSE_SOFT(flexvertadr);
+  MJSENSE_SOFT(flexvertnum);
+  MJSENSE_SOFT(flexfaceadr);
+  MJSENSE_SOFT(flexfaceused);
+  MJSENSE_SOFT(flexvert);
+  MJSENSE_SOFT(flexface);
+  MJSENSE_SOFT(flexnormal);
+  MJSENSE_SOFT(flextexcoord);
+  MJSENSE_SOFT(skinfacenum);
+  MJSENSE_SOFT(skinvertadr);
+  MJSENSE_SOFT(skinvertnum);
+  MJSENSE_SOFT(skinvert);
+  MJSENSE_SOFT(skinnormal);
+#undef MJSENSE_SOFT
+  return soft;
+}
+
+const char* address(const nb::handle& value) {
+  return reinterpret_cast<const char*>(nb::cast<std::uintptr_t>(value));
+}
+
+SceneMemory memory_of(const nb::dict& scene) {
+  SceneMemory m{};
+  m.geoms = address(scene["geoms"]);
+  m.geom_stride = nb::cast<std::ptrdiff_t>(scene["geom_stride"]);
+  m.lights = address(scene["lights"]);
+  m.light_stride = nb::cast<std::ptrdiff_t>(scene["light_stride"]);
+  m.cameras[0] = address(scene["left_camera"]);
+  m.cameras[1] = address(scene["right_camera"]);
+  return m;
+}
+
+// A renderer and the memory of the scene that it draws.
+struct BoundRenderer {
+  SceneRenderer renderer;
+  SceneMemory memory;
+  std::mutex mutex;  // held while rendering
+
+  BoundRenderer(const nb::dict& model, const nb::dict& settings, const nb::dict& layouts,
+                const nb::dict& scene, const nb::dict& soft)
+      : renderer(named_arrays(model), settings_of(settings),
+                 StructReader::geoms(layout_of(nb::cast<nb::dict>(layouts["geom"]))),
+                 StructReader::lights(layout_of(nb::cast<nb::dict>(layouts["light"]))),
+                 StructReader::cameras(layout_of(nb::cast<nb::dict>(layouts["camera"]))),
+                 soft_arrays(soft)),
+        memory(memory_of(scene)) {}
+
+  static SceneSettings settings_of(const nb::dict& from) {
+    SceneSettings out;
+    out.samples = nb::cast<int>(from["samples"]);
+    out.shadows = nb::cast<bool>(from["shadows"]);
+    out.haze_width = nb::cast<float>(from["haze"]);
+    const auto rgb = nb::cast<nb::tuple>(from["haze_rgb"]);
+    for (int i = 0; i < 3; ++i) out.haze_rgb[i] = nb::cast<float>(rgb[i]);
+    out.line_width = nb::cast<float>(from["line_width"]);
+    out.projected_textures = nb::cast<bool>(from["projected_textures"]);
+    return out;
+  }
+
+  void render(int num_geoms, int num_lights, nb::tuple flags, int width, int height,
+              std::uintptr_t rgb, std::uintptr_t depth, std::uintptr_t segmentation) {
+    SceneMemory scene = memory;
+    scene.num_geoms = num_geoms;
+    scene.num_lights = num_lights;
+    bool* const all[] = {&scene.shadow,        &scene.reflection, &scene.skybox,   &scene.haze,
+                         &scene.flex_vertices, &scene.flex_edges, &scene.flex_skin};
+    for (std::size_t i = 0; i < std::size(all); ++i) *all[i] = nb::cast<bool>(flags[i]);
+    ImageTargets targets;
+    targets.rgb = reinterpret_cast<std::uint8_t*>(rgb);
+    targets.depth = reinterpret_cast<float*>(depth);
+    targets.segmentation = reinterpret_cast<std::int32_t*>(segmentation);
+    const nb::gil_scoped_release release;
+    const std::unique_lock lock(mutex, std::try_to_lock);
+    if (!lock)
+      throw RuntimeError(
+          "Renderer: another thread is rendering with it; use one renderer per thread");
+    renderer.render(scene, width, height, targets);
+  }
+};
+
+}  // namespace
+
+void bind_renderer(nb::module_& m) {
+  nb::class_<BoundRenderer>(m, "SceneRenderer")
+      .def(nb::init<nb::dict, nb::dict, nb::dict, nb::dict, nb::dict>())
+      .def("render", &BoundRenderer::render)
+      .def("reload", [](BoundRenderer& r) { r.renderer.reload(); });
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images of Gymnasium's MuJoCo environments without OpenGL.
+
+    env = mjsense.compat.gymnasium.use(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"))
+    env.reset()
+    env.render()
+
+``use`` works for every environment with a ``MujocoRenderer``: Gymnasium's own, gymnasium-robotics, Meta-World. In a vector environment,
+call it in the function that makes each environment.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer
+
+from mjsense.renderer import Renderer
+
+
+class Viewer(OffScreenViewer):
+    """Gymnasium's offscreen viewer; ``render`` has its arguments and results.
+
+    Depth is 0 at the near plane and 1 at the far plane, as OpenGL stores it, and 1 where nothing is seen. Overlay texts are not drawn.
+    """
+
+    def __init__(
+        self, model: Any, data: Any, width: int, height: int, max_geom: int = 1000, visual_options: dict[int, bool] | None = None
+    ) -> None:
+        # The base class's constructor would make an OpenGL context.
+        self.model, self.data = model, data
+        self._markers: list[dict[str, Any]] = []
+        self._overlays: dict[int, list[str]] = {}
+        self.viewport = mujoco.MjrRect(0, 0, width, height)
+        self.scn = mujoco.MjvScene(model, max(max_geom, 2))
+        self.cam = mujoco.MjvCamera()
+        self.vopt = mujoco.MjvOption()
+        self.pert = mujoco.MjvPerturb()
+        for flag, value in (visual_options or {}).items():
+            self.vopt.flags[flag] = value
+        self._renderer = Renderer.of_scene(model, self.scn, height, width)
+        self._init_camera()
+
+    def make_context_current(self) -> None:
+        pass
+
+    def free(self) -> None:
+        pass
+
+    def close(self) -> None:
+        self._renderer.close()
+
+    def render(self, render_mode: str | None, camera_id: int | None = None, segmentation: bool = False) -> Any:
+        if self._overlays:
+            raise ValueError("mjsense.compat.gymnasium: overlay texts are not drawn; remove the calls of add_overlay()")
+        if camera_id is not None:
+            self.cam.type = mujoco.mjtCamera.mjCAMERA_FREE if camera_id == -1 else mujoco.mjtCamera.mjCAMERA_FIXED
+            self.cam.fixedcamid = camera_id
+        mujoco.mjv_updateCamera(self.model, self.data, self.cam, self.scn)
+        mujoco.mjv_updateScene(self.model, self.data, self.vopt, self.pert, self.cam, mujoco.mjtCatBit.mjCAT_ALL, self.scn)
+        for marker in self._markers:
+            self._add_marker_to_scene(marker)
+        self._markers.clear()
+        color = "segmentation" if segmentation else "rgb"
+        kinds = {"rgb_array": (color,), "depth_array": ("depth",)}.get(str(render_mode), (color, "depth"))
+        images = self._renderer.render_images(kinds)
+        if segmentation and color in images:
+            images[color] = images[color][..., ::-1]  # Gymnasium puts the type first
+        if "depth" in images:
+            images["depth"] = self._depth_buffer(images["depth"])
+        return images[kinds[0]] if len(kinds) == 1 else (images[color], images["depth"])
+
+    def _depth_buffer(self, depth: np.ndarray) -> np.ndarray:
+        camera = self.scn.camera[0]
+        near, far = camera.frustum_near, camera.frustum_far
+        window = depth - near if camera.orthographic else far * (1 - near / depth)
+        return np.clip(window / (far - near), 0, 1).astype(np.float32)
+
+
+def use(env: Any) -> Any:
+    """Makes the environment's ``MujocoRenderer`` draw with mjsense, for all render modes but ``human``; returns `env`."""
+    inner = env.unwrapped
+    inner = getattr(inner, "robot_env", inner)  # gymnasium-robotics' kitchen
+    renderer = getattr(inner, "mujoco_renderer", None)
+    if not isinstance(renderer, MujocoRenderer):
+        raise TypeError(
+            f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer"
+        )
+    get_viewer = renderer._get_viewer
+
+    def viewer_of(render_mode: str | None) -> Any:
+        if render_mode not in ("rgb_array", "depth_array", "rgbd_tuple"):
+            return get_viewer(render_mode)
+        viewer = renderer._viewers.get("mjsense")
+        if viewer is None:
+            viewer = Viewer(renderer.model, renderer.data, renderer.width, renderer.height, renderer.max_geom, renderer._vopt)
+            renderer.viewer = renderer._viewers["mjsense"] = viewer
+            renderer._set_cam_config()
+        renderer.viewer = viewer
+        return viewer
+
+    renderer._get_viewer = viewer_of
+    return env

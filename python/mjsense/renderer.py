@@ -1,0 +1,428 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjsense.Renderer``: the interface of ``mujoco.Renderer``, without OpenGL."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from concurrent.futures import ThreadPoolExecutor
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _core, _scene_layout
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import mujoco
+
+# fmt: off
+_MODEL_ARRAYS = (
+    "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_normaladr", "mesh_normalnum", "mesh_texcoordadr",
+    "mesh_texcoordnum", "mesh_graphadr", "mesh_vert", "mesh_normal", "mesh_texcoord", "mesh_face", "mesh_facenormal", "mesh_facetexcoord",
+    "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
+    "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
+    "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
+)
+"""The model's arrays that an image depends on and that are not in the abstract scene."""
+
+_SCENE_ARRAYS = (
+    "flexedgeadr", "flexedgenum", "flexedge", "flexvertadr", "flexvertnum", "flexfaceadr", "flexfaceused", "flexvert", "flexface",
+    "flexnormal", "flextexcoord", "skinfacenum", "skinvertadr", "skinvertnum", "skinvert", "skinnormal",
+)
+
+# fmt: on
+
+_SIZES = (
+    "nq",
+    "nv",
+    "nbody",
+    "ngeom",
+    "nsite",
+    "ncam",
+    "nlight",
+    "nmesh",
+    "nskin",
+    "nflex",
+    "nflexvert",
+    "ntendon",
+    "nu",
+    "ntex",
+    "nmat",
+)
+
+# Flags of renderer.scene.flags (mjtRndFlag) by their effect here.
+_REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_FOG", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
+_REFUSED_IF_CLEAR = ("mjRND_CULL_FACE",)
+
+
+_KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "rgb": (np.uint8, (3,)),
+    "depth": (np.float32, ()),
+    "segmentation": (np.int32, (2,)),
+}
+"""Element type and channels by kind of image."""
+
+
+class _Pool:
+    """Threads of this process, with a renderer for each."""
+
+    def __init__(self, make: Callable[[], Renderer]) -> None:
+        self.process = os.getpid()
+        count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self.threads = ThreadPoolExecutor(count)
+        self.free: SimpleQueue[Renderer] = SimpleQueue()
+        self._make = make
+
+    def take(self) -> Renderer:
+        try:
+            return self.free.get_nowait()
+        except Empty:
+            return self._make()
+
+
+class Renderer:
+    """Renders MuJoCo scenes on the CPU, with the interface of ``mujoco.Renderer`` and without OpenGL.
+
+    Works with models and data of the MuJoCo that the environment has installed. MuJoCo itself builds the scene
+    (``mujoco.mjv_updateScene``), so that cameras, ``scene_option`` and decoration geoms mean what they mean there; the image is
+    ray-cast.
+
+        renderer = mjsense.Renderer(model, height=240, width=320)
+        renderer.update_scene(data, camera="front")
+        image = renderer.render()  # uint8 [240, 320, 3]
+
+    Args:
+        model: the ``mujoco.MjModel``.
+        height: height of the images in pixels; not limited by ``offheight``.
+        width: width of the images in pixels; not limited by ``offwidth``.
+        max_geom: maximum number of geoms in the scene, decoration included.
+        font_scale: accepted for compatibility; labels are not drawn.
+
+    Raises:
+        ValueError: for a height or width below 1.
+        TypeError: if `model` is not an ``MjModel``.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, height: int = 240, width: int = 320, max_geom: int = 10000, font_scale: Any = 150
+    ) -> None:
+        import mujoco
+
+        self._native: Any = None
+        self._batch: _Pool | None = None
+        if not isinstance(model, mujoco.MjModel):
+            raise TypeError(f"Renderer: model must be a mujoco.MjModel, got {type(model).__name__}")
+        for name, value in (("height", height), ("width", width)):
+            if int(value) < 1:
+                raise ValueError(f"Renderer: {name} must be at least 1, got {value}")
+        self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
+
+    @classmethod
+    def of_scene(cls, model: mujoco.MjModel, scene: mujoco.MjvScene, height: int, width: int) -> Renderer:
+        """A renderer of a scene that the caller updates with ``mujoco.mjv_updateScene``; ``render()`` draws its current contents.
+
+        `scene` must have room for at least two geoms.
+        """
+        made = cls.__new__(cls)
+        made._native = made._batch = None
+        made._set_up(model, height, width, scene)
+        return made
+
+    def _set_up(self, model: mujoco.MjModel, height: int, width: int, scene: mujoco.MjvScene) -> None:
+        import mujoco
+
+        self._mujoco = mujoco
+        self._model = model
+        self._height, self._width = int(height), int(width)
+        self._scene = scene
+        self._scene_option = mujoco.MjvOption()
+        self._depth = self._segmentation = False
+        self._sizes = self._sizes_of(model)
+        self._native = self._make_native()
+
+    def _make_native(self) -> Any:
+        model, scene = self._model, self._scene
+        arrays = {name: getattr(model, name) for name in _MODEL_ARRAYS if hasattr(model, name)}
+        if arrays["tex_adr"].dtype != np.int64:
+            arrays["tex_adr"] = arrays["tex_adr"].astype(np.int64)
+        soft = {name: getattr(scene, name) for name in _SCENE_ARRAYS}
+        self._alive = (arrays, soft)  # the native renderer reads their memory
+        quality, haze = model.vis.quality, model.vis.rgba.haze
+        settings = {
+            "samples": max(1, int(quality.offsamples)),
+            "shadows": bool(quality.shadowsize > 0),
+            "haze": float(model.vis.map.haze),
+            "haze_rgb": tuple(float(x) for x in haze[:3]),
+            "line_width": float(model.vis.global_.linewidth),
+            "projected_textures": int(self._mujoco.mj_versionString().split(".")[0]) < 4,
+        }
+        geoms, lights, cameras = scene.geoms, scene.lights, scene.camera
+        where = {
+            name: _scene_layout.address(value)
+            for name, value in (
+                ("geoms", geoms[0].pos),
+                ("lights", lights[0].pos),
+                ("left_camera", cameras[0].pos),
+                ("right_camera", cameras[1].pos),
+            )
+        }
+        where["geom_stride"] = _scene_layout.address(geoms[1].pos) - where["geoms"]
+        where["light_stride"] = _scene_layout.address(lights[1].pos) - where["lights"]
+        return _core.SceneRenderer(arrays, settings, _scene_layout.layouts(), where, soft)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        return self._model
+
+    @property
+    def scene(self) -> mujoco.MjvScene:
+        """The abstract scene of the last ``update_scene``. Geoms that are added to it, or edited, appear in the image."""
+        return self._scene
+
+    @property
+    def height(self) -> int:
+        return self._height
+
+    @property
+    def width(self) -> int:
+        return self._width
+
+    def enable_depth_rendering(self) -> None:
+        self._segmentation = False
+        self._depth = True
+
+    def disable_depth_rendering(self) -> None:
+        self._depth = False
+
+    def enable_segmentation_rendering(self) -> None:
+        self._segmentation = True
+        self._depth = False
+
+    def disable_segmentation_rendering(self) -> None:
+        self._segmentation = False
+
+    @staticmethod
+    def _sizes_of(model: mujoco.MjModel) -> tuple[int, ...]:
+        return tuple(getattr(model, name) for name in _SIZES)
+
+    def _check_open(self) -> None:
+        if self._native is None:
+            raise RuntimeError("Renderer: used after close(); make a new one")
+
+    def _check_sizes(self, model: mujoco.MjModel, what: str) -> None:
+        sizes = self._sizes_of(model)
+        if sizes == self._sizes:
+            return
+        name, found, expected = next(row for row in zip(_SIZES, sizes, self._sizes) if row[1] != row[2])
+        raise ValueError(f"Renderer: {what}: {name} is {found}, but the renderer's model had {expected}")
+
+    def _camera(self, camera: Any) -> mujoco.MjvCamera:
+        mujoco, model = self._mujoco, self._model
+        if isinstance(camera, mujoco.MjvCamera):
+            return camera
+        if isinstance(camera, str):
+            id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA.value, camera)
+            if id == -1:
+                names = [
+                    mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_CAMERA.value, i) or f"(camera {i}, unnamed)"
+                    for i in range(model.ncam)
+                ]
+                near = difflib.get_close_matches(camera, names, n=3, cutoff=0.0)
+                raise ValueError(
+                    f'The camera "{camera}" does not exist. '
+                    + (f"Nearest: {', '.join(near)}." if near else "The model has no cameras.")
+                )
+        else:
+            id = int(camera)
+        if not -1 <= id < model.ncam:
+            raise ValueError(f"The camera id {id} is out of range [-1, {model.ncam}).")
+        out = mujoco.MjvCamera()
+        out.fixedcamid = id
+        if id == -1:
+            out.type = mujoco.mjtCamera.mjCAMERA_FREE
+            mujoco.mjv_defaultFreeCamera(model, out)
+        else:
+            out.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        return out
+
+    def update_scene(
+        self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera = -1, scene_option: mujoco.MjvOption | None = None
+    ) -> None:
+        """Updates ``scene`` from `data`.
+
+        Args:
+            data: data of the renderer's model.
+            camera: id or name of a camera of the model, -1 for the default free camera, or an ``MjvCamera`` (free, fixed or tracking).
+            scene_option: visibility of groups and elements; None for MuJoCo's defaults.
+
+        Raises:
+            ValueError: if the camera does not exist, or `data` belongs to a model of another size.
+            RuntimeError: after ``close()``.
+        """
+        self._check_open()
+        self._check_sizes(self._model, "the model has changed")
+        owner = getattr(data, "model", self._model)
+        if owner is not self._model:
+            self._check_sizes(owner, "`data` belongs to another model")
+        mujoco, view = self._mujoco, self._camera(camera)
+        # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.
+        mujoco.mjv_updateCamera(self._model, data, view, self._scene)
+        mujoco.mjv_updateScene(
+            self._model, data, scene_option or self._scene_option, None, view, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene
+        )
+
+    def render(self, *, out: np.ndarray | None = None) -> np.ndarray:
+        """Renders the scene.
+
+        Args:
+            out: array for the image, of the shape below; its type is cast to if necessary.
+
+        Returns:
+            A new array, or `out`: rgb uint8 [H, W, 3]; with depth rendering float32 [H, W], distance to the camera plane in m, the far
+            plane's where nothing is seen; with segmentation rendering int32 [H, W, 2], object id and type, (-1, -1) where nothing is seen.
+
+        Raises:
+            RuntimeError: after ``close()``.
+            ValueError: if the shape of `out` is wrong, if a pose is not finite, or if the scene contains something that cannot be drawn.
+        """
+        self._check_open()
+        kind = "depth" if self._depth else "segmentation" if self._segmentation else "rgb"
+        dtype, channels = _KINDS[kind]
+        shape = (self._height, self._width, *channels)
+        if out is not None and out.shape != shape:
+            raise ValueError(f"Expected `out.shape == {shape}` for {kind} rendering. Got `out.shape={out.shape}` instead.")
+        direct = out is not None and out.dtype == dtype and out.flags.c_contiguous and out.flags.writeable
+        image = out if out is not None and direct else np.empty(shape, dtype)
+        self._draw(**{kind: image})
+        if out is None or direct:
+            return image
+        np.copyto(out, image, casting="unsafe")
+        return out
+
+    def render_images(self, kinds: Sequence[str] = ("rgb", "depth", "segmentation")) -> dict[str, np.ndarray]:
+        """Renders several images of the scene at once: ``rgb``, ``depth`` and ``segmentation``, with the shapes and types of ``render()``.
+
+        Returns:
+            New arrays by kind.
+        """
+        self._check_open()
+        images = {kind: self._empty(kind) for kind in kinds}
+        self._draw(**images)
+        return images
+
+    def render_batch(
+        self,
+        datas: Sequence[mujoco.MjData],
+        cameras: Any = -1,
+        scene_option: mujoco.MjvOption | None = None,
+        *,
+        out: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Renders one rgb image of each `data` on all CPU cores. ``scene`` does not change.
+
+        Args:
+            datas: data of the renderer's model.
+            cameras: a camera as for ``update_scene``, or a sequence with one for each data.
+            scene_option: as for ``update_scene``.
+            out: uint8 [B, H, W, 3] array for the images.
+
+        Returns:
+            uint8 [B, H, W, 3]: `out` or a new array.
+        """
+        self._check_open()
+        datas = list(datas)
+        each = list(cameras) if isinstance(cameras, (list, tuple, np.ndarray)) else [cameras] * len(datas)
+        if len(each) != len(datas):
+            raise ValueError(f"Renderer.render_batch: got {len(each)} cameras for {len(datas)} datas")
+        shape = (len(datas), self._height, self._width, 3)
+        images = np.empty(shape, np.uint8) if out is None else out
+        if images.shape != shape or images.dtype != np.uint8 or not images.flags.c_contiguous or not images.flags.writeable:
+            raise ValueError(f"Renderer.render_batch: out must be a contiguous, writable uint8 array of shape {shape}")
+        pool = self._pool()
+
+        def draw(index: int) -> None:
+            renderer = pool.take()
+            try:
+                renderer.update_scene(datas[index], each[index], scene_option)
+                renderer._draw(rgb=images[index])
+            finally:
+                pool.free.put(renderer)
+
+        for _ in pool.threads.map(draw, range(len(datas))):
+            pass
+        return images
+
+    def _pool(self) -> _Pool:
+        if self._batch is None or self._batch.process != os.getpid():  # threads do not survive a fork
+            self._batch = _Pool(lambda: Renderer(self._model, self._height, self._width, self._scene.maxgeom))
+        return self._batch
+
+    def reload(self) -> None:
+        """Makes the next image show the current textures, height fields and meshes of the model.
+
+        Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a large one
+        may be missed.
+        """
+        self._check_open()
+        self._native.reload()
+
+    def _empty(self, kind: str) -> np.ndarray:
+        if kind not in _KINDS:
+            raise ValueError(f"Renderer: unknown kind of image '{kind}'; expected one of {', '.join(_KINDS)}")
+        dtype, channels = _KINDS[kind]
+        return np.empty((self._height, self._width, *channels), dtype)
+
+    def _draw(
+        self, rgb: np.ndarray | None = None, depth: np.ndarray | None = None, segmentation: np.ndarray | None = None
+    ) -> None:
+        scene, flag = self._scene, self._mujoco.mjtRndFlag
+        flags = scene.flags
+        if rgb is not None:
+            self._check_scene()
+        shown = [bool(flags[i]) for i in (flag.mjRND_SHADOW, flag.mjRND_REFLECTION, flag.mjRND_SKYBOX, flag.mjRND_HAZE)]
+        shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
+        images = [0 if image is None else _scene_layout.address(image) for image in (rgb, depth, segmentation)]
+        try:
+            self._native.render(scene.ngeom, scene.nlight, tuple(shown), self._width, self._height, *images)
+        except ValueError as error:
+            raise ValueError(f"Renderer: {self._with_names(str(error))}") from None
+
+    def _with_names(self, message: str) -> str:
+        """The message with names instead of MuJoCo's object types and ids."""
+
+        def name(found: re.Match[str]) -> str:
+            kind, id = int(found[1]), int(found[2])
+            if id < 0 or not (text := self._mujoco.mju_type2Str(kind)):
+                return "(decoration)"
+            return f"({text} '{self._mujoco.mj_id2name(self._model, kind, id) or ''}', id {id})"
+
+        return re.sub(r"\(object type (\d+), id (-?\d+)\)", name, message)
+
+    def _check_scene(self) -> None:
+        """Raises ValueError for settings of the scene that change an image and are not supported."""
+        scene = self._scene
+        for names, refused in ((_REFUSED_IF_SET, 1), (_REFUSED_IF_CLEAR, 0)):
+            for name in names:
+                index = getattr(self._mujoco.mjtRndFlag, name, None)
+                if index is not None and bool(scene.flags[index]) == refused:
+                    raise ValueError(f"Renderer: scene.flags[{name}] = {refused} is not supported")
+        for name in ("stereo", "enabletransform", "framewidth"):
+            if getattr(scene, name):
+                raise ValueError(f"Renderer: scene.{name} = {getattr(scene, name)} is not supported")
+
+    def close(self) -> None:
+        """Frees the renderer's memory. The renderer is also a context manager that does this at its end."""
+        self._native = None
+        if self._batch is not None and self._batch.process == os.getpid():
+            self._batch.threads.shutdown()
+        self._batch = None
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Images of an abstract scene (mjvScene) that any version of MuJoCo has filled.
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "mjsense/rays/soft_mesh.h"
+#include "mjsense/render/abstract/abstract_scene.h"
+#include "mjsense/render/abstract/decoration_shapes.h"
+#include "mjsense/render/abstract/model_arrays.h"
+#include "mjsense/render/abstract/scene_assets.h"
+#include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/render/view/view_builder.h"
+
+namespace mjsense {
+
+// Values of the model that MuJoCo's renderers read when they are made.
+struct SceneSettings {
+  int samples = 1;  // per pixel of rgb
+  bool shadows = true;
+  float haze_width = 0, haze_rgb[3] = {};
+  float line_width = 1;             // pixels
+  bool projected_textures = false;  // DrawnScene::projected_textures
+};
+
+// Arrays of an mjvScene that hold flexes and skins; null if there are none.
+struct SoftArrays {
+  const int *flexedgeadr = nullptr, *flexedgenum = nullptr, *flexedge = nullptr;
+  const int *flexvertadr = nullptr, *flexvertnum = nullptr;
+  const int *flexfaceadr = nullptr, *flexfaceused = nullptr;
+  const float *flexvert = nullptr, *flexface = nullptr, *flexnormal = nullptr,
+              *flextexcoord = nullptr;
+  const int *skinfacenum = nullptr, *skinvertadr = nullptr, *skinvertnum = nullptr;
+  const float *skinvert = nullptr, *skinnormal = nullptr;
+};
+
+// The memory of an mjvScene. Addresses are those of the structs' reference fields.
+struct SceneMemory {
+  const char* geoms;
+  std::ptrdiff_t geom_stride;
+  int num_geoms;
+  const char* lights;
+  std::ptrdiff_t light_stride;
+  int num_lights;
+  const char* cameras[2];
+  bool shadow, reflection, skybox, haze;  // flags mjRND_*
+  bool flex_vertices, flex_edges, flex_skin;
+};
+
+class SceneRenderer {
+ public:
+  // `arrays` must stay valid as long as the renderer.
+  SceneRenderer(const NamedArrays& arrays, const SceneSettings& settings, StructReader geoms,
+                StructReader lights, StructReader cameras, const SoftArrays& soft);
+  ~SceneRenderer();
+
+  // Renders the scene's current contents. Throws ValueError for a geom or camera whose pose is not
+  // finite and for what cannot be drawn.
+  void render(const SceneMemory& scene, int width, int height, const ImageTargets& targets);
+
+  // Makes the next image show the current contents of meshes, height fields and textures.
+  void reload() { assets_.reload(); }
+
+ private:
+  struct Soft;
+  struct Decoration;
+
+  void read(const SceneMemory& scene, bool all);
+  void add(const AbstractGeom& geom, const SceneMemory& scene);
+  void add_triangles(DrawnGeom drawn, ShapeTriangles triangles);
+  void add_lines(const AbstractGeom& geom, DrawnGeom drawn);
+  void add_flex(const AbstractGeom& geom, DrawnGeom drawn, const SceneMemory& scene);
+  void add_skin(const AbstractGeom& geom, DrawnGeom drawn);
+  void read_lights(const SceneMemory& scene);
+  void read_camera(const SceneMemory& scene, int width, int height);
+
+  std::unique_ptr<mjModel> model_;
+  SceneSettings settings_;
+  StructReader geom_reader_, light_reader_, camera_reader_;
+  SoftArrays soft_;
+  SceneAssets assets_;
+  std::shared_ptr<RTCDeviceTy> device_;
+  // The current scene.
+  std::vector<DrawnGeom> drawn_;
+  std::vector<std::pair<int, int>> segments_;  // object id and type by segmentation id
+  std::vector<ViewLight> lights_;
+  double position_[3], rotation_[9];
+  PixelGrid grid_;
+  float near_ = 0, far_ = 0;
+  std::map<int, std::unique_ptr<Soft>> skins_;
+  std::map<std::pair<int, int>, std::unique_ptr<Soft>> flexes_;  // by flex and first face
+  std::vector<std::unique_ptr<Decoration>> decorations_;
+  // Working memory for up to `capacity_` geoms.
+  std::size_t capacity_ = 0;
+  std::unique_ptr<ViewBuilder> builder_;
+  std::unique_ptr<TileMemory> memory_;
+  RenderTiles tiles_ = best_render_tiles();
+};
+
+}  // namespace mjsense
