@@ -29,6 +29,6 @@ foreach(source IN LISTS targets)
 endforeach()
 
 # The recorder without physics, with the same sanitizers. Its readers run in a separate process. Used by tests/faults.
-add_executable(record_fake EXCLUDE_FROM_ALL tests/record/fake_writer.cc src/mjsense/record/testing/fake_suite.cc src/mjsense/hdf5/in_child.cc)
+add_executable(record_fake EXCLUDE_FROM_ALL tests/record/fake_writer.cc src/mjsense/record/testing/fake_suite.cc src/mjsense/hdf5/child_reader.cc)
 target_link_libraries(record_fake PRIVATE mjsense_fuzzed)
 add_dependencies(fuzz record_fake)

@@ -8,22 +8,22 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/cameras/frozen_cameras.h
   mjsense/cameras/load_cameras.h
   mjsense/core/array.h
-  mjsense/core/checks.h
+  mjsense/core/config_checks.h
   mjsense/core/cpu.h
   mjsense/core/data_class.h
   mjsense/core/debug_shapes.h
   mjsense/core/error.h
   mjsense/core/fields.h
   mjsense/core/json.h
-  mjsense/core/parallel.h
   mjsense/core/path_field.h
   mjsense/core/pose.h
   mjsense/core/rng.h
   mjsense/core/row_error.h
   mjsense/core/sensor.h
   mjsense/core/sensor_fields.h
-  mjsense/core/shared.h
-  mjsense/core/spec.h
+  mjsense/core/sensor_spec.h
+  mjsense/core/shared_cache.h
+  mjsense/core/thread_pool.h
   mjsense/effects/all_effects.h
   mjsense/effects/calibration.h
   mjsense/effects/chain.h
@@ -48,8 +48,8 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/observe/pose_sensor.h
   mjsense/observe/shared_field.h
   mjsense/observe/suite.h
-  mjsense/policies/planner/follower.h
   mjsense/policies/planner/plan.h
+  mjsense/policies/planner/plan_follower.h
   mjsense/policies/planner/task_planner.h
   mjsense/rays/packet.h
   mjsense/rays/ray_geom.h
@@ -57,7 +57,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/rays/ray_world.h
   mjsense/record/recorder.h
   mjsense/record/recording.h
-  mjsense/replay/check.h
+  mjsense/replay/recording_tools.h
   mjsense/robots/action.h
   mjsense/robots/base_placement.h
   mjsense/robots/controllers/controller.h
@@ -76,16 +76,16 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/rollout/record_job.h
   mjsense/rollout/registry.h
   mjsense/rollout/rollout.h
-  mjsense/scene/daylight.h
+  mjsense/scene/default_lighting.h
   mjsense/scene/entity.h
   mjsense/scene/model_sensors/model_sensor.h
-  mjsense/scene/options.h
+  mjsense/scene/physics_options.h
   mjsense/scene/scene.h
   mjsense/scene/terrain.h
   mjsense/scenes/episode_scene.h
-  mjsense/scenes/layout.h
   mjsense/scenes/load_scene.h
   mjsense/scenes/object_meshes.h
+  mjsense/scenes/object_placement.h
   mjsense/scenes/object_sizes.h
   mjsense/scenes/object_task.h
   mjsense/scenes/scene_file.h

@@ -21,7 +21,7 @@ FOLDERS = ("src", "python/bindings", "tests", "examples/cpp", "packaging")
 # Alternative implementations: a build contains one file of each pair.
 ALTERNATIVES = (
     {"src/mjsense/render/opengl/gl_absent.cc", "src/mjsense/render/opengl/gl_renderer.cc"},
-    {"src/mjsense/hdf5/in_child.cc", "tests/fuzz/in_process.cc"},
+    {"src/mjsense/hdf5/child_reader.cc", "tests/fuzz/in_process.cc"},
 )
 # Functions that each program defines once.
 ENTRY_POINTS = ("main(", "LLVMFuzzerTestOneInput(")

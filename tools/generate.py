@@ -109,7 +109,7 @@ SIGNATURES = {
 ENTRY_HEADERS = [
     "cameras/frozen_cameras.h",
     "cameras/load_cameras.h",
-    "core/checks.h",
+    "core/config_checks.h",
     "effects/effect_sensor.h",
     "effects/pipeline.h",
     "episode/object_sensors.h",
@@ -119,7 +119,7 @@ ENTRY_HEADERS = [
     "observe/pose_sensor.h",
     "observe/shared_field.h",
     "policies/planner/task_planner.h",
-    "replay/check.h",
+    "replay/recording_tools.h",
     "rollout/planners.h",
     "rollout/record_job.h",
     "scenes/load_scene.h",

@@ -6,8 +6,8 @@
 #include <nanobind/stl/vector.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/core/spec.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/core/sensor_spec.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
@@ -61,9 +61,9 @@ void bind_core(nb::module_& m) {
 
   m.def(
       "unknown_name",
-      [](const std::string& place, const std::string& kind, const std::string& name,
+      [](const std::string& context, const std::string& kind, const std::string& name,
          const std::vector<std::string>& names) {
-        return place + ": no " + kind + " named '" + name + "'" + suggest(name, names);
+        return context + ": no " + kind + " named '" + name + "'" + suggest(name, names);
       },
       nb::arg("place"), nb::arg("kind"), nb::arg("name"), nb::arg("names"),
       "Error text for a name that does not exist, with the nearest names.");

@@ -20,7 +20,7 @@ class DataCopies final : public Sensor {
   void compute(const World& world) override { mj_copyData(to_[world.id], world.model, world.data); }
 
  private:
-  Held datas_;
+  PyHandle datas_;
   std::vector<mjData*> to_;
 };
 

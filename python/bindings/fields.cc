@@ -15,12 +15,12 @@ namespace {
 using Kind = FieldType::Kind;
 
 // For example "ContactSensorCfg 'feet'".
-std::string place_of(nb::handle config) {
+std::string context_of(nb::handle config) {
   if (nb::isinstance<nb::dict>(config)) return "options";
-  std::string place = nb::cast<std::string>(config.type().attr("__name__"));
+  std::string context = nb::cast<std::string>(config.type().attr("__name__"));
   nb::object name = nb::getattr(config, "name", nb::none());
-  if (nb::isinstance<nb::str>(name)) place += " '" + nb::cast<std::string>(name) + "'";
-  return place;
+  if (nb::isinstance<nb::str>(name)) context += " '" + nb::cast<std::string>(name) + "'";
+  return context;
 }
 
 std::string kind_of(nb::handle config) {
@@ -34,7 +34,7 @@ struct Reader {
   const FieldDecl& field;
 
   [[noreturn]] void fail(nb::handle value, const FieldType& type) const {
-    const std::string text = place_of(config) + ": " + field.name + " must be " + expected(type) +
+    const std::string text = context_of(config) + ": " + field.name + " must be " + expected(type) +
                              ", not " + nb::cast<std::string>(nb::repr(value));
     throw nb::type_error(text.c_str());
   }
@@ -71,10 +71,10 @@ struct Reader {
         *static_cast<std::filesystem::path*>(out) = nb::cast<std::string>(text);
         return;
       }
-      case Kind::kWord: {
+      case Kind::kEnum: {
         std::string text;
         scalar(value, type, text);
-        set_integer(type, out, word_index(text, type.words, place_of(config), field.name));
+        set_integer(type, out, enum_index(text, type.words, context_of(config), field.name));
         return;
       }
       case Kind::kOptional:
@@ -152,7 +152,7 @@ void read_struct(nb::handle config, const StructDecl& decl, void* out) {
   for (const FieldDecl& field : decl.fields) {
     if (!field.type) continue;
     if (!nb::hasattr(config, field.name)) {
-      const std::string text = place_of(config) + " has no '" + field.name + "'";
+      const std::string text = context_of(config) + " has no '" + field.name + "'";
       throw nb::type_error(text.c_str());
     }
     nb::object value = nb::getattr(config, field.name);

@@ -7,7 +7,7 @@
 // Threads: every call releases the GIL and locks the simulation's mutex, so Python threads use it
 // one at a time. The mutex is recursive, because a sensor written in Python reads other sensors
 // while it is computed. No thread waits for it while holding the GIL.
-// Processes: the copy in a forked process throws (birthplace.h).
+// Processes: the copy in a forked process throws (process_guard.h).
 
 #include <nanobind/nanobind.h>
 
@@ -19,23 +19,23 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/sim/simulation.h"
-#include "python/bindings/birthplace.h"
-#include "python/bindings/callbacks.h"
+#include "python/bindings/mujoco_callbacks.h"
 #include "python/bindings/numpy.h"
+#include "python/bindings/process_guard.h"
 #include "python/bindings/python_sensor.h"
 
 namespace mjsense::python {
 
 // Serialises access to a simulation and records whether it is working. All Python objects of one
 // simulation share one instance.
-class Turns {
+class SimulationLock {
  public:
-  bool here() const { return place_.here(); }
+  bool is_current() const { return process_.is_current(); }
   // `what` names the call in the error message if user code calls it while the simulation is
   // working.
   template <class Body>
   void change(std::string_view what, Body&& body) {
-    place_.check("simulation");
+    process_.check("simulation");
     refuse_python_callbacks();
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
@@ -50,7 +50,7 @@ class Turns {
   }
   template <class Body>
   void read(Body&& body) {
-    place_.check("simulation");
+    process_.check("simulation");
     refuse_python_callbacks();
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
@@ -60,7 +60,7 @@ class Turns {
   // For code that runs inside the simulation. Must be called without the GIL.
   template <class Body>
   auto work(Body&& body) {
-    place_.check("simulation");
+    process_.check("simulation");
     refuse_python_callbacks();
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
@@ -73,7 +73,7 @@ class Turns {
     ~Depth() { --depth; }
     int& depth;
   };
-  const Birthplace place_;
+  const ProcessGuard process_;
   std::recursive_mutex mutex_;
   int depth_ = 0;
 };
@@ -84,17 +84,18 @@ class PySimulation {
                std::uint64_t seed) {
     const SimulationCfg cfg{num_worlds, decimation, threads, seed};
     nb::gil_scoped_release unlock;
-    sim_ = make_shared_here<Simulation>(std::move(scene), cfg);
+    sim_ = make_shared_guarded<Simulation>(std::move(scene), cfg);
   }
   // Wraps an existing simulation.
-  explicit PySimulation(std::shared_ptr<Simulation> sim,
-                        std::shared_ptr<Turns> turns = std::make_shared<Turns>())
-      : sim_(std::move(sim)), turns_(std::move(turns)) {}
+  explicit PySimulation(std::shared_ptr<Simulation> sim, std::shared_ptr<SimulationLock> sim_lock =
+                                                             std::make_shared<SimulationLock>())
+      : sim_(std::move(sim)), sim_lock_(std::move(sim_lock)) {}
 
   void close() {
-    if (!turns_->here()) return sim_.reset();  // in a forked process the copy must not be destroyed
+    if (!sim_lock_->is_current())
+      return sim_.reset();  // in a forked process the copy must not be destroyed
     std::shared_ptr<Simulation> last;
-    turns_->change("close", [&] { last = std::move(sim_); });
+    sim_lock_->change("close", [&] { last = std::move(sim_); });
   }
   bool closed() const { return sim_ == nullptr; }
 
@@ -102,7 +103,7 @@ class PySimulation {
   // working.
   template <class Body>
   void change(const char* what, Body&& body) {
-    turns_->change(what, [&] {
+    sim_lock_->change(what, [&] {
       body(open());
       // By index, because a notified sensor may add further ones.
       for (std::size_t i = 0; i < python_.size(); ++i) python_[i]->tell_resets();
@@ -110,7 +111,7 @@ class PySimulation {
   }
   template <class Body>
   void read(Body&& body) {
-    turns_->read([&] { body(open()); });
+    sim_lock_->read([&] { body(open()); });
   }
 
   Simulation& open() const {
@@ -127,7 +128,7 @@ class PySimulation {
 
  private:
   std::shared_ptr<Simulation> sim_;
-  std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
+  std::shared_ptr<SimulationLock> sim_lock_ = std::make_shared<SimulationLock>();
   // These sensors are notified of the resets of their worlds (also of failed worlds), even if they
   // are not computed.
   std::vector<std::shared_ptr<PythonSensor>> python_;

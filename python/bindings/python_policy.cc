@@ -61,7 +61,7 @@ PythonPolicy::PythonPolicy(nb::object policy, std::shared_ptr<PythonHost> host)
     phases_.push_back({"", nb::cast<int>(number)});
   }
   for (std::size_t i = 0; i < phases_.size(); ++i) phases_[i].name = phase_names_[i];
-  as_array_ = Held(nb::module_::import_("numpy").attr("ascontiguousarray"));
+  as_array_ = PyHandle(nb::module_::import_("numpy").attr("ascontiguousarray"));
 }
 
 std::string PythonPolicy::place(const char* method) const {
@@ -105,10 +105,10 @@ void PythonPolicy::observe(Rollout& rollout) {
     nb::object bound =
         policy.attr("_mjs_bind")(host_->simulation(rollout.simulation_ptr()),
                                  suite_streams(rollout), action_layout(task_->robot()));
-    observation_ = Held(nb::object(bound[0]));
-    wanted_ = Held(nb::object(bound[1]));
+    observation_ = PyHandle(nb::object(bound[0]));
+    wanted_ = PyHandle(nb::object(bound[1]));
     wanted_rows_ = nb::cast<nb::ndarray<bool, nb::ndim<1>, nb::c_contig>>(wanted_.get()).data();
-    act_ = Held(policy.attr("act"));
+    act_ = PyHandle(policy.attr("act"));
   });
 }
 

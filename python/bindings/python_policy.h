@@ -9,7 +9,7 @@
 
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
-#include "python/bindings/host.h"
+#include "python/bindings/rollout_host.h"
 
 namespace mjsense {
 class Rollout;
@@ -64,7 +64,7 @@ class PythonPolicy final : public PlannerPolicy {
   void read_phases();
   void fill(int world, Action& action);
 
-  Held policy_;
+  PyHandle policy_;
   std::shared_ptr<PythonHost> host_;
   std::weak_ptr<Simulation> simulation_;
   Task* task_ = nullptr;
@@ -72,7 +72,7 @@ class PythonPolicy final : public PlannerPolicy {
   std::vector<std::string> phase_names_;
   std::vector<Phase> phases_;
   std::vector<int> phase_, retries_;  // [B]
-  Held act_, observation_, wanted_, as_array_;
+  PyHandle act_, observation_, wanted_, as_array_;
   bool* wanted_rows_ = nullptr;     // [B], memory of wanted_
   std::vector<int> group_, width_;  // of the controlled move groups
   std::size_t n_ = 0;               // sum of the widths

@@ -28,10 +28,10 @@ nb::list list_of(std::span<const int> ids) {
 void throw_faults(nb::handle faults) {
   if (nb::len(faults) == 0) return;
   std::vector<RowError::Fault> all;
-  Held first;
+  PyHandle first;
   for (nb::handle fault : faults) {
     nb::object exception = fault[1];
-    if (all.empty()) first = Held(exception);
+    if (all.empty()) first = PyHandle(exception);
     all.push_back({nb::cast<int>(fault[0]), nb::cast<std::string>(nb::str(exception))});
   }
   throw PythonRowError(std::move(all), std::move(first));
@@ -49,7 +49,8 @@ nb::object WeakObject::get() const {
   return object;
 }
 
-Held::Held(nb::object object) : object_(new nb::object(std::move(object)), give_back<nb::object>) {}
+PyHandle::PyHandle(nb::object object)
+    : object_(new nb::object(std::move(object)), give_back<nb::object>) {}
 
 void PythonSensor::edit_spec(mjSpec*) {
   nb::gil_scoped_acquire lock;

@@ -16,7 +16,7 @@
 #include "mjsense/core/control_step.h"
 #include "mjsense/core/row_error.h"
 #include "mjsense/core/sensor.h"
-#include "python/bindings/held.h"
+#include "python/bindings/py_handle.h"
 
 namespace mjsense::python {
 
@@ -35,9 +35,9 @@ class WeakObject {
 // Worlds in which a sensor written in Python failed. Python receives the exception of the first
 // one.
 struct PythonRowError : RowError {
-  PythonRowError(std::vector<Fault> faults, Held exception)
+  PythonRowError(std::vector<Fault> faults, PyHandle exception)
       : RowError(std::move(faults)), exception(std::move(exception)) {}
-  Held exception;
+  PyHandle exception;
 };
 
 // Declaration of a Python sensor's rows: the fields (none if its value is an arbitrary Python

@@ -22,11 +22,11 @@ using Bools = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu
 using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 // Position (m) and quaternion (wxyz) from a sequence of 7 numbers.
-Pose read_pose(nb::handle value, const std::string& place) {
+Pose read_pose(nb::handle value, const std::string& context) {
   const auto numbers = nb::cast<std::vector<double>>(value);
   if (numbers.size() != 7) {
     throw ValueError(fmt::format("{} returned {} numbers, a pose has 7: position and quaternion",
-                                 place, numbers.size()));
+                                 context, numbers.size()));
   }
   return {vec3(numbers.data()), quat(numbers.data() + 3)};
 }
@@ -164,7 +164,7 @@ void PythonTask::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
     const auto reward = nb::cast<Doubles>(found[0]);
     const auto success = nb::cast<Bools>(found[1]), over = nb::cast<Bools>(found[2]);
     for (int w : worlds.ids()) {
-      out[w] = found_[w] = judge(w, reward.data()[w], success.data()[w], over.data()[w]);
+      out[w] = found_[w] = make_evaluation(w, reward.data()[w], success.data()[w], over.data()[w]);
     }
     read_info(found[3]);
   });

@@ -10,7 +10,7 @@
 
 #include "mjsense/episode/grasp_scene.h"
 #include "mjsense/episode/task.h"
-#include "python/bindings/host.h"
+#include "python/bindings/rollout_host.h"
 
 namespace mjsense::python {
 
@@ -75,7 +75,7 @@ class PythonTask final : public Task, public GraspScene {
   void set_objects(int world, nb::handle roles);
   void read_info(nb::handle info);
 
-  Held task_;
+  PyHandle task_;
   std::shared_ptr<PythonHost> host_;
   std::weak_ptr<Simulation> simulation_;
   std::string name_, type_, robot_entity_;

@@ -48,7 +48,7 @@ class PyRecorder {
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
     nb::gil_scoped_release unlock;
-    recorder_ = make_shared_here<Recorder>(cfg);
+    recorder_ = make_shared_guarded<Recorder>(cfg);
   }
   ~PyRecorder() {
     nb::gil_scoped_release unlock;
@@ -103,7 +103,7 @@ class PyRecorder {
  private:
   template <class Body>
   void unlocked(Body&& body) {
-    place_.check("recorder");
+    process_.check("recorder");
     nb::gil_scoped_release unlock;
     body();
   }
@@ -133,7 +133,7 @@ class PyRecorder {
   nb::object simulation_;                         // keeps the simulation alive
   std::vector<std::shared_ptr<Sensor>> sources_;  // sensors to refresh
   std::vector<std::shared_ptr<Sensor>> sensors_;  // sensors to store
-  const Birthplace place_;
+  const ProcessGuard process_;
   std::shared_ptr<Recorder> recorder_;
 };
 
@@ -173,7 +173,7 @@ void bind_recorder(nb::module_& m) {
       .def("decided", [](PyRecorder& r, std::int64_t n) { return r.recorder().decided(n); })
       .def_prop_ro("kept", [](PyRecorder& r) { return r.recorder().kept(); })
       .def_prop_ro("discarded", [](PyRecorder& r) { return r.recorder().discarded(); })
-      .def_prop_ro("enough", [](PyRecorder& r) { return r.recorder().enough(); })
+      .def_prop_ro("enough", [](PyRecorder& r) { return r.recorder().has_all_episodes(); })
       .def_prop_ro("path", [](PyRecorder& r) { return r.recorder().house_dir().string(); })
       .def("stats", &stats);
 }

@@ -10,7 +10,7 @@
 
 #include <memory>
 
-#include "mjsense/core/embedded.h"
+#include "mjsense/core/embedded_files.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
@@ -46,7 +46,7 @@ class PyRobot {
       const MoveGroupCfg& cfg = cfg_.groups[g];
       nb::dict info;
       info["name"] = group.name;
-      info["kind"] = std::string(word(group.kind));
+      info["kind"] = std::string(enum_name(group.kind));
       info["joints"] = cfg.joints;
       info["actuators"] = cfg.actuators;
       info["controller"] = std::string(controller_kind(cfg.controller));

@@ -18,12 +18,12 @@
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scenes/scene_file.h"
 #include "python/bindings/bindings.h"
-#include "python/bindings/callbacks.h"
 #include "python/bindings/fields.h"
-#include "python/bindings/host.h"
+#include "python/bindings/mujoco_callbacks.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_policy.h"
 #include "python/bindings/python_task.h"
+#include "python/bindings/rollout_host.h"
 
 namespace mjsense::python {
 
@@ -68,13 +68,13 @@ class Parts {
         return read_scene_file(nb::borrow(scene.get()), host);
       };
     }
-    const auto members = [host = host_](const Held& sensors) {
+    const auto members = [host = host_](const PyHandle& sensors) {
       return [sensors, host](Rollout& rollout) {
         nb::gil_scoped_acquire lock;
         return host->members(sensors.get(), rollout.simulation_ptr());
       };
     };
-    const auto are_there = [](const Held& sensors) {
+    const auto are_there = [](const PyHandle& sensors) {
       return PyCallable_Check(sensors.get().ptr()) || nb::len(sensors.get()) > 0;
     };
     if (are_there(sensors_)) cfg.more_sensors = members(sensors_);
@@ -88,8 +88,8 @@ class Parts {
         suite.select(nb::cast<std::vector<std::string>>(nb::borrow(select.get())(known)));
       };
     }
-    cfg.making = [host = host_](Rollout& rollout) { host->set_rollout(rollout); };
-    cfg.made = [](Rollout& rollout) {
+    cfg.on_construct_begin = [host = host_](Rollout& rollout) { host->set_rollout(rollout); };
+    cfg.on_constructed = [](Rollout& rollout) {
       if (auto* policy = dynamic_cast<PythonPolicy*>(rollout.policy())) policy->observe(rollout);
     };
   }
@@ -101,18 +101,18 @@ class Parts {
     SceneFileCfg cfg;
     read_struct(scene, cfg);
     if (!scene.attr("models").is_none()) {
-      cfg.models = [scene = Held(scene), host,
-                    place = fmt::format("scene '{}': models()", cfg.name)] {
-        return host->call(place,
+      cfg.models = [scene = PyHandle(scene), host,
+                    context = fmt::format("scene '{}': models()", cfg.name)] {
+        return host->call(context,
                           [&] { return host->read_prepared(scene.get().attr("_mjs_scene")()); });
       };
     }
     return cfg;
   }
 
-  Held task_, policy_, sensors_, scene_;
+  PyHandle task_, policy_, sensors_, scene_;
   decltype(RolloutCfg::code) code_;
-  Held robot_sensors_, select_;
+  PyHandle robot_sensors_, select_;
 };
 
 nb::dict progress_dict(const RecordProgress& p) {
@@ -154,7 +154,7 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
   try {
     nb::gil_scoped_release unlock;
     // User code that runs inside may read the worlds but not step or reset them.
-    parts.host()->turns()->work([&] { s = record_episodes(cfg, report, &stop); });
+    parts.host()->sim_lock()->work([&] { s = record_episodes(cfg, report, &stop); });
   } catch (...) {
     parts.host()->close();
     throw;
@@ -188,7 +188,7 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
 class PyRollout {
  public:
   PyRollout(nb::dict options, nb::object objects, nb::object make_simulation)
-      : parts_(objects, make_simulation), turns_(parts_.host()->turns()) {
+      : parts_(objects, make_simulation), sim_lock_(parts_.host()->sim_lock()) {
     refuse_python_callbacks();
     RolloutCfg cfg;
     cfg.default_view = nb::cast<bool>(options.attr("pop")("default_view", false));
@@ -196,7 +196,7 @@ class PyRollout {
     parts_.join(cfg);
     nb::gil_scoped_release unlock;
     try {
-      rollout_ = make_shared_here<Rollout>(cfg);
+      rollout_ = make_shared_guarded<Rollout>(cfg);
     } catch (...) {
       parts_.host()->end();
       throw;
@@ -213,19 +213,19 @@ class PyRollout {
   nb::object simulation() const { return parts_.host()->simulation(rollout_->simulation_ptr()); }
 
   void start(const std::vector<int>& worlds, const std::vector<std::int64_t>& episodes) {
-    turns_->change("start", [&] { rollout_->start(worlds, episodes); });
+    sim_lock_->change("start", [&] { rollout_->start(worlds, episodes); });
   }
   void stop(int world) {
-    turns_->change("stop", [&] { rollout_->stop(world); });
+    sim_lock_->change("stop", [&] { rollout_->stop(world); });
   }
   void act() {
-    turns_->change("act", [&] { rollout_->act(); });
+    sim_lock_->change("act", [&] { rollout_->act(); });
   }
   void step() {
-    turns_->change("step", [&] { rollout_->step(); });
+    sim_lock_->change("step", [&] { rollout_->step(); });
   }
   void reseed(std::uint64_t seed) {
-    turns_->change("reseed", [&] { rollout_->reseed(seed); });
+    sim_lock_->change("reseed", [&] { rollout_->reseed(seed); });
   }
 
   // Commands of all controlled groups, concatenated, [B, n]. `done` [B]: the episode ends after
@@ -238,7 +238,7 @@ class PyRollout {
       throw ValueError(fmt::format("done: {} flags for {} worlds", done->size(), values.shape(0)));
     const double* at = values.data();
     const bool* flags = done ? done->data() : nullptr;
-    turns_->change("set_actions", [&] {
+    sim_lock_->change("set_actions", [&] {
       for (int w = 0; w < rollout_->num_worlds(); ++w) {
         rollout_->action(w) = action(at + w * width());
         if (flags) rollout_->action(w).done = flags[w];
@@ -255,14 +255,14 @@ class PyRollout {
       for (std::size_t k = 0; k < steps; ++k)
         actions[k * B + w] = action(values.data() + (w * steps + k) * width());
     }
-    turns_->change("step_chunk", [&] { rollout_->step_chunk(actions, stop_on_success); });
+    sim_lock_->change("step_chunk", [&] { rollout_->step_chunk(actions, stop_on_success); });
   }
   // Actions that act() chose, [B, n], and the worlds for which the policy reported done.
   nb::tuple actions() {
     std::vector<std::vector<double>> rows(rollout_->num_worlds());
     std::vector<int> done(rollout_->num_worlds()), all(rollout_->num_worlds());
     std::iota(all.begin(), all.end(), 0);
-    turns_->read([&] {
+    sim_lock_->read([&] {
       rollout_->for_each(all, [&](const World& world) {
         rows[world.id] = rollout_->task().robot().commands(world, rollout_->action(world.id));
         done[world.id] = rollout_->action(world.id).done;
@@ -272,7 +272,7 @@ class PyRollout {
   }
   template <class Body>
   void read(Body&& body) {
-    turns_->read([&] { body(*rollout_); });
+    sim_lock_->read([&] { body(*rollout_); });
   }
 
  private:
@@ -299,7 +299,7 @@ class PyRollout {
   }
 
   Parts parts_;
-  std::shared_ptr<Turns> turns_;
+  std::shared_ptr<SimulationLock> sim_lock_;
   std::shared_ptr<Rollout> rollout_;
 };
 

@@ -11,13 +11,13 @@
 #include <nanobind/stl/vector.h>
 
 #include "mjsense/app/schema.h"
-#include "mjsense/core/embedded.h"
+#include "mjsense/core/embedded_files.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 #include "python/bindings/bindings.h"
-#include "python/bindings/callbacks.h"
 #include "python/bindings/fields.h"
+#include "python/bindings/mujoco_callbacks.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
 #include "python/bindings/sensor_handle.h"

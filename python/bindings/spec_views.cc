@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/mujoco_fields.h"
 

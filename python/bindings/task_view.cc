@@ -22,7 +22,7 @@ namespace {
 
 void visit(const TaskView& view, int world, std::function<void(const World&)> body) {
   const int id = view.checked(world);
-  view.turns().read([&] { view.rollout().for_each(std::span(&id, 1), std::move(body)); });
+  view.sim_lock().read([&] { view.rollout().for_each(std::span(&id, 1), std::move(body)); });
 }
 
 nb::object array_of(std::span<const double> values) {
@@ -38,7 +38,7 @@ nb::object array_of(const Pose& pose) {
 }
 
 std::string name_of_kind(GroupKind kind) {
-  return std::string(kWords<GroupKind>[static_cast<std::size_t>(kind)]);
+  return std::string(kEnumNames<GroupKind>[static_cast<std::size_t>(kind)]);
 }
 
 nb::list groups(const TaskView& view) {

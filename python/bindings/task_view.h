@@ -10,7 +10,7 @@
 
 namespace mjsense::python {
 
-class Turns;
+class SimulationLock;
 
 // May outlive its rollout; every call then throws RuntimeError.
 class TaskView {
@@ -18,19 +18,19 @@ class TaskView {
   // Shared by all objects that refer to a rollout. The owner sets the pointer to null when the
   // rollout ends.
   using Cell = std::shared_ptr<Rollout*>;
-  TaskView(Cell cell, std::shared_ptr<Turns> turns)
-      : cell_(std::move(cell)), turns_(std::move(turns)) {}
+  TaskView(Cell cell, std::shared_ptr<SimulationLock> sim_lock)
+      : cell_(std::move(cell)), sim_lock_(std::move(sim_lock)) {}
 
   Rollout& rollout() const;
   Task& task() const { return rollout().task(); }
   const Robot& robot() const { return rollout().task().robot(); }
-  Turns& turns() const { return *turns_; }
+  SimulationLock& sim_lock() const { return *sim_lock_; }
   // Throws ValueError if there is no such world.
   int checked(int world) const;
 
  private:
   Cell cell_;
-  std::shared_ptr<Turns> turns_;  // shared with the rollout's simulation
+  std::shared_ptr<SimulationLock> sim_lock_;  // shared with the rollout's simulation
 };
 
 }  // namespace mjsense::python

@@ -90,7 +90,7 @@ def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
     return (lambda value: _is_a(value, cls)), f"a {word}"
 
 
-def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] | None:
+def _check_of(context: str, name: str, annotation: Any) -> Callable[[Any], None] | None:
     """A function that raises for values that the annotation does not allow; None if it allows every value."""
     if not isinstance(annotation, str):
         return None
@@ -106,7 +106,7 @@ def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] |
             if test(value):
                 return
         out_of_range = "an int" in words and isinstance(value, Integral) and not isinstance(value, bool)
-        raise (ValueError if out_of_range else TypeError)(f"{place}: {name} must be {words}, not {_short(value)}")
+        raise (ValueError if out_of_range else TypeError)(f"{context}: {name} must be {words}, not {_short(value)}")
 
     return check
 
@@ -124,9 +124,9 @@ def checked(target: T, owner: str = "") -> T:
                 setattr(target, name, checked(value, target.__name__))
         return target
     function: Any = target
-    place = f"{owner}()" if function.__name__ == "__init__" else f"{owner}.{function.__name__}()".lstrip(".")
+    context = f"{owner}()" if function.__name__ == "__init__" else f"{owner}.{function.__name__}()".lstrip(".")
     parameters = inspect.signature(function).parameters
-    checks = {name: _check_of(place, name, p.annotation) for name, p in parameters.items() if p.kind is not p.VAR_KEYWORD}
+    checks = {name: _check_of(context, name, p.annotation) for name, p in parameters.items() if p.kind is not p.VAR_KEYWORD}
     if not any(checks.values()):
         return target
     closed = all(p.kind is not p.VAR_KEYWORD for p in parameters.values())
@@ -141,7 +141,7 @@ def checked(target: T, owner: str = "") -> T:
             if closed and name not in checks:
                 near = difflib.get_close_matches(name, checks, 3)
                 hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-                raise TypeError(f"{place} got an unexpected keyword argument '{name}'{hint}")
+                raise TypeError(f"{context} got an unexpected keyword argument '{name}'{hint}")
             check = checks.get(name)
             if check is not None:
                 check(value)

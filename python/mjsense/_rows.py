@@ -128,8 +128,8 @@ def rows_of_space(space: Any, path: tuple[str, ...] = ()) -> list[Row]:
     row = Row(path, tuple(shape), np.dtype(dtype))
     if isinstance(space, spaces.Box) and row.dtype.kind != "b":
         info = np.iinfo(row.dtype) if row.dtype.kind in "iu" else None
-        least, most = (info.min, info.max) if info else (-np.inf, np.inf)
-        if not (np.all(space.low <= least) and np.all(space.high >= most)):
+        minimum, maximum = (info.min, info.max) if info else (-np.inf, np.inf)
+        if not (np.all(space.low <= minimum) and np.all(space.high >= maximum)):
             row.low, row.high = space.low, space.high
     return [row]
 

@@ -88,11 +88,11 @@ class named:
     """Adds the sensor, world and method to errors of user code and keeps the traceback."""
 
     def __init__(self, sensor: Sensor, method: str, world: int | None = None) -> None:
-        place = "" if world is None else f", world {world}"
-        self.place = f"sensor '{sensor.uuid}'{place}: {method}()"
+        world_text = "" if world is None else f", world {world}"
+        self.context = f"sensor '{sensor.uuid}'{world_text}: {method}()"
 
     def __enter__(self) -> None: ...
 
     def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
         if isinstance(error, Exception):
-            raise SensorError(f"{self.place}: {kind.__name__}: {error}") from error
+            raise SensorError(f"{self.context}: {kind.__name__}: {error}") from error

@@ -74,7 +74,7 @@ def _nested(fields: Any) -> Any:
 
 
 def _sim_groups(
-    sim: Simulation, place: str, groups: Mapping[str, Sequence[str]] | None
+    sim: Simulation, context: str, groups: Mapping[str, Sequence[str]] | None
 ) -> list[tuple[str, list[int], list[int]]]:
     """Addresses of the joints of each group. Default groups: those of the robot, or all joints as one group."""
     model = sim.model
@@ -87,7 +87,7 @@ def _sim_groups(
         qpos: list[int] = []
         dofs: list[int] = []
         for joint in joints:
-            i = _id(model, _mujoco.Obj.JOINT, joint, f"{place}: group '{name}'")
+            i = _id(model, _mujoco.Obj.JOINT, joint, f"{context}: group '{name}'")
             sizes = {_mujoco.Joint.FREE: (7, 6), _mujoco.Joint.BALL: (4, 3)}
             nq, nv = sizes.get(_mujoco.Joint(model.jnt_type[i]), (1, 1))
             qpos += range(model.jnt_qposadr[i], model.jnt_qposadr[i] + nq)
@@ -96,13 +96,13 @@ def _sim_groups(
     return out
 
 
-def _id(model: mujoco.MjModel, kind: _mujoco.Obj, name: str, place: str) -> int:
+def _id(model: mujoco.MjModel, kind: _mujoco.Obj, name: str, context: str) -> int:
     found = _mujoco.name2id(model, kind, name)
     if found >= 0:
         return found
     counts = {_mujoco.Obj.JOINT: model.njnt, _mujoco.Obj.BODY: model.nbody, _mujoco.Obj.CAMERA: model.ncam}
     names = [_mujoco.id2name(model, kind, i) for i in range(counts[kind])]
-    raise UnknownNameError(_core.unknown_name(place, kind.name.lower(), name, names))
+    raise UnknownNameError(_core.unknown_name(context, kind.name.lower(), name, names))
 
 
 @checked

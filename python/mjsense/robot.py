@@ -171,14 +171,14 @@ class Robot(KnownAttributes):
         return values
 
 
-def robot_of(robot: Any, place: str = "robot") -> tuple[str, list[Any]]:
+def robot_of(robot: Any, context: str = "robot") -> tuple[str, list[Any]]:
     """Returns (name or path for C++, the robot's sensors that are written in Python); "" for None."""
     if robot is None:
         return "", []
     if isinstance(robot, Robot):
         return robot._given, list(robot.create_robot_sensors())
     if not isinstance(robot, (str, Path)):
-        raise TypeError(f"{place} is {robot!r}: must be the name of a robot, the path of its .toml, a mjsense.Robot, or None")
+        raise TypeError(f"{context} is {robot!r}: must be the name of a robot, the path of its .toml, a mjsense.Robot, or None")
     name = str(robot)
     return name, _sensors_of_file(name) if name.endswith(".toml") else []
 
@@ -187,16 +187,16 @@ def _sensors_of_file(name_or_path: str) -> list[Any]:
     """Creates the sensors that a robot.toml declares as ``class = "module:Class"``."""
     sensors = []
     for name, reference, args in _core.robot_python_sensors(name_or_path):
-        place = f"{name_or_path}: sensor '{name}': class '{reference}'"
+        context = f"{name_or_path}: sensor '{name}': class '{reference}'"
         module, attribute = reference.split(":")
         try:
             made: Any = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError) as error:
-            raise ValueError(f"{place} is not found: {error}") from error
+            raise ValueError(f"{context} is not found: {error}") from error
         try:
             sensor = made(**json.loads(args))
         except TypeError as error:
-            raise TypeError(f"{place} cannot be made: {error}") from error
+            raise TypeError(f"{context} cannot be made: {error}") from error
         sensor.uuid = name
         sensors.append(sensor)
     return sensors

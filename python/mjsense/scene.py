@@ -257,11 +257,11 @@ class Scene(KnownAttributes):
         return self._core.tile_origins()
 
 
-def prepared(cfg: Any, place: str) -> tuple[Any, ...]:
+def prepared(cfg: Any, context: str) -> tuple[Any, ...]:
     """Arguments from which C++ builds the scene of a rollout: the configuration, its spec, its sensors, the final edit, and the
     Scene."""
     if not isinstance(cfg, SceneCfg):
-        raise TypeError(f"{place} must return a mjsense.SceneCfg, not {cfg!r}")
+        raise TypeError(f"{context} must return a mjsense.SceneCfg, not {cfg!r}")
     scene: Scene = Scene.__new__(Scene)
     items, edit = scene._prepare(cfg)
     return cfg, scene.spec, items, edit, scene

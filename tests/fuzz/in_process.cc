@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Replaces hdf5/in_child.cc in the fuzz targets: readers run in this process, so that the fuzzer
-// can trace their execution.
+// Replaces hdf5/child_reader.cc in the fuzz targets: readers run in this process, so that the
+// fuzzer can trace their execution.
 
 #include "mjsense/core/error.h"
-#include "mjsense/hdf5/guard.h"
+#include "mjsense/hdf5/untrusted_file.h"
 
 namespace mjsense::h5 {
 

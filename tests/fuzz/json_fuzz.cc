@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/layout.h"
+#include "mjsense/record/recording_plan.h"
 #include "mjsense/replay/json_text.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -15,12 +15,12 @@ constexpr const char* kRecording =
     R"({"batches":1,"episodes":4,"settings":{"task":"pick","seed":0},"streams":[{"place":"rewards"}]})";
 
 int depth_of(std::string_view text) {
-  int depth = 0, most = 0;
+  int depth = 0, maximum = 0;
   for (const char c : text) {
     depth += (c == '[' || c == '{') - (c == ']' || c == '}');
-    most = std::max(most, depth);
+    maximum = std::max(maximum, depth);
   }
-  return most;
+  return maximum;
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/staged_episode.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/replay/recording_tools.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace fs = std::filesystem;

@@ -185,7 +185,7 @@ Hashes legged() {
        {SubTerrain::kRough, SubTerrain::kSlope, SubTerrain::kStairs, SubTerrain::kWaves}) {
     SubTerrainCfg sub{.kind = kind};
     sub.platform_width = 1;
-    scene.terrain->sub_terrains.emplace_back(word(kind), sub);
+    scene.terrain->sub_terrains.emplace_back(enum_name(kind), sub);
   }
   add_entity(scene, "dog", kDog, {-1.2, -5.2, 0.75});
   const auto feet = std::vector<std::string>{".*_foot"};

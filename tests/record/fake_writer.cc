@@ -23,7 +23,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/record/testing/fake_suite.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/replay/recording_tools.h"
 
 using namespace mjsense;
 
@@ -120,7 +120,7 @@ int record(const std::string& out, const Options& o) {
     bool any = false;
     for (int w = 0; w < worlds; ++w) {
       Running& r = running[w];
-      if (recorder.enough()) {
+      if (recorder.has_all_episodes()) {
         if (recorder.recording(w)) recorder.abandon_episode(w);
         continue;
       }

@@ -5,7 +5,7 @@
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 #include "mjsense/core/toml_value.h"
 
 namespace mjsense {
@@ -15,11 +15,11 @@ using Kind = FieldType::Kind;
 
 // Adds the place to the errors of `read`, which parses a value as on the command line.
 template <class Read>
-void at_place(const std::string& place, Read&& read) {
+void at_place(const std::string& context, Read&& read) {
   try {
     read();
   } catch (const ValueError& e) {
-    throw ValueError(fmt::format("{}: {}", place, e.what()));
+    throw ValueError(fmt::format("{}: {}", context, e.what()));
   }
 }
 
@@ -29,21 +29,21 @@ struct Key {
   bool opposite;
 };
 
-void read_key(const Key& key, void* object, const toml::node& node, const std::string& place) {
+void read_key(const Key& key, void* object, const toml::node& node, const std::string& context) {
   const FieldDecl& field = *key.field;
   const auto text = node.value_exact<std::string>();
   void* value = at(object, field);
-  if (!read_toml_value(*field.type, value, node, place, field.option_name())) {
+  if (!read_toml_value(*field.type, value, node, context, field.option_name())) {
     // Lists may also be written as on the command line.
     const Kind kind =
         field.type->kind == Kind::kOptional ? field.type->element().kind : field.type->kind;
     if (kind != Kind::kList || !text)
-      throw ValueError(fmt::format("{}: the value of '{}' has the wrong type: must be {}", place,
+      throw ValueError(fmt::format("{}: the value of '{}' has the wrong type: must be {}", context,
                                    field.option_name(), expected(*field.type)));
-    at_place(place, [&] { read_text(field, object, *text); });
+    at_place(context, [&] { read_text(field, object, *text); });
   }
   if (key.opposite) *static_cast<bool*>(value) = !*static_cast<bool*>(value);
-  check_field(field, object, place);
+  check_field(field, object, context);
 }
 
 }  // namespace
@@ -65,18 +65,18 @@ void read_toml_text(std::string_view text, const std::string& path, const Struct
   for (const auto& [name, key] : known) names.push_back(name);
   for (const auto& [key, node] : table) {
     const std::string name(key.str());
-    const std::string place = toml_place(path, node);
+    const std::string context = toml_context(path, node);
     if (name == "size") {
       const auto text = node.value_exact<std::string>();
       if (!text)
         throw ValueError(
-            fmt::format("{}: the value of 'size' has the wrong type: must be a str", place));
-      at_place(place, [&] { read_size(decl, object, *text); });
+            fmt::format("{}: the value of 'size' has the wrong type: must be a str", context));
+      at_place(context, [&] { read_size(decl, object, *text); });
       continue;
     }
     const auto found = known.find(name);
-    if (found == known.end()) throw_unknown(place, "key", name, names);
-    read_key(found->second, object, node, place);
+    if (found == known.end()) throw_unknown(context, "key", name, names);
+    read_key(found->second, object, node, context);
   }
 }
 

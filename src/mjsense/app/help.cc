@@ -70,7 +70,7 @@ class HelpFormatter : public CLI::Formatter {
 
 }  // namespace
 
-void use_our_help(CLI::App& program) {
+void set_help_format(CLI::App& program) {
   program.formatter(std::make_shared<HelpFormatter>());
   program.set_help_flag("-h,--help", "Print this help and exit.");
 }

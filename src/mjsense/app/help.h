@@ -14,7 +14,7 @@ struct Example {
 };
 
 // Applies to a program and to the subcommands that are added to it later.
-void use_our_help(CLI::App& program);
+void set_help_format(CLI::App& program);
 
 // Shown below the options.
 void add_examples(CLI::App& app, const std::vector<Example>& examples);

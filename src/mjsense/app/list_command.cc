@@ -95,7 +95,7 @@ std::string list_tasks(bool json) {
     }
     if (!line.what.empty())
       line.needs += fmt::format(" Default: {} in {}.", default_robot(name),
-                                default_scene(parts_of_task(name)[0]));
+                                default_scene(task_components(name)[0]));
     lines.push_back(line);
   }
   return text_of(lines, json);

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "mjsense/app/completion.h"
-#include "mjsense/app/external.h"
+#include "mjsense/app/external_commands.h"
 #include "mjsense/app/field_options.h"
 #include "mjsense/app/help.h"
 #include "mjsense/app/list_command.h"
@@ -28,9 +28,9 @@
 #include "mjsense/app/schema.h"
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/core/say.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/replay/recording_tools.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/scenes/load_scene.h"
@@ -178,7 +178,7 @@ void show_warnings() {
     const std::string warning = text;
     if (warning.find("simulation is unstable") != std::string::npos) return;
     const std::lock_guard lock(mutex);
-    if (shown.insert(warning).second) say("mjsense: MuJoCo: {}\n", one_line(warning));
+    if (shown.insert(warning).second) print_stderr("mjsense: MuJoCo: {}\n", one_line(warning));
   };
 }
 
@@ -204,9 +204,9 @@ void read_config_argument(int argc, char** argv, RecordOptions& options) {
 
 int run(int argc, char** argv) {
   show_warnings();
-  leave_no_log_file();
+  disable_mujoco_log_file();
   CLI::App program("Sensors, cameras and recordings for MuJoCo simulations.", "mjsense");
-  use_our_help(program);
+  set_help_format(program);
   program.set_version_flag("--version", "mjsense " MJSENSE_VERSION, "Print the version and exit.");
   program.require_subcommand(1);
 
@@ -281,7 +281,7 @@ int run(int argc, char** argv) {
   for (const CLI::App* app : program.get_subcommands({}))
     if (!app->get_group().empty()) known.push_back(app->get_name());
   if (argc < 2) {
-    say("{}", program.help());
+    print_stderr("{}", program.help());
     return kWrongInput;
   }
   const std::string word = argv[1];
@@ -365,9 +365,9 @@ int run_program(int argc, char** argv) {
         of_fmt && std::ferror(stdout))
       why = "cannot write to stdout: " + of_fmt->code().message();
     // The message may quote a file of any size.
-    constexpr std::size_t kMostBytes = 4000;
-    if (why.size() > kMostBytes) why = why.substr(0, kMostBytes) + " ...";
-    say("mjsense: {}\n", one_line(why));
+    constexpr std::size_t kMaxBytes = 4000;
+    if (why.size() > kMaxBytes) why = why.substr(0, kMaxBytes) + " ...";
+    print_stderr("mjsense: {}\n", one_line(why));
     return kWrongInput;
   }
 }

@@ -6,7 +6,7 @@
 namespace mjsense {
 
 // Exit codes: 0 done; 1 some episodes or checks failed; 2 wrong usage or input. Errors are printed
-// on stderr. An unknown command may replace this process (external.h).
+// on stderr. An unknown command may replace this process (external_commands.h).
 int run_program(int argc, char** argv);
 
 }  // namespace mjsense

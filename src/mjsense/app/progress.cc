@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mjsense/app/terminal.h"
-#include "mjsense/core/say.h"
+#include "mjsense/core/print_stderr.h"
 
 namespace mjsense {
 
@@ -44,14 +44,14 @@ ProgressLine::ProgressLine(std::string title, bool quiet)
 
 void ProgressLine::show(const RecordProgress& progress, int stop_level) {
   if (quiet_) return;
-  if (!title_.empty()) say("{}\n", std::exchange(title_, {}));
+  if (!title_.empty()) print_stderr("{}\n", std::exchange(title_, {}));
   text_ = progress_text(progress);
   if (stop_level > 0 && progress.running > 0) {
     text_ += fmt::format("  stopping: {} running; Ctrl-C discards them", progress.running);
   }
   if (terminal_) {
     // A longer line would wrap, and "\r" would not return to its beginning.
-    say_raw("\r\033[K" + text_.substr(0, terminal_width(STDERR_FILENO) - 1));
+    print_stderr_raw("\r\033[K" + text_.substr(0, terminal_width(STDERR_FILENO) - 1));
     std::fflush(stderr);
     open_ = true;
     return;
@@ -65,12 +65,12 @@ void ProgressLine::show(const RecordProgress& progress, int stop_level) {
 }
 
 void ProgressLine::print() {
-  say("{}\n", text_);
+  print_stderr("{}\n", text_);
   printed_ = text_;
 }
 
 void ProgressLine::finish() {
-  if (open_) say("\n");
+  if (open_) print_stderr("\n");
   if (!terminal_ && text_ != printed_) print();
   open_ = false;
 }

@@ -9,10 +9,10 @@
 #include <numeric>
 
 #include "mjsense/app/progress.h"
-#include "mjsense/app/table.h"
+#include "mjsense/app/text_table.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/say.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/core/print_stderr.h"
+#include "mjsense/replay/recording_tools.h"
 
 namespace mjsense {
 namespace {
@@ -169,14 +169,15 @@ int run_record(const RecordOptions& options) {
   } else {
     fmt::print("{}", summary_text(summary, sheet));
   }
-  for (const std::string& damage : summary.damage) say("mjsense: {}\n", damage);
+  for (const std::string& damage : summary.damage) print_stderr("mjsense: {}\n", damage);
   if (summary.interrupted) {
-    say("interrupted: the finished episodes are safe. Continue with --resume, or finish with "
+    print_stderr(
+        "interrupted: the finished episodes are safe. Continue with --resume, or finish with "
         "`mjsense repair {}`.\n",
         summary.house_dir.string());
   } else if (!summary.enough) {
-    say("stopped after {} attempts; --max-attempts allows more\n",
-        summary.progress.succeeded + summary.progress.failed);
+    print_stderr("stopped after {} attempts; --max-attempts allows more\n",
+                 summary.progress.succeeded + summary.progress.failed);
   }
   return summary.enough ? 0 : 1;
 }

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/say.h"
+#include "mjsense/core/print_stderr.h"
 
 namespace mjsense {
 
@@ -22,13 +22,13 @@ bool names_model(const std::string& what, const std::string& expected) {
 }
 
 void print_warnings(const Scene& scene) {
-  for (const std::string& text : scene.warnings()) say("mjsense: {}\n", text);
+  for (const std::string& text : scene.warnings()) print_stderr("mjsense: {}\n", text);
 }
 
-void check_physics(const Simulation& simulation, const std::string& place) {
+void check_physics(const Simulation& simulation, const std::string& context) {
   if (simulation.failures().empty()) return;
   throw RuntimeError(
-      fmt::format("{}: the physics failed: {}", place, simulation.failures()[0].message));
+      fmt::format("{}: the physics failed: {}", context, simulation.failures()[0].message));
 }
 
 }  // namespace mjsense

@@ -16,6 +16,6 @@ bool names_model(const std::string& what, const std::string& expected);
 void print_warnings(const Scene& scene);
 // Throws RuntimeError if a world failed in the last call, because measurements of a diverged
 // simulation are meaningless.
-void check_physics(const Simulation& simulation, const std::string& place);
+void check_physics(const Simulation& simulation, const std::string& context);
 
 }  // namespace mjsense

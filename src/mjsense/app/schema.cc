@@ -96,7 +96,7 @@ class Schema {
   Json type(const FieldType& t) {
     Json out{{"kind", kKindNames[static_cast<int>(t.kind)]}};
     if (t.element) out["element"] = type(t.element());
-    if (t.kind == Kind::kWord) out["words"] = t.words;
+    if (t.kind == Kind::kEnum) out["words"] = t.words;
     if (t.object) {
       add(t.object());
       out["name"] = t.object().name;
@@ -135,7 +135,7 @@ class Schema {
         return *static_cast<const std::string*>(value);
       case Kind::kPath:
         return static_cast<const std::filesystem::path*>(value)->string();
-      case Kind::kWord:
+      case Kind::kEnum:
         return t.words[get_integer(t, value)];
       case Kind::kOptional:
         return t.count(v) ? this->value(t.element(), t.at(v, 0)) : Json();

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "mjsense/app/scene_file.h"
-#include "mjsense/app/table.h"
+#include "mjsense/app/text_table.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -95,14 +95,14 @@ std::vector<Line> task_lines(Rollout& rollout, int steps) {
   return lines_of(rollout.simulation(), sensors, taken + (steps > 0 ? 1 : 0));
 }
 
-std::vector<Line> scene_lines(Simulation& simulation, int steps, const std::string& place) {
+std::vector<Line> scene_lines(Simulation& simulation, int steps, const std::string& context) {
   std::vector<Sensor*> sensors;
   for (const auto& sensor : simulation.scene().sensors()) sensors.push_back(sensor.get());
   simulation.measure_cost(true);
   for (int k = 0; k < steps; ++k) {
     simulation.step();
     simulation.refresh(sensors);
-    check_physics(simulation, place);
+    check_physics(simulation, context);
   }
   return lines_of(simulation, sensors, steps);
 }

@@ -27,9 +27,9 @@ bool CameraMountCfg::varies() const {
          min_visible > 0;
 }
 
-void validate(const CameraMountCfg& c, std::string_view place) {
+void validate(const CameraMountCfg& c, std::string_view context) {
   const std::string who =
-      fmt::format("{}camera '{}'", place.empty() ? "" : fmt::format("{}, ", place), c.name);
+      fmt::format("{}camera '{}'", context.empty() ? "" : fmt::format("{}, ", context), c.name);
   const auto fail = [&](const std::string& what) {
     throw ValueError(fmt::format("{}: {}", who, what));
   };

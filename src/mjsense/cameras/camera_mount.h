@@ -13,14 +13,14 @@ namespace mjsense {
 
 enum class MountKind { kMjcf, kBody, kLookAt, kFixed, kOrbit };
 template <>
-inline constexpr std::array<std::string_view, 5> kWords<MountKind>{"mjcf", "body", "look_at",
-                                                                   "fixed", "orbit"};
+inline constexpr std::array<std::string_view, 5> kEnumNames<MountKind>{"mjcf", "body", "look_at",
+                                                                       "fixed", "orbit"};
 
 // Poses are those of MuJoCo's camera frame: x right, y up, looking along -z. Noise is uniform in
 // [-x, x] and drawn once per episode.
 struct CameraMountCfg {
   std::string name;
-  Word<MountKind> mount;
+  NamedEnum<MountKind> mount;
   std::string camera;
   bool of_scene = false;
   std::string body;
@@ -116,8 +116,8 @@ void visit_fields(V& v, CameraMountCfg& c) {
   v("erosion", c.erosion, "Keep image points away from the rim of an object.");
 }
 
-// Checks fields that depend on each other. Throws ValueError; `place`, if not empty, starts its
+// Checks fields that depend on each other. Throws ValueError; `context`, if not empty, starts its
 // message.
-void validate(const CameraMountCfg& cfg, std::string_view place);
+void validate(const CameraMountCfg& cfg, std::string_view context);
 
 }  // namespace mjsense

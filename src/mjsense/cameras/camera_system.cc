@@ -37,13 +37,13 @@ nlohmann::ordered_json list(Vec3 v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
 
-void validate(const CameraSystemCfg& cfg, std::string_view place) {
+void validate(const CameraSystemCfg& cfg, std::string_view context) {
   for (std::size_t i = 0; i < cfg.cameras.size(); ++i) {
-    validate(cfg.cameras[i], place);
+    validate(cfg.cameras[i], context);
     for (std::size_t k = 0; k < i; ++k) {
       if (cfg.cameras[k].name == cfg.cameras[i].name)
-        throw ValueError(fmt::format("{}{}two cameras are named '{}'", place,
-                                     place.empty() ? "" : ": ", cfg.cameras[i].name));
+        throw ValueError(fmt::format("{}{}two cameras are named '{}'", context,
+                                     context.empty() ? "" : ": ", cfg.cameras[i].name));
     }
   }
 }
@@ -140,13 +140,13 @@ CameraSystem::Lens CameraSystem::with_noise(int camera, Rng& rng) const {
 }
 
 // Share of the pixels, of the object that covers the fewest.
-double CameraSystem::least_visible(int camera, const World& world, const Lens& lens,
-                                   std::span<const int> objects) const {
-  const Lookout from{lens.pose, lens.fovy, width(camera), height(camera)};
-  double least = 1;
+double CameraSystem::lowest_visible_share(int camera, const World& world, const Lens& lens,
+                                          std::span<const int> objects) const {
+  const CameraView from{lens.pose, lens.fovy, width(camera), height(camera)};
+  double minimum = 1;
   for (double share : visible_shares(simulation_->rays(), world.id, from, objects))
-    least = std::min(least, share);
-  return least;
+    minimum = std::min(minimum, share);
+  return minimum;
 }
 
 std::string CameraSystem::orbit(int camera, const World& world, Rng& rng, Vec3 centre,
@@ -163,12 +163,13 @@ std::string CameraSystem::orbit(int camera, const World& world, Rng& rng, Vec3 c
     if (!(norm(target - eye) > 1e-6)) continue;
     const Lens lens{look_at(eye, target, {0, 0, 1}), out.fovy};
     if (c.min_visible > 0 && is_inside(simulation_->rays(), world.id, lens.pose)) continue;
-    const double least = c.min_visible > 0 ? least_visible(camera, world, lens, objects) : 1;
-    if (least > best) {
-      best = least;
+    const double minimum =
+        c.min_visible > 0 ? lowest_visible_share(camera, world, lens, objects) : 1;
+    if (minimum > best) {
+      best = minimum;
       out = lens;
     }
-    if (least >= c.min_visible) return "";
+    if (minimum >= c.min_visible) return "";
   }
   if (c.relaxed && best >= 0) return "";
   return fmt::format(
@@ -186,15 +187,16 @@ std::string CameraSystem::make_visible(int camera, const World& world, Rng& rng,
   const int body = world.model->cam_bodyid[ids_[camera]];
   const Pose mount{vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
   Lens in_world{mount * lens.pose, lens.fovy};
-  const double shown = least_visible(camera, world, in_world, objects);
+  const double shown = lowest_visible_share(camera, world, in_world, objects);
   if (shown >= wanted) return "";
   std::string why = orbit(camera, world, rng, centre, objects, shown, in_world);
   lens.pose = inverse(mount) * in_world.pose;
   return why;
 }
 
-std::string CameraSystem::place(const World& world, std::uint64_t seed, std::uint64_t episode,
-                                Vec3 centre, std::span<const int> objects) {
+std::string CameraSystem::place_cameras(const World& world, std::uint64_t seed,
+                                        std::uint64_t episode, Vec3 centre,
+                                        std::span<const int> objects) {
   if (!varies_) return "";
   const bool looks =
       std::ranges::any_of(cfg_.cameras, [](const CameraMountCfg& c) { return c.min_visible > 0; });

@@ -38,7 +38,7 @@ void visit_fields(V& v, CameraSystemCfg& c) {
 }
 
 // Throws ValueError if two cameras have the same name or if a camera is invalid.
-void validate(const CameraSystemCfg& cfg, std::string_view place);
+void validate(const CameraSystemCfg& cfg, std::string_view context);
 
 class CameraSystem {
  public:
@@ -70,8 +70,8 @@ class CameraSystem {
   // world's data must be current. Orbiting cameras are placed around `centre` (m, world frame) and
   // must see `objects` (bodies). Returns "", or why there is no pose for a camera. Accesses this
   // world only, so that worlds can be placed in parallel.
-  std::string place(const World& world, std::uint64_t seed, std::uint64_t episode, Vec3 centre,
-                    std::span<const int> objects);
+  std::string place_cameras(const World& world, std::uint64_t seed, std::uint64_t episode,
+                            Vec3 centre, std::span<const int> objects);
 
   // This world's cameras as JSON text, one object per camera. Cameras on a body have `body` and, in
   // its frame, `pos` (m) and `quat` (wxyz); cameras in the world have `pos`, `forward` and `up`;
@@ -90,8 +90,8 @@ class CameraSystem {
   // Moves a lens that does not show enough of the objects.
   std::string make_visible(int camera, const World& world, Rng& rng, Vec3 centre,
                            std::span<const int> objects, Lens& lens) const;
-  double least_visible(int camera, const World& world, const Lens& lens,
-                       std::span<const int> objects) const;
+  double lowest_visible_share(int camera, const World& world, const Lens& lens,
+                              std::span<const int> objects) const;
 
   CameraSystemCfg cfg_;
   std::vector<Mounted> mounted_;

@@ -75,11 +75,11 @@ struct Bench {
   }
   int body(const char* name) const { return mj_name2id(sim->model(), mjOBJ_BODY, name); }
   // Places the cameras of all worlds. Returns the first reason why a camera has no pose, or "".
-  std::string place(std::uint64_t seed, const std::vector<std::uint64_t>& episodes) {
+  std::string place_cameras(std::uint64_t seed, const std::vector<std::uint64_t>& episodes) {
     std::vector<std::string> why(sim->num_worlds());
     const int objects[] = {body("ball")};
     Hooks hooks([&](const World& w) {
-      why[w.id] = cameras.place(w, seed, episodes[w.id], {0, 0, 0}, objects);
+      why[w.id] = cameras.place_cameras(w, seed, episodes[w.id], {0, 0, 0}, objects);
     });
     sim->worlds().visit(all_worlds, hooks);
     sim->worlds().model_changed();
@@ -181,10 +181,10 @@ TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
   cfg.cameras[1].pos_noise = {0, 0, .5};  // along the viewing direction
   Bench bench(cfg, 3), other(cfg, 1);
   const Pose rest = bench.pose("robot_0/eye");
-  double most = 0;
+  double maximum = 0;
   for (std::uint64_t episode = 0; episode < 40; episode += 2) {
-    ASSERT_EQ(bench.place(7, {episode, episode + 1, episode}), "");
-    ASSERT_EQ(other.place(7, {episode + 1}), "");
+    ASSERT_EQ(bench.place_cameras(7, {episode, episode + 1, episode}), "");
+    ASSERT_EQ(other.place_cameras(7, {episode + 1}), "");
     EXPECT_EQ(bench.cameras.frozen(0), bench.cameras.frozen(2));
     EXPECT_EQ(bench.cameras.frozen(1), other.cameras.frozen(0));
     EXPECT_NE(bench.cameras.frozen(0), bench.cameras.frozen(1));
@@ -195,7 +195,7 @@ TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
     EXPECT_NEAR(moved.z, 0, 1e-9);
     expect_near(forward(now), forward(rest), 1e-6);  // the rotation is about the viewing axis
     EXPECT_LE(angle_between(rest.q, now.q), 5 * kDeg + 1e-9);
-    most = std::max(most, angle_between(rest.q, now.q));
+    maximum = std::max(maximum, angle_between(rest.q, now.q));
     const Pose corner = bench.pose("corner");
     EXPECT_NEAR(corner.p.x, 0, 1e-9);
     EXPECT_NEAR(corner.p.y, -2, .5);
@@ -206,7 +206,7 @@ TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
     EXPECT_NEAR(frozen["corner"]["pos"][1].get<double>(), corner.p.y, 1e-12);
     EXPECT_NEAR(frozen["corner"]["forward"][1].get<double>(), 1, 1e-9);
   }
-  EXPECT_GT(most, 3 * kDeg);
+  EXPECT_GT(maximum, 3 * kDeg);
 }
 
 TEST(CameraSystem, DrawsDoNotDependOnOtherCameras) {
@@ -217,8 +217,8 @@ TEST(CameraSystem, DrawsDoNotDependOnOtherCameras) {
   two.cameras = {mount("wrist", MountKind::kMjcf), orbit};
   two.cameras[0].fovy_noise = 3;
   Bench a(one), b(two);
-  ASSERT_EQ(a.place(1, {5}), "");
-  ASSERT_EQ(b.place(1, {5}), "");
+  ASSERT_EQ(a.place_cameras(1, {5}), "");
+  ASSERT_EQ(b.place_cameras(1, {5}), "");
   const Pose pa = a.pose("exo"), pb = b.pose("exo");
   EXPECT_EQ(pa.p.x, pb.p.x);
   EXPECT_EQ(pa.q.w, pb.q.w);
@@ -271,7 +271,7 @@ TEST(CameraSystem, OrbitCamerasSeeTheObject) {
   c.min_visible = .005;
   Bench bench(cfg);
   for (std::uint64_t episode = 0; episode < 30; ++episode) {
-    ASSERT_EQ(bench.place(0, {episode}), "");
+    ASSERT_EQ(bench.place_cameras(0, {episode}), "");
     const Pose pose = bench.pose("exo");
     const Vec3 flat{pose.p.x, pose.p.y, 0};
     EXPECT_GE(norm(flat), .6 - 1e-9);
@@ -288,17 +288,17 @@ TEST(CameraSystem, TheFieldOfViewOfAnOrbitCameraVaries) {
   cfg.cameras[0].fovy = 50;
   cfg.cameras[0].fovy_noise = 4;
   Bench bench(cfg);
-  double least = 50, most = 50;
+  double minimum = 50, maximum = 50;
   for (std::uint64_t episode = 0; episode < 20; ++episode) {
-    ASSERT_EQ(bench.place(0, {episode}), "");
+    ASSERT_EQ(bench.place_cameras(0, {episode}), "");
     const double fovy = nlohmann::json::parse(bench.cameras.frozen(0))["exo"]["fovy"];
-    least = std::min(least, fovy);
-    most = std::max(most, fovy);
+    minimum = std::min(minimum, fovy);
+    maximum = std::max(maximum, fovy);
   }
-  EXPECT_GE(least, 46);
-  EXPECT_LT(least, 48);
-  EXPECT_GT(most, 52);
-  EXPECT_LE(most, 54);
+  EXPECT_GE(minimum, 46);
+  EXPECT_LT(minimum, 48);
+  EXPECT_GT(maximum, 52);
+  EXPECT_LE(maximum, 54);
 }
 
 // A recorded episode can be rendered again.
@@ -311,7 +311,7 @@ TEST(CameraSystem, FrozenCamerasAreThoseOfTheEpisode) {
   cfg.cameras[0].rot_noise = {5, 5, 5};
   cfg.cameras[0].fovy_noise = 3;
   Bench bench(cfg);
-  ASSERT_EQ(bench.place(0, {4}), "");
+  ASSERT_EQ(bench.place_cameras(0, {4}), "");
   const std::string text = bench.cameras.frozen(0);
   const CameraSystemCfg frozen = read_frozen(text, "robot_0/", "obs_scene");
   EXPECT_EQ(frozen.cameras.at(0).body, "base");
@@ -341,10 +341,10 @@ TEST(CameraSystem, WithoutAVisiblePoseItFailsOrUsesTheBest) {
   c.azimuth_range = {-10, 10};  // behind the wall
   c.min_visible = .005;
   c.max_attempts = 5;
-  EXPECT_THAT(Bench(cfg).place(0, {0}),
+  EXPECT_THAT(Bench(cfg).place_cameras(0, {0}),
               HasSubstr("camera 'exo': none of the 5 poses around (0.000, 0.000, 0.000) shows"));
   c.relaxed = true;
-  EXPECT_EQ(Bench(cfg).place(0, {0}), "");
+  EXPECT_EQ(Bench(cfg).place_cameras(0, {0}), "");
 }
 
 TEST(CameraSystem, ErrorsNameTheCamera) {
@@ -401,7 +401,7 @@ TEST(CameraSystem, CameraThatDoesNotShowTheObjectIsMoved) {
   }
   Bench bench(cfg);
   for (std::uint64_t episode = 0; episode < 10; ++episode) {
-    ASSERT_EQ(bench.place(0, {episode}), "");
+    ASSERT_EQ(bench.place_cameras(0, {episode}), "");
     expect_near(bench.pose("sees").p, {0, -1, 0}, 1e-9);
     for (const char* name : {"blocked", "turned"}) {
       const Pose pose = bench.pose(name);

@@ -50,15 +50,15 @@ CameraMountCfg read_camera(const std::string& name, const Json& camera, std::str
 }  // namespace
 
 CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix,
-                            std::string_view place) {
+                            std::string_view context) {
   const Json all = Json::parse(json, nullptr, /*allow_exceptions=*/false);
   if (!all.is_object() || all.empty())
     throw ValueError(fmt::format(
-        "{}: must be a JSON object of cameras by name, like 'cameras' in obs_scene", place));
+        "{}: must be a JSON object of cameras by name, like 'cameras' in obs_scene", context));
   CameraSystemCfg system;
   for (const auto& [name, camera] : all.items())
     system.cameras.push_back(
-        read_camera(name, camera, prefix, fmt::format("{}, camera '{}'", place, name)));
+        read_camera(name, camera, prefix, fmt::format("{}, camera '{}'", context, name)));
   return system;
 }
 

@@ -10,7 +10,8 @@ namespace mjsense {
 
 // Reads the text of CameraSystem::frozen(), which obs_scene contains under `cameras`, as a camera
 // system without noise. Bodies must be the robot's: their names in the text begin with `prefix`.
-// `place` names the source of the text in messages. Throws ValueError.
-CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix, std::string_view place);
+// `context` names the source of the text in messages. Throws ValueError.
+CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix,
+                            std::string_view context);
 
 }  // namespace mjsense

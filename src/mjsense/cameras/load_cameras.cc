@@ -23,7 +23,9 @@ constexpr std::string_view kEmbedded = "embedded:", kTail = ".toml", kFrozen = "
 bool is_file(std::string_view name) { return name.ends_with(kTail) || name.ends_with(kFrozen); }
 
 // Returns "embedded:robots/franka/cameras/", or a folder on disk.
-std::string folder_of(std::string_view robot_file) { return beside(robot_file, "cameras/"); }
+std::string folder_of(std::string_view robot_file) {
+  return resolve_relative(robot_file, "cameras/");
+}
 
 DataFolder embedded(const std::string& folder) {
   return {"camera system", std::string_view(folder).substr(kEmbedded.size()), kTail};

@@ -10,12 +10,12 @@
 namespace mjsense {
 namespace {
 
-constexpr double kMostRays = 16384;
+constexpr double kMaxRays = 16384;
 constexpr std::uint32_t kDrawn = 0b111;  // groups 0 to 2
 
 }  // namespace
 
-std::vector<double> visible_shares(const RayScene& rays, int world, const Lookout& from,
+std::vector<double> visible_shares(const RayScene& rays, int world, const CameraView& from,
                                    std::span<const int> bodies) {
   const mjModel* m = rays.model();
   RayFilter filter;
@@ -23,7 +23,7 @@ std::vector<double> visible_shares(const RayScene& rays, int world, const Lookou
   filter.backfaces = RayFilter::Backfaces::kCull;
   RayScratch scratch(rays.num_objects());
 
-  const double per_ray = std::max(1.0, std::sqrt(from.width * from.height / kMostRays));
+  const double per_ray = std::max(1.0, std::sqrt(from.width * from.height / kMaxRays));
   const int columns = std::max(1, static_cast<int>(from.width / per_ray));
   const int rows = std::max(1, static_cast<int>(from.height / per_ray));
   const double focal =
@@ -52,7 +52,7 @@ std::vector<double> visible_shares(const RayScene& rays, int world, const Lookou
   for (int body : bodies) {
     std::int64_t count = 0;
     for (int g = 0; g < m->ngeom; ++g) {
-      if (seen[g] > 0 && is_below(m, m->geom_bodyid[g], body)) count += seen[g];
+      if (seen[g] > 0 && is_descendant_or_self(m, m->geom_bodyid[g], body)) count += seen[g];
     }
     shares.push_back(static_cast<double>(count) / (static_cast<double>(rows) * columns));
   }

@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-struct Lookout {
+struct CameraView {
   Pose camera;        // X_WC: x right, y up, looking along -z
   double fovy = 45;   // degrees
   int width, height;  // pixels
@@ -22,7 +22,7 @@ struct Lookout {
 // from outside; those with alpha 0 are invisible, and all others are treated as opaque. At most
 // about 16,000 pixels on a regular grid are sampled. The ray scene must be up to date for this
 // world.
-std::vector<double> visible_shares(const RayScene& rays, int world, const Lookout& from,
+std::vector<double> visible_shares(const RayScene& rays, int world, const CameraView& from,
                                    std::span<const int> bodies);
 
 // Whether a camera is inside a visible solid geom. Its image would still show what is outside.

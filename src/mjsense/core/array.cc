@@ -98,7 +98,7 @@ Array Array::shared(Array& owner, DType dtype, const Shape& shape) {
 
 void Array::fill_zero() { std::memset(data_.get(), 0, bytes()); }
 
-void Array::throw_other_type(DType asked) const {
+void Array::throw_type_mismatch(DType asked) const {
   throw RuntimeError(fmt::format("an array {} of {} cannot be read as {}", shape_.str(),
                                  dtype_name(dtype_), dtype_name(asked)));
 }

@@ -142,9 +142,9 @@ class Array {
   template <class T>
   void check_type() const {
     if (dtype_of<T>() != dtype_) [[unlikely]]
-      throw_other_type(dtype_of<T>());
+      throw_type_mismatch(dtype_of<T>());
   }
-  [[noreturn]] void throw_other_type(DType asked) const;
+  [[noreturn]] void throw_type_mismatch(DType asked) const;
 
   struct Free {
     Free() : owned(true) {}

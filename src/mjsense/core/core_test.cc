@@ -12,8 +12,8 @@
 #include "mjsense/core/array.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/json.h"
-#include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/core/utf8.h"
 
 namespace mjsense {

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "mjsense/core/fields.h"
-#include "mjsense/core/spec.h"
+#include "mjsense/core/sensor_spec.h"
 
 namespace mjsense {
 

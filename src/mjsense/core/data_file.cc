@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <utility>
 
-#include "mjsense/core/embedded.h"
+#include "mjsense/core/embedded_files.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 
 namespace mjsense {
 namespace {
@@ -43,7 +43,7 @@ DataFile DataFolder::find(std::string_view name) const {
   return {fs::absolute(path).lexically_normal().string(), std::move(text)};
 }
 
-std::string beside(std::string_view path, const std::string& name) {
+std::string resolve_relative(std::string_view path, const std::string& name) {
   if (name.starts_with(kEmbedded) || name.starts_with(kPackage) || fs::path(name).is_absolute())
     return name;
   const bool embedded = path.starts_with(kEmbedded);

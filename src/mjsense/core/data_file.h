@@ -29,6 +29,6 @@ struct DataFolder {
 
 // Resolves `name` relative to the folder of the file at `path`, unless it is absolute, embedded or
 // in a package.
-std::string beside(std::string_view path, const std::string& name);
+std::string resolve_relative(std::string_view path, const std::string& name);
 
 }  // namespace mjsense

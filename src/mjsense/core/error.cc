@@ -32,12 +32,13 @@ int distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::vector<std::string> nearest_names(std::string_view name,
-                                       std::span<const std::string> candidates, std::size_t most) {
+                                       std::span<const std::string> candidates,
+                                       std::size_t maximum) {
   // Longer names are not misspelt names, and time and memory grow with the square of the length.
-  constexpr std::size_t kMostBytes = 256;
+  constexpr std::size_t kMaxBytes = 256;
   std::vector<std::pair<int, std::string>> scored;
   for (const std::string& c : candidates) {
-    if (name.size() > kMostBytes || c.size() > kMostBytes) continue;
+    if (name.size() > kMaxBytes || c.size() > kMaxBytes) continue;
     int d = distance(name, c);
     // A name with an additional prefix, or one without its prefix, also counts as near.
     if (!name.empty() && c.size() > name.size() && c.ends_with(name)) d = 2;
@@ -50,7 +51,7 @@ std::vector<std::string> nearest_names(std::string_view name,
                    [](auto& a, auto& b) { return a.first < b.first; });
   std::vector<std::string> names;
   for (auto& [d, c] : scored) {
-    if (names.size() == most) break;
+    if (names.size() == maximum) break;
     if (std::find(names.begin(), names.end(), c) == names.end()) names.push_back(c);
   }
   return names;
@@ -66,16 +67,16 @@ std::string suggest(std::string_view name, std::span<const std::string> candidat
     return text + "?";
   }
   if (candidates.empty()) return "";
-  constexpr std::size_t kMost = 12;
-  const auto shown = candidates.first(std::min(candidates.size(), kMost));
+  constexpr std::size_t kMax = 12;
+  const auto shown = candidates.first(std::min(candidates.size(), kMax));
   return fmt::format("; available: {}{}", fmt::join(shown, ", "),
-                     candidates.size() > kMost ? ", ..." : "");
+                     candidates.size() > kMax ? ", ..." : "");
 }
 
-void throw_unknown(std::string_view place, std::string_view kind, std::string_view name,
+void throw_unknown(std::string_view context, std::string_view kind, std::string_view name,
                    std::span<const std::string> candidates) {
   throw KeyError(
-      fmt::format("{}: no {} named '{:.300}'{}", place, kind, name, suggest(name, candidates)));
+      fmt::format("{}: no {} named '{:.300}'{}", context, kind, name, suggest(name, candidates)));
 }
 
 }  // namespace mjsense

@@ -37,18 +37,18 @@ struct RuntimeError : Error {
   explicit RuntimeError(const std::string& message) : Error(ErrorKind::kRuntime, message) {}
 };
 
-// Returns up to `most` candidates nearest to `name` by edit distance, nearest first. Candidates
+// Returns up to `maximum` candidates nearest to `name` by edit distance, nearest first. Candidates
 // that differ too much are left out.
 [[nodiscard]] std::vector<std::string> nearest_names(std::string_view name,
                                                      std::span<const std::string> candidates,
-                                                     std::size_t most = 3);
+                                                     std::size_t maximum = 3);
 
 // "; did you mean 'a' or 'b'?" or, if no candidate is near, "; available: a, b, c" (the first 12).
 // "" if there are no candidates.
 [[nodiscard]] std::string suggest(std::string_view name, std::span<const std::string> candidates);
 
 // Throws KeyError "sensor 'feet': no geom named 'FR_fot'; did you mean 'FR_foot'?"
-[[noreturn]] void throw_unknown(std::string_view place, std::string_view kind,
+[[noreturn]] void throw_unknown(std::string_view context, std::string_view kind,
                                 std::string_view name, std::span<const std::string> candidates);
 
 }  // namespace mjsense

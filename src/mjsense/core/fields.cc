@@ -37,19 +37,19 @@ std::string listed(std::span<const std::string_view> words) {
 }
 
 // "sensor 'feet': reduce is 'max'"
-std::string found(std::string_view place, std::string_view field, std::string_view value) {
-  return fmt::format("{}{}{} is {}", place, place.empty() ? "" : ": ", field, value);
+std::string found(std::string_view context, std::string_view field, std::string_view value) {
+  return fmt::format("{}{}{} is {}", context, context.empty() ? "" : ": ", field, value);
 }
 
 [[noreturn]] void throw_word(std::string_view text, std::span<const std::string_view> words,
-                             std::string_view place, std::string_view field) {
+                             std::string_view context, std::string_view field) {
   const std::vector<std::string> names(words.begin(), words.end());
   std::vector<std::string> shown = names;
   std::ranges::replace(shown, std::string(), std::string("\"\""));
   std::string hint;
   if (!nearest_names(text, names, 1).empty()) hint = suggest(text, names);
   throw ValueError(fmt::format("{}: must be one of {}{}",
-                               found(place, field, fmt::format("'{}'", text)),
+                               found(context, field, fmt::format("'{}'", text)),
                                fmt::join(shown, ", "), hint));
 }
 
@@ -69,9 +69,9 @@ bool in_range(const FieldDecl& field, double x) {
 }
 
 void check_number(const FieldDecl& field, double x, const std::string& shown,
-                  std::string_view place, std::string_view name) {
+                  std::string_view context, std::string_view name) {
   if (in_range(field, x)) return;
-  throw ValueError(fmt::format("{}: {}", found(place, name, shown), range_text(field)));
+  throw ValueError(fmt::format("{}: {}", found(context, name, shown), range_text(field)));
 }
 
 // Quick check of lists of numbers, which can be long: no element names are formatted.
@@ -88,25 +88,25 @@ bool right_numbers(const FieldDecl& field, const FieldType& type, const void* va
 }
 
 void check_list(const FieldDecl& field, const FieldType& type, const void* value,
-                std::string_view place, const std::string& name);
+                std::string_view context, const std::string& name);
 
 void check_value(const FieldDecl& field, const FieldType& type, const void* value,
-                 std::string_view place, const std::string& name) {
+                 std::string_view context, const std::string& name) {
   switch (type.kind) {
     case Kind::kNumber: {
       const double x = get_number(type, value);
-      return check_number(field, x, fmt::format("{}", x), place, name);
+      return check_number(field, x, fmt::format("{}", x), context, name);
     }
     case Kind::kInt: {
       const std::int64_t x = get_integer(type, value);
-      return check_number(field, static_cast<double>(x), fmt::format("{}", x), place, name);
+      return check_number(field, static_cast<double>(x), fmt::format("{}", x), context, name);
     }
     case Kind::kText: {
       const auto& text = *static_cast<const std::string*>(value);
-      if (!field.words.empty()) word_index(text, field.words, place, name);
+      if (!field.words.empty()) enum_index(text, field.words, context, name);
       return;
     }
-    case Kind::kWord:
+    case Kind::kEnum:
     case Kind::kBool:
     case Kind::kUnsigned:
     case Kind::kPath:
@@ -115,32 +115,32 @@ void check_value(const FieldDecl& field, const FieldType& type, const void* valu
     case Kind::kList:
     case Kind::kOptional:
     case Kind::kMap:
-      return check_list(field, type, value, place, name);
+      return check_list(field, type, value, context, name);
     case Kind::kObject: {
       const StructDecl& decl = type.object();
-      const std::string inside = fmt::format("{}{}{}", place, place.empty() ? "" : ": ", name);
+      const std::string inside = fmt::format("{}{}{}", context, context.empty() ? "" : ": ", name);
       return check_fields(decl, value, inside);
     }
     case Kind::kChoice: {
       const int which = type.which(value);
       if (!type.get(const_cast<void*>(value)))
-        throw ValueError(fmt::format("{}{}{} is null", place, place.empty() ? "" : ": ", name));
+        throw ValueError(fmt::format("{}{}{} is null", context, context.empty() ? "" : ": ", name));
       if (which < 0) return;  // unknown alternative, defined elsewhere: it checks itself
       const StructDecl& decl = *type.alternatives()[which];
-      const std::string inside = fmt::format("{}{}{}", place, place.empty() ? "" : ": ", name);
+      const std::string inside = fmt::format("{}{}{}", context, context.empty() ? "" : ": ", name);
       return check_fields(decl, type.get(const_cast<void*>(value)), inside);
     }
   }
 }
 
 void check_list(const FieldDecl& field, const FieldType& type, const void* value,
-                std::string_view place, const std::string& name) {
+                std::string_view context, const std::string& name) {
   // the accessors of a type are shared by reading and writing
   void* list = const_cast<void*>(value);
   const std::size_t n = type.count(list);
   if (n == 0 && field.is_not_empty) {
     throw ValueError(fmt::format(
-        "{}{}{} is empty{}", place, place.empty() ? "" : ": ", name,
+        "{}{}{} is empty{}", context, context.empty() ? "" : ": ", name,
         field.words.empty() ? "" : fmt::format("; choose from {}", fmt::join(field.words, ", "))));
   }
   const FieldType& element = type.element();
@@ -152,13 +152,13 @@ void check_list(const FieldDecl& field, const FieldType& type, const void* value
                              : type.kind == Kind::kMap
                                  ? fmt::format("{}['{}']", name, *type.key_at(list, i))
                                  : fmt::format("{}[{}]", name, i);
-    check_value(field, element, type.at(list, i), place, part);
+    check_value(field, element, type.at(list, i), context, part);
     if (field.words.empty() || element.kind != Kind::kText) continue;
     const auto& text = *static_cast<const std::string*>(type.at(list, i));
     for (std::size_t k = 0; k < i; ++k) {
       if (*static_cast<const std::string*>(type.at(list, k)) == text)
         throw ValueError(
-            fmt::format("{}{}{} has '{}' twice", place, place.empty() ? "" : ": ", name, text));
+            fmt::format("{}{}{} has '{}' twice", context, context.empty() ? "" : ": ", name, text));
     }
   }
 }
@@ -194,8 +194,8 @@ bool read_value(const FieldDecl& field, const FieldType& type, void* value, std:
     case Kind::kPath:
       *static_cast<std::filesystem::path*>(value) = text;
       return true;
-    case Kind::kWord:
-      set_integer(type, value, word_index(text, type.words, "", field.option_name()));
+    case Kind::kEnum:
+      set_integer(type, value, enum_index(text, type.words, "", field.option_name()));
       return true;
     case Kind::kOptional:
       type.clear(value);
@@ -239,7 +239,7 @@ std::string write_value(const FieldType& type, const void* value) {
       return *static_cast<const std::string*>(value);
     case Kind::kPath:
       return static_cast<const std::filesystem::path*>(value)->string();
-    case Kind::kWord:
+    case Kind::kEnum:
       return std::string(type.words[get_integer(type, value)]);
     case Kind::kOptional:
       return type.count(v) ? write_value(type.element(), type.at(v, 0)) : "";
@@ -261,12 +261,12 @@ std::string write_value(const FieldType& type, const void* value) {
 
 }  // namespace
 
-int word_index(std::string_view text, std::span<const std::string_view> words,
-               std::string_view place, std::string_view field) {
+int enum_index(std::string_view text, std::span<const std::string_view> words,
+               std::string_view context, std::string_view field) {
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (same_word(text, words[i])) return static_cast<int>(i);
   }
-  throw_word(text, words, place, field);
+  throw_word(text, words, context, field);
 }
 
 const FieldDecl* StructDecl::find(std::string_view field) const {
@@ -338,14 +338,14 @@ FieldDecl& FieldVisitor::add(const char* name, const void* member, const FieldTy
       .name = name, .sentence = sentence.text(), .type = type, .offset = offset, .owner = owner_});
 }
 
-void check_fields(const StructDecl& decl, const void* object, std::string_view place) {
-  for (const FieldDecl& field : decl.fields) check_field(field, object, place);
-  if (decl.validate) decl.validate(object, place);
+void check_fields(const StructDecl& decl, const void* object, std::string_view context) {
+  for (const FieldDecl& field : decl.fields) check_field(field, object, context);
+  if (decl.validate) decl.validate(object, context);
 }
 
-void check_field(const FieldDecl& field, const void* object, std::string_view place) {
+void check_field(const FieldDecl& field, const void* object, std::string_view context) {
   if (!field.type) return;
-  check_value(field, *field.type, at(object, field), place, field.option_name());
+  check_value(field, *field.type, at(object, field), context, field.option_name());
 }
 
 void read_text(const FieldDecl& field, void* object, std::string_view text) {
@@ -423,7 +423,7 @@ std::string expected(const FieldType& type) {
     case Kind::kText:
     case Kind::kPath:
       return "a str";
-    case Kind::kWord:
+    case Kind::kEnum:
       return listed(type.words);
     case Kind::kArray:
       return fmt::format("{} numbers", type.count(nullptr));

@@ -46,51 +46,52 @@ class Sentence {
 };
 
 // Words for the values of an enumeration that counts from 0. Specialise next to the enumeration:
-//  template <> inline constexpr std::array<std::string_view, 2> kWords<Side>{"left", "right"};
+//  template <> inline constexpr std::array<std::string_view, 2> kEnumNames<Side>{"left", "right"};
 template <class E>
-inline constexpr std::nullptr_t kWords = nullptr;
+inline constexpr std::nullptr_t kEnumNames = nullptr;
 
 template <class E>
-concept Worded = std::is_enum_v<E> && !std::is_same_v<decltype(kWords<E>), const std::nullptr_t>;
+concept HasEnumNames =
+    std::is_enum_v<E> && !std::is_same_v<decltype(kEnumNames<E>), const std::nullptr_t>;
 
-template <Worded E>
-std::string_view word(E value) {
-  return kWords<E>[static_cast<std::size_t>(value)];
+template <HasEnumNames E>
+std::string_view enum_name(E value) {
+  return kEnumNames<E>[static_cast<std::size_t>(value)];
 }
 
 // Index of `text` in `words`, ignoring case. Throws ValueError "sensor 'feet': reduce is 'max':
 // must be one of none, mindist, maxforce, netforce; did you mean 'maxforce'?"
-int word_index(std::string_view text, std::span<const std::string_view> words,
-               std::string_view place, std::string_view field);
+int enum_index(std::string_view text, std::span<const std::string_view> words,
+               std::string_view context, std::string_view field);
 
 // A member that holds one of the words: `cfg.reduce = ContactReduce::kNone` or `cfg.reduce =
 // "none"`. An unknown word does not compile.
-template <Worded E>
-class Word {
+template <HasEnumNames E>
+class NamedEnum {
  public:
   using Enum = E;
-  constexpr Word() = default;
-  constexpr Word(E value) : value_(value) {}  // NOLINT: implicit conversion is intended
+  constexpr NamedEnum() = default;
+  constexpr NamedEnum(E value) : value_(value) {}  // NOLINT: implicit conversion is intended
   // NOLINT: implicit conversion is intended
-  consteval Word(const char* text) : value_(find(text)) {}
+  consteval NamedEnum(const char* text) : value_(find(text)) {}
   constexpr operator E() const { return value_; }  // NOLINT
-  std::string_view text() const { return word(value_); }
-  friend constexpr bool operator==(Word a, Word b) { return a.value_ == b.value_; }
-  friend constexpr bool operator==(Word a, E b) { return a.value_ == b; }
+  std::string_view text() const { return enum_name(value_); }
+  friend constexpr bool operator==(NamedEnum a, NamedEnum b) { return a.value_ == b.value_; }
+  friend constexpr bool operator==(NamedEnum a, E b) { return a.value_ == b; }
 
  private:
   static consteval E find(std::string_view text) {
-    for (std::size_t i = 0; i < kWords<E>.size(); ++i) {
-      if (kWords<E>[i] == text) return static_cast<E>(i);
+    for (std::size_t i = 0; i < kEnumNames<E>.size(); ++i) {
+      if (kEnumNames<E>[i] == text) return static_cast<E>(i);
     }
     throw "the word is not one of the allowed words";
   }
   E value_{};
 };
 
-template <Worded E>
-E from_word(std::string_view text, std::string_view place, std::string_view field) {
-  return static_cast<E>(word_index(text, kWords<E>, place, field));
+template <HasEnumNames E>
+E from_word(std::string_view text, std::string_view context, std::string_view field) {
+  return static_cast<E>(enum_index(text, kEnumNames<E>, context, field));
 }
 
 class JsonWriter;
@@ -105,7 +106,7 @@ struct FieldType {
     kNumber,
     kText,
     kPath,
-    kWord,      // an enumeration
+    kEnum,      // an enumeration
     kArray,     // of fixed length
     kList,      // std::vector
     kOptional,  // accessed as a list of 0 or 1 elements
@@ -115,7 +116,7 @@ struct FieldType {
   };
   Kind kind;
   std::size_t bytes = 0;                      // of numbers
-  std::span<const std::string_view> words{};  // kWord
+  std::span<const std::string_view> words{};  // kEnum
   // kArray, kList, kOptional, kMap
   const FieldType& (*element)() = nullptr;
   std::size_t (*count)(const void* list) = nullptr;
@@ -205,7 +206,7 @@ struct StructDecl {
   std::shared_ptr<const void> defaults;
   // Checks relations between fields: validate(cfg, place) next to the struct, or its member
   // function.
-  void (*validate)(const void* object, std::string_view place) = nullptr;
+  void (*validate)(const void* object, std::string_view context) = nullptr;
   void* (*create)() = nullptr;
   void (*destroy)(void* object) = nullptr;
 
@@ -279,19 +280,19 @@ struct StructOf {
   void* (*create)();
   void (*destroy)(void* object);
   void (*visit)(FieldVisitor& visitor, void* object);
-  void (*validate)(const void* object, std::string_view place);
+  void (*validate)(const void* object, std::string_view context);
 };
 const StructDecl& make_struct(const StructOf& of);
 
 template <class T>
-constexpr auto validator() -> void (*)(const void* object, std::string_view place) {
+constexpr auto validator() -> void (*)(const void* object, std::string_view context) {
   if constexpr (requires(const T& t) { t.validate(std::string_view()); }) {
-    return [](const void* object, std::string_view place) {
-      static_cast<const T*>(object)->validate(place);
+    return [](const void* object, std::string_view context) {
+      static_cast<const T*>(object)->validate(context);
     };
   } else if constexpr (requires(const T& t) { validate(t, std::string_view()); }) {
-    return [](const void* object, std::string_view place) {
-      validate(*static_cast<const T*>(object), place);
+    return [](const void* object, std::string_view context) {
+      validate(*static_cast<const T*>(object), context);
     };
   } else {
     return nullptr;
@@ -311,14 +312,14 @@ const StructDecl& struct_of() {
 
 // Throws ValueError for the first field that is out of range, NaN, or not a known word: "sensor
 // 'feet': num_slots is 0: must be at least 1".
-void check_fields(const StructDecl& decl, const void* object, std::string_view place);
+void check_fields(const StructDecl& decl, const void* object, std::string_view context);
 
 // Checks one field only.
-void check_field(const FieldDecl& field, const void* object, std::string_view place);
+void check_field(const FieldDecl& field, const void* object, std::string_view context);
 
 template <Described T>
-void check_fields(const T& object, std::string_view place) {
-  check_fields(struct_of<T>(), &object, place);
+void check_fields(const T& object, std::string_view context) {
+  check_fields(struct_of<T>(), &object, context);
 }
 
 // Parses a value as written on the command line: "3", "true", "maxforce", "0,0,1", "wrist,exo",
@@ -354,9 +355,9 @@ namespace field_detail {
 using Kind = FieldType::Kind;
 
 template <class T>
-inline constexpr bool kIsWord = false;
+inline constexpr bool kIsNamedEnum = false;
 template <class E>
-inline constexpr bool kIsWord<Word<E>> = true;
+inline constexpr bool kIsNamedEnum<NamedEnum<E>> = true;
 template <class T>
 inline constexpr bool kIsArray = false;
 template <class T, std::size_t N>
@@ -450,10 +451,10 @@ constexpr FieldType make() {
     return {.kind = Kind::kNumber, .bytes = sizeof(T)};
   } else if constexpr (std::is_same_v<T, std::string>) {
     return {.kind = Kind::kText};
-  } else if constexpr (kIsWord<T>) {
-    return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<typename T::Enum>};
-  } else if constexpr (Worded<T>) {
-    return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<T>};
+  } else if constexpr (kIsNamedEnum<T>) {
+    return {.kind = Kind::kEnum, .bytes = sizeof(T), .words = kEnumNames<typename T::Enum>};
+  } else if constexpr (HasEnumNames<T>) {
+    return {.kind = Kind::kEnum, .bytes = sizeof(T), .words = kEnumNames<T>};
   } else if constexpr (kIsArray<T>) {
     return array<T>();
   } else if constexpr (kIsMap<T>) {

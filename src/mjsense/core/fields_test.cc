@@ -12,7 +12,7 @@ namespace mjsense {
 
 enum class Side { kLeft, kRight };
 template <>
-inline constexpr std::array<std::string_view, 2> kWords<Side>{"left", "right"};
+inline constexpr std::array<std::string_view, 2> kEnumNames<Side>{"left", "right"};
 
 namespace fields_test {
 
@@ -110,7 +110,7 @@ TEST(Fields, EveryValueIsChecked) {
 
 TEST(Fields, WordsIgnoreCaseAndErrorsNameTheNearest) {
   EXPECT_EQ(from_word<Side>("LEFT", "sensor 'x'", "side"), Side::kLeft);
-  EXPECT_EQ(word(Side::kRight), "right");
+  EXPECT_EQ(enum_name(Side::kRight), "right");
   try {
     from_word<Side>("rihgt", "sensor 'x'", "side");
     FAIL();

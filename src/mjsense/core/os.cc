@@ -43,10 +43,10 @@ std::uint64_t free_memory() {
     std::uint64_t kilobytes = 0;
     if (word == "MemAvailable:" && file >> kilobytes) available = kilobytes * 1024;
   }
-  const std::uint64_t most = number_in("/sys/fs/cgroup/memory.max");
+  const std::uint64_t maximum = number_in("/sys/fs/cgroup/memory.max");
   const std::uint64_t taken = number_in("/sys/fs/cgroup/memory.current");
-  if (most != kUnknown && taken != kUnknown)
-    available = std::min(available, most > taken ? most - taken : 0);
+  if (maximum != kUnknown && taken != kUnknown)
+    available = std::min(available, maximum > taken ? maximum - taken : 0);
   return available;
 }
 
@@ -76,7 +76,7 @@ std::pair<Fd, Fd> make_pipe() {
 
 Fd memory_file(const char* name) { return Fd(memfd_create(name, MFD_CLOEXEC)); }
 
-Fd wake_up() { return Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); }
+Fd make_eventfd() { return Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); }
 
 void widen_pipe(int pipe, int bytes) { fcntl(pipe, F_SETPIPE_SZ, bytes); }
 
@@ -88,7 +88,7 @@ bool reserve(int file, std::int64_t bytes) {
   return fallocate(file, FALLOC_FL_KEEP_SIZE, 0, bytes) == 0;
 }
 
-void end_with_parent() { prctl(PR_SET_PDEATHSIG, SIGKILL); }
+void die_with_parent() { prctl(PR_SET_PDEATHSIG, SIGKILL); }
 
 bool close_files(unsigned first, unsigned last) {
   constexpr long kCloseRange = 436;  // as a number, because glibc has a name for it only since 2.34

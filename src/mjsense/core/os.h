@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 
 namespace mjsense::os {
 
@@ -26,7 +26,7 @@ std::vector<int> open_files(int first);
 // reason.
 std::pair<Fd, Fd> make_pipe();  // read end, write end
 Fd memory_file(const char* name);
-Fd wake_up();                          // eventfd: readable after a write of 8 bytes
+Fd make_eventfd();                     // eventfd: readable after a write of 8 bytes
 void widen_pipe(int pipe, int bytes);  // best effort
 // Reserves disk space without changing the file's size; false: see errno.
 bool reserve(int file, std::int64_t bytes);
@@ -34,7 +34,7 @@ bool reserve(int file, std::int64_t bytes);
 std::filesystem::path path_of(int file);
 
 // Calls that are safe in a child between fork() and exec().
-void end_with_parent();  // kills the child when its parent's thread ends
+void die_with_parent();  // kills the child when its parent's thread ends
 // false: not supported by this kernel (before 5.9)
 bool close_files(unsigned first, unsigned last);
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 
 namespace mjsense {
 namespace {

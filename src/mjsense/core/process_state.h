@@ -7,7 +7,7 @@
 
 namespace mjsense {
 
-inline constexpr int kMostThreads = 4096;  // a larger number is taken for a typing error
+inline constexpr int kMaxThreads = 4096;  // a larger number is taken for a typing error
 
 // Registry of objects that own threads. In the child of a fork their threads do not exist, and
 // joining them would block forever. In the child, every owner created before the fork is an orphan.

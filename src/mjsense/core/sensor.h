@@ -23,14 +23,14 @@
 
 #include "mjsense/core/array.h"
 #include "mjsense/core/rng.h"
-#include "mjsense/core/spec.h"
+#include "mjsense/core/sensor_spec.h"
 
 namespace mjsense {
 
 class DebugShapes;
 class RayScene;
 class Scene;
-class Shared;
+class SharedCache;
 class ThreadPool;
 
 // One world as passed to a sensor. In compute() and substep() the derived fields of `data`
@@ -78,7 +78,7 @@ struct SensorInit {
   int num_worlds = 1;
   int decimation = 1;  // substeps per control step
   int threads = 1;
-  Shared* shared = nullptr;  // null if the sensor is used outside of a simulation
+  SharedCache* shared = nullptr;  // null if the sensor is used outside of a simulation
 };
 
 // Input of cast(): the ray scene after compute() of the worlds `ids`.
@@ -131,9 +131,9 @@ class Sensor {
   virtual mjtStage needs() const { return mjSTAGE_ACC; }
   // True if compute() must run exactly once per control step even if the sensor is not read
   // (delays, rates, filters).
-  virtual bool eager() const { return false; }
+  virtual bool needs_every_step() const { return false; }
   // Keys of the scene's sensors that initialize() accesses; they are initialized first.
-  virtual std::vector<std::string> reads() const { return {}; }
+  virtual std::vector<std::string> initialization_dependencies() const { return {}; }
   // Sensors whose rows compute() reads; they are computed first.
   virtual std::span<Sensor* const> inputs() const { return {}; }
 

@@ -30,35 +30,35 @@ class Reader {
       // the key that selected this alternative
       if (name == "kind" && *decl.kind && !decl.find(name)) continue;
       const FieldDecl* field = decl.find(name);
-      const std::string place = toml_place(path_, node);
+      const std::string context = toml_context(path_, node);
       if (!field || !field->type) {
-        throw_unknown(place, inside.empty() ? "key" : fmt::format("key of '{}'", inside), name,
+        throw_unknown(context, inside.empty() ? "key" : fmt::format("key of '{}'", inside), name,
                       names);
       }
       value(*field->type, at(object, *field), node,
             inside.empty() ? name : fmt::format("{}.{}", inside, name));
-      check_field(*field, object, place_in(place, inside));
+      check_field(*field, object, place_in(context, inside));
     }
-    const std::string place = toml_place(path_, table);
+    const std::string context = toml_context(path_, table);
     for (const FieldDecl& field : decl.fields) {
       if (field.is_required && !table.contains(field.name)) {
-        throw ValueError(fmt::format("{}: {}'{}' is missing: {}", place,
+        throw ValueError(fmt::format("{}: {}'{}' is missing: {}", context,
                                      inside.empty() ? "" : fmt::format("'{}': ", inside),
                                      field.name, field.sentence));
       }
     }
-    if (decl.validate) decl.validate(object, place_in(place, inside));
+    if (decl.validate) decl.validate(object, place_in(context, inside));
   }
 
  private:
-  static std::string place_in(const std::string& place, const std::string& inside) {
-    return inside.empty() ? place : fmt::format("{}: {}", place, inside);
+  static std::string place_in(const std::string& context, const std::string& inside) {
+    return inside.empty() ? context : fmt::format("{}: {}", context, inside);
   }
 
   [[noreturn]] void wrong(const FieldType& type, const toml::node& node,
                           const std::string& name) const {
     throw ValueError(fmt::format("{}: the value of '{}' has the wrong type: must be {}",
-                                 toml_place(path_, node), name, expected(type)));
+                                 toml_context(path_, node), name, expected(type)));
   }
 
   void value(const FieldType& type, void* out, const toml::node& node,
@@ -94,7 +94,7 @@ class Reader {
       default:
         break;
     }
-    if (!read_toml_value(type, out, node, toml_place(path_, node), name)) wrong(type, node, name);
+    if (!read_toml_value(type, out, node, toml_context(path_, node), name)) wrong(type, node, name);
   }
 
   // A choice is a table with a `kind`, or only that word if all other fields have their defaults.
@@ -102,15 +102,15 @@ class Reader {
               const std::string& name) const {
     const toml::table* table = node.as_table();
     const toml::node* kind = table ? table->get("kind") : &node;
-    const std::string place = toml_place(path_, node);
+    const std::string context = toml_context(path_, node);
     std::vector<std::string_view> kinds;
     for (const StructDecl* decl : type.alternatives()) kinds.emplace_back(decl->kind);
     if (!kind)
       throw ValueError(
-          fmt::format("{}: '{}' needs a kind: one of {}", place, name, fmt::join(kinds, ", ")));
+          fmt::format("{}: '{}' needs a kind: one of {}", context, name, fmt::join(kinds, ", ")));
     const auto word = kind->value_exact<std::string>();
     if (!word) wrong(type, node, name);
-    const int which = word_index(*word, kinds, place, fmt::format("{}.kind", name));
+    const int which = enum_index(*word, kinds, context, fmt::format("{}.kind", name));
     void* object = type.emplace(out, which);
     if (table) this->table(*type.alternatives()[which], object, *table, name);
   }

@@ -23,12 +23,12 @@ toml::table parse_toml(std::string_view text, const std::string& path) {
   }
 }
 
-std::string toml_place(const std::string& path, const toml::node& node) {
+std::string toml_context(const std::string& path, const toml::node& node) {
   return fmt::format("{}:{}", path, node.source().begin.line);
 }
 
 bool read_toml_value(const FieldType& type, void* out, const toml::node& node,
-                     std::string_view place, std::string_view name) {
+                     std::string_view context, std::string_view name) {
   switch (type.kind) {
     case Kind::kBool: {
       const auto value = node.value_exact<bool>();
@@ -55,19 +55,19 @@ bool read_toml_value(const FieldType& type, void* out, const toml::node& node,
       if (value) *static_cast<std::filesystem::path*>(out) = *value;
       return value.has_value();
     }
-    case Kind::kWord: {
+    case Kind::kEnum: {
       const auto value = node.value_exact<std::string>();
-      if (value) set_integer(type, out, word_index(*value, type.words, place, name));
+      if (value) set_integer(type, out, enum_index(*value, type.words, context, name));
       return value.has_value();
     }
     case Kind::kOptional:
       type.clear(out);
-      return read_toml_value(type.element(), type.append(out), node, place, name);
+      return read_toml_value(type.element(), type.append(out), node, context, name);
     case Kind::kArray: {
       const toml::array* list = node.as_array();
       if (!list || list->size() != type.count(out)) return false;
       for (std::size_t i = 0; i < list->size(); ++i) {
-        if (!read_toml_value(type.element(), type.at(out, i), *list->get(i), place, name))
+        if (!read_toml_value(type.element(), type.at(out, i), *list->get(i), context, name))
           return false;
       }
       return true;
@@ -76,7 +76,7 @@ bool read_toml_value(const FieldType& type, void* out, const toml::node& node,
       const toml::array* list = node.as_array();
       type.clear(out);
       for (std::size_t i = 0; list && i < list->size(); ++i) {
-        if (!read_toml_value(type.element(), type.append(out), *list->get(i), place, name))
+        if (!read_toml_value(type.element(), type.append(out), *list->get(i), context, name))
           return false;
       }
       return list;

@@ -24,7 +24,7 @@ namespace mjsense {
 toml::table parse_toml(std::string_view text, const std::string& path);
 
 // Location of a node: "x.toml:3".
-std::string toml_place(const std::string& path, const toml::node& node);
+std::string toml_context(const std::string& path, const toml::node& node);
 
 // Like read_toml_fields() (core/toml_fields.h), for one table. `inside` is the name of the table in
 // messages, "sensors[1]"; "" for the top level.
@@ -32,9 +32,9 @@ void read_toml_table(const toml::table& table, const std::string& path, const St
                      void* object, const std::string& inside);
 
 // Reads a bool, number, text, path or word, or lists, arrays and optionals of them. Returns false
-// if the value has another type or does not fit. Throws ValueError, prefixed with `place`, for an
+// if the value has another type or does not fit. Throws ValueError, prefixed with `context`, for an
 // unknown word.
 bool read_toml_value(const FieldType& type, void* out, const toml::node& node,
-                     std::string_view place, std::string_view name);
+                     std::string_view context, std::string_view name);
 
 }  // namespace mjsense

@@ -57,11 +57,11 @@ FieldType CustomFieldType<Shared>::make() {
   return t;
 }
 
-void check_effect(const Shared& effect, std::string_view place) {
+void check_effect(const Shared& effect, std::string_view context) {
   const FieldType& type = field_type<Shared>();
   const int which = type.which(&effect);
-  if (which < 0) return effect->validate(place);
-  check_fields(*type.alternatives()[which], whole(effect), place);
+  if (which < 0) return effect->validate(context);
+  check_fields(*type.alternatives()[which], whole(effect), context);
 }
 
 }  // namespace mjsense

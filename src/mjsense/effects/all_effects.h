@@ -22,8 +22,8 @@ struct CustomFieldType<std::shared_ptr<const Effect>> {
   static FieldType make();
 };
 
-// Checks the fields of an effect, also against each other. Throws ValueError; `place` starts its
+// Checks the fields of an effect, also against each other. Throws ValueError; `context` starts its
 // message.
-void check_effect(const std::shared_ptr<const Effect>& effect, std::string_view place);
+void check_effect(const std::shared_ptr<const Effect>& effect, std::string_view context);
 
 }  // namespace mjsense

@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/say.h"
+#include "mjsense/core/print_stderr.h"
 
 namespace mjsense {
 
@@ -17,7 +17,7 @@ void Scale::initialize(const EffectInit& init) {
   check_components(factor, "factor", init);
 }
 
-void Scale::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
+void Scale::apply(const EffectTime& /*moment*/, const EffectRow& row) {
   row.transform([&](double x, int i) { return x * component(factor, i); });
 }
 
@@ -25,14 +25,14 @@ void Misalignment::initialize(const EffectInit& init) {
   check_numeric(init);
   if (init.size % 3 != 0) {
     throw ValueError(fmt::format("{}: the row must consist of 3-vectors; it has {} values",
-                                 init.place, init.size));
+                                 init.context, init.size));
   }
   stream_ = init.stream;
   matrix_.assign(static_cast<std::size_t>(init.num_worlds) * 9, 0.0);
   drawn_.assign(init.num_worlds, 0);
 }
 
-void Misalignment::reset(const EffectMoment& moment) {
+void Misalignment::reset(const EffectTime& moment) {
   Rng rng = moment.episode_rng(stream_);
   double s[3], a[3];
   for (int i = 0; i < 3; ++i) s[i] = 1.0 + scale_error[i] + scale_error_std * rng.normal();
@@ -54,7 +54,7 @@ void Misalignment::reset(const EffectMoment& moment) {
   drawn_[moment.world] = 1;
 }
 
-void Misalignment::apply(const EffectMoment& moment, const EffectRow& row) {
+void Misalignment::apply(const EffectTime& moment, const EffectRow& row) {
   if (!drawn_[moment.world]) reset(moment);
   const double* M = matrix_.data() + static_cast<std::size_t>(moment.world) * 9;
   double v[3], out[3];
@@ -68,7 +68,7 @@ void Misalignment::apply(const EffectMoment& moment, const EffectRow& row) {
   }
 }
 
-void Clip::validate(std::string_view place) const { check_order(low, high, place); }
+void Clip::validate(std::string_view context) const { check_order(low, high, context); }
 
 void Clip::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -76,7 +76,7 @@ void Clip::initialize(const EffectInit& init) {
   check_components(high, "high", init);
 }
 
-void Clip::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
+void Clip::apply(const EffectTime& /*moment*/, const EffectRow& row) {
   row.transform([&](double x, int i) {  // NaN stays NaN
     return x < component(low, i)    ? component(low, i)
            : x > component(high, i) ? component(high, i)
@@ -89,7 +89,7 @@ void Quantize::initialize(const EffectInit& init) {
   check_components(step, "step", init);
 }
 
-void Quantize::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
+void Quantize::apply(const EffectTime& /*moment*/, const EffectRow& row) {
   row.transform([&](double x, int i) {
     const double s = component(step, i);
     return s > 0 ? s * std::round(x / s) : x;
@@ -98,11 +98,11 @@ void Quantize::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
 
 void NanPolicy::initialize(const EffectInit& init) {
   check_numeric(init);
-  place_ = init.place;
+  context_ = init.context;
   warned_.assign(init.num_worlds, 0);
 }
 
-void NanPolicy::apply(const EffectMoment& moment, const EffectRow& row) {
+void NanPolicy::apply(const EffectTime& moment, const EffectRow& row) {
   if (action == Action::kDisabled) return;
   int bad = 0, where = -1;
   row.transform([&](double x, int i) {
@@ -113,12 +113,13 @@ void NanPolicy::apply(const EffectMoment& moment, const EffectRow& row) {
   if (bad == 0) return;
   if (action == Action::kError) {
     throw RuntimeError(
-        fmt::format("{}: {} of {} values are not finite in world {} (first: index {})", place_, bad,
-                    row.size, moment.world, where));
+        fmt::format("{}: {} of {} values are not finite in world {} (first: index {})", context_,
+                    bad, row.size, moment.world, where));
   }
   if (action == Action::kWarn && !warned_[moment.world]) {
     warned_[moment.world] = 1;
-    say("{}: {} of {} values are not finite in world {}\n", place_, bad, row.size, moment.world);
+    print_stderr("{}: {} of {} values are not finite in world {}\n", context_, bad, row.size,
+                 moment.world);
   }
 }
 

@@ -22,7 +22,7 @@ struct Scale : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Scale>(*this); }
   std::string kind() const override { return "scale"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 };
 template <class V>
 void visit_fields(V& v, Scale& c) {
@@ -41,8 +41,8 @@ struct Misalignment : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Misalignment>(*this); }
   std::string kind() const override { return "misalignment"; }
   void initialize(const EffectInit& init) override;
-  void reset(const EffectMoment& moment) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void reset(const EffectTime& moment) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 
  private:
   std::uint32_t stream_ = 0;
@@ -76,9 +76,9 @@ struct Clip : Effect {
   static Clip saturation(double range) { return {{-range}, {range}}; }
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Clip>(*this); }
   std::string kind() const override { return "clip"; }
-  void validate(std::string_view place) const override;
+  void validate(std::string_view context) const override;
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 };
 template <class V>
 void visit_fields(V& v, Clip& c) {
@@ -100,7 +100,7 @@ struct Quantize : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Quantize>(*this); }
   std::string kind() const override { return "quantize"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 };
 template <class V>
 void visit_fields(V& v, Quantize& c) {
@@ -114,21 +114,21 @@ void visit_fields(V& v, Quantize& c) {
 // What happens to NaN and infinite values.
 enum class NanAction { kDisabled, kWarn, kSanitize, kError };
 template <>
-inline constexpr std::array<std::string_view, 4> kWords<NanAction>{"disabled", "warn", "sanitize",
-                                                                   "error"};
+inline constexpr std::array<std::string_view, 4> kEnumNames<NanAction>{"disabled", "warn",
+                                                                       "sanitize", "error"};
 struct NanPolicy : Effect {
   using Action = NanAction;
-  Word<Action> action = Action::kSanitize;
+  NamedEnum<Action> action = Action::kSanitize;
 
   NanPolicy() = default;
   explicit NanPolicy(Action action) : action(action) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<NanPolicy>(*this); }
   std::string kind() const override { return "nan_policy"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 
  private:
-  std::string place_;
+  std::string context_;
   std::vector<std::uint8_t> warned_;  // [B]
 };
 template <class V>

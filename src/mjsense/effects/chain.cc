@@ -12,16 +12,16 @@ namespace mjsense {
 
 namespace {
 
-std::string place_of(const Effects& effects, std::size_t i, std::string_view place) {
-  return fmt::format("{}, effect {} ({})", place, i, effects[i]->kind());
+std::string context_of(const Effects& effects, std::size_t i, std::string_view context) {
+  return fmt::format("{}, effect {} ({})", context, i, effects[i]->kind());
 }
 
 }  // namespace
 
-void validate(const Effects& effects, std::string_view place) {
+void validate(const Effects& effects, std::string_view context) {
   for (std::size_t i = 0; i < effects.size(); ++i) {
-    if (!effects[i]) throw ValueError(fmt::format("{}: effect {} is null", place, i));
-    check_effect(effects[i], place_of(effects, i, place));
+    if (!effects[i]) throw ValueError(fmt::format("{}: effect {} is null", context, i));
+    check_effect(effects[i], context_of(effects, i, context));
   }
 }
 
@@ -37,11 +37,11 @@ EffectChain::EffectChain(std::string name, const SensorSpec& input, const Effect
     throw ValueError(fmt::format("sensor '{}': history_length is {}: must not be negative", name,
                                  cfg.history_length));
   }
-  const std::string place = fmt::format("sensor '{}'", name);
-  validate(cfg.effects, place);
+  const std::string context = fmt::format("sensor '{}'", name);
+  validate(cfg.effects, context);
   for (std::size_t i = 0; i < cfg.effects.size(); ++i) {
     EffectInit init;
-    init.place = place_of(cfg.effects, i, place);
+    init.context = context_of(cfg.effects, i, context);
     init.num_worlds = num_worlds;
     init.dtype = dtype_;
     init.size = size_;
@@ -49,19 +49,19 @@ EffectChain::EffectChain(std::string name, const SensorSpec& input, const Effect
     init.stream = stream_of(fmt::format("{}#{}", name, i));
     effects_.push_back(cfg.effects[i]->clone());
     effects_.back()->initialize(init);
-    eager_ |= effects_.back()->eager();
+    needs_every_step_ |= effects_.back()->needs_every_step();
   }
   if (history_ > 0) {
-    eager_ = true;
+    needs_every_step_ = true;
     spec_.shape = cfg.flatten_history ? Shape{static_cast<std::int64_t>(history_) * size_}
                                       : input.shape.with_front(history_);
     spec_.description += fmt::format(" The last {} values, oldest first.", history_);
   }
 }
 
-EffectMoment EffectChain::moment_of(const ChainTick& t) const {
+EffectTime EffectChain::moment_of(const ChainTick& t) const {
   const WorldState& state = worlds_[t.world];
-  EffectMoment m;
+  EffectTime m;
   m.world = t.world;
   m.key = t.key;
   m.seed = t.seed;
@@ -76,13 +76,13 @@ EffectMoment EffectChain::moment_of(const ChainTick& t) const {
 
 void EffectChain::reset(const ChainTick& tick) {
   worlds_[tick.world].fresh = true;
-  const EffectMoment moment = moment_of(tick);
+  const EffectTime moment = moment_of(tick);
   for (auto& effect : effects_) effect->reset(moment);
 }
 
 void EffectChain::apply(const ChainTick& tick, std::span<const std::byte> in,
                         std::span<std::byte> out) {
-  const EffectMoment moment = moment_of(tick);
+  const EffectTime moment = moment_of(tick);
   const std::size_t bytes = in.size();
   std::byte* newest = out.data() + out.size() - bytes;
   if (history_ > 0 && moment.advance && !moment.first) {

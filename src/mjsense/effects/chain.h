@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/spec.h"
+#include "mjsense/core/sensor_spec.h"
 #include "mjsense/effects/effect.h"
 
 namespace mjsense {
@@ -19,7 +19,7 @@ using Effects = std::vector<std::shared_ptr<const Effect>>;
 
 // Throws ValueError for an effect that is null or that is invalid for every row: "<place>, effect 1
 // (dropout): ...".
-void validate(const Effects& effects, std::string_view place);
+void validate(const Effects& effects, std::string_view context);
 
 struct EffectChainCfg {
   Effects effects;  // applied in this order
@@ -44,7 +44,7 @@ class EffectChain {
               double tick_s, double period);
 
   const SensorSpec& spec() const { return spec_; }  // of the output
-  bool eager() const { return eager_; }
+  bool needs_every_step() const { return needs_every_step_; }
 
   // Starts an episode of this world; the next apply() gets its first row.
   void reset(const ChainTick& tick);
@@ -53,14 +53,14 @@ class EffectChain {
   void apply(const ChainTick& tick, std::span<const std::byte> in, std::span<std::byte> out);
 
  private:
-  EffectMoment moment_of(const ChainTick& tick) const;
+  EffectTime moment_of(const ChainTick& tick) const;
 
   std::vector<std::unique_ptr<Effect>> effects_;
   SensorSpec spec_;
   DType dtype_;
   int size_, history_ = 0;
   double tick_s_;
-  bool eager_ = false;
+  bool needs_every_step_ = false;
   struct WorldState {
     std::int64_t tick = 0;
     bool fresh = true;   // no row since the reset

@@ -15,12 +15,12 @@
 #include "mjsense/core/array.h"
 #include "mjsense/core/fields.h"
 #include "mjsense/core/rng.h"
-#include "mjsense/core/spec.h"
+#include "mjsense/core/sensor_spec.h"
 
 namespace mjsense {
 
 // The time at which a row is measured.
-struct EffectMoment {
+struct EffectTime {
   int world = 0;          // index of the row
   std::uint32_t key = 0;  // key of the random numbers, usually the world
   std::uint64_t seed = 0;
@@ -67,7 +67,7 @@ struct EffectRow {
 
 // Properties of the rows that an effect is applied to.
 struct EffectInit {
-  std::string place;  // starts every message: "sensor 'imu', effect 0 (noise)"
+  std::string context;  // starts every message: "sensor 'imu', effect 0 (noise)"
   int num_worlds = 1;
   DType dtype = DType::kFloat32;
   int size = 1;              // number of elements of a row
@@ -84,17 +84,17 @@ class Effect {
   virtual std::string kind() const = 0;
 
   // Throws ValueError if the fields contradict each other, whatever the row. check_fields() calls
-  // it after checking ranges, when a configuration is built and before initialize(). `place` starts
-  // the message.
+  // it after checking ranges, when a configuration is built and before initialize(). `context`
+  // starts the message.
   virtual void validate(std::string_view /*place*/) const {}
   // Throws ValueError if the effect does not suit the row. Allocates memory; other functions do
   // not.
   virtual void initialize(const EffectInit& init) = 0;
-  virtual void apply(const EffectMoment& moment, const EffectRow& row) = 0;
+  virtual void apply(const EffectTime& moment, const EffectRow& row) = 0;
   // Starts an episode of this world; a call of apply() with moment.first follows.
-  virtual void reset(const EffectMoment& /*moment*/) {}
+  virtual void reset(const EffectTime& /*moment*/) {}
   // True if the effect must process every row, even if it is not read.
-  virtual bool eager() const { return false; }
+  virtual bool needs_every_step() const { return false; }
 
   std::vector<std::string> fields;
 };
@@ -110,7 +110,7 @@ inline double component(const PerComponent& values, int i) {
   return values.size() == 1 ? values[0] : values[i];
 }
 // Throws ValueError if a component of `low` is above that of `high`, or if their sizes differ.
-void check_order(const PerComponent& low, const PerComponent& high, std::string_view place);
+void check_order(const PerComponent& low, const PerComponent& high, std::string_view context);
 // Throws ValueError unless there is one value, or as many as the row has.
 void check_components(const PerComponent& values, const char* name, const EffectInit& init);
 void check_numeric(const EffectInit& init);  // throws ValueError unless float32 or float64
@@ -122,7 +122,7 @@ struct Gaussian {
 struct Uniform {
   PerComponent low = {0.0}, high = {0.0};
 
-  void validate(std::string_view place) const;  // throws unless low <= high
+  void validate(std::string_view context) const;  // throws unless low <= high
 };
 struct Constant {
   PerComponent value = {0.0};
@@ -130,8 +130,8 @@ struct Constant {
 
 // A random number with a given distribution.
 struct Draw {
-  using Law = std::variant<Gaussian, Uniform, Constant>;
-  Law law;
+  using Distribution = std::variant<Gaussian, Uniform, Constant>;
+  Distribution distribution;
 
   static Draw gaussian(PerComponent std, PerComponent mean = {0.0});
   static Draw uniform(PerComponent low, PerComponent high);
@@ -141,9 +141,9 @@ struct Draw {
   double sample(Rng& rng, int i) const;
 };
 template <>
-inline constexpr const char* kChoiceName<Draw::Law> = "Draw";
+inline constexpr const char* kChoiceName<Draw::Distribution> = "Draw";
 template <>
-inline constexpr int kPlainAlternative<Draw::Law> = 2;
+inline constexpr int kPlainAlternative<Draw::Distribution> = 2;
 
 template <class V>
 void visit_fields(V& v, Gaussian& c) {
@@ -166,7 +166,7 @@ void visit_fields(V& v, Constant& c) {
 // How a random number e changes a value x: x + e, x e, or e instead of x.
 enum class Operation { kAdd, kScale, kAbs };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<Operation>{"add", "scale", "abs"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<Operation>{"add", "scale", "abs"};
 inline double operate(Operation operation, double x, double e) {
   return operation == Operation::kAdd ? x + e : operation == Operation::kScale ? x * e : e;
 }

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 
@@ -24,9 +24,9 @@ ChainTick tick_of(const World& world) {
 }  // namespace
 
 std::unique_ptr<Sensor> EffectSensorCfg::build() const {
-  const std::string place = sensor_place(name);
-  if (sensor.empty()) throw ValueError(fmt::format("{}: the sensor to read is missing", place));
-  check_fields(*this, place);
+  const std::string context = sensor_context(name);
+  if (sensor.empty()) throw ValueError(fmt::format("{}: the sensor to read is missing", context));
+  check_fields(*this, context);
   return std::make_unique<EffectSensor>(*this);
 }
 
@@ -35,7 +35,7 @@ SensorKind effect_kind() { return sensor_kind<EffectSensorCfg>(); }
 EffectSensor::EffectSensor(EffectSensorCfg cfg, Sensor* inner)
     : Sensor(cfg.name), cfg_(std::move(cfg)), inner_(inner) {}
 
-std::vector<std::string> EffectSensor::reads() const {
+std::vector<std::string> EffectSensor::initialization_dependencies() const {
   return cfg_.sensor.empty() ? std::vector<std::string>{} : std::vector<std::string>{cfg_.sensor};
 }
 
@@ -68,7 +68,7 @@ void EffectSensor::initialize(const SensorInit& init) {
 
   clear_fields();
   streams_.clear();
-  eager_ = false;
+  needs_every_step_ = false;
   const double tick_s = init.model->opt.timestep;
   for (const Field& in : inner_->fields()) {
     if (!cfg_.fields.empty() && !contains(cfg_.fields, in.name)) continue;
@@ -83,7 +83,7 @@ void EffectSensor::initialize(const SensorInit& init) {
     const std::string stream = in.name.empty() ? name() : name() + "/" + in.name;
     EffectChain chain(stream, in.spec, chain_cfg, init.num_worlds, tick_s,
                       tick_s * init.decimation);
-    eager_ |= chain.eager();
+    needs_every_step_ |= chain.needs_every_step();
     Field& out = add_field(in.name, chain.spec(), init.num_worlds);
     streams_.push_back({&in, &out, std::move(chain)});
   }

@@ -48,12 +48,12 @@ class EffectSensor : public Sensor {
   explicit EffectSensor(EffectSensorCfg cfg, Sensor* inner = nullptr);
 
   std::string_view kind() const override { return "effect"; }
-  std::vector<std::string> reads() const override;
+  std::vector<std::string> initialization_dependencies() const override;
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
   void reset(const World& world) override;
   // Delays, drifts and histories must process every control step.
-  bool eager() const override { return eager_; }
+  bool needs_every_step() const override { return needs_every_step_; }
   mjtStage needs() const override { return mjSTAGE_NONE; }  // only rows of another sensor
   std::span<Sensor* const> inputs() const override { return {&inner_, 1}; }
 
@@ -67,7 +67,7 @@ class EffectSensor : public Sensor {
   };
   EffectSensorCfg cfg_;
   Sensor* inner_;
-  bool eager_ = false;
+  bool needs_every_step_ = false;
   std::vector<Stream> streams_;
 };
 

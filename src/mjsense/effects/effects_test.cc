@@ -319,9 +319,9 @@ TEST(Delay, IsDrawnAnewInEveryEpisode) {
     for (int t = 0; t < 20; ++t, ++tick) x = bench.feed(static_cast<float>(tick), tick);
     lags.push_back(static_cast<double>(tick - 1) - x);
   }
-  const auto [least, most] = std::minmax_element(lags.begin(), lags.end());
-  EXPECT_GE(*least, 1.0);
-  EXPECT_LE(*most, 5.0);
+  const auto [minimum, maximum] = std::minmax_element(lags.begin(), lags.end());
+  EXPECT_GE(*minimum, 1.0);
+  EXPECT_LE(*maximum, 5.0);
   // 2 to 5 rows, because delays are rounded up.
   EXPECT_EQ(std::set<double>(lags.begin(), lags.end()).size(), 4u);
 }

@@ -25,13 +25,13 @@ void Noise::initialize(const EffectInit& init) {
   check_components(density, "density", init);
   has_density_ = std::ranges::any_of(density, [](double d) { return d > 0; });
   if (has_density_ && !(init.period > 0)) {
-    throw ValueError(fmt::format("{}: a density needs a period > 0", init.place));
+    throw ValueError(fmt::format("{}: a density needs a period > 0", init.context));
   }
   density_factor_ = has_density_ ? 1.0 / std::sqrt(init.period) : 0.0;
   stream_ = init.stream;
 }
 
-void Noise::apply(const EffectMoment& moment, const EffectRow& row) {
+void Noise::apply(const EffectTime& moment, const EffectRow& row) {
   Rng rng = moment.rng(stream_);
   row.transform([&](double x, int i) {
     x = operate(operation, x, draw.sample(rng, i));
@@ -51,7 +51,7 @@ void EpisodeBias::initialize(const EffectInit& init) {
   drawn_.assign(init.num_worlds, 0);
 }
 
-void EpisodeBias::reset(const EffectMoment& moment) {
+void EpisodeBias::reset(const EffectTime& moment) {
   Rng rng = moment.episode_rng(stream_);
   double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
   double e = 0.0;
@@ -62,16 +62,16 @@ void EpisodeBias::reset(const EffectMoment& moment) {
   drawn_[moment.world] = 1;
 }
 
-void EpisodeBias::apply(const EffectMoment& moment, const EffectRow& row) {
+void EpisodeBias::apply(const EffectTime& moment, const EffectRow& row) {
   if (!drawn_[moment.world]) reset(moment);
   const double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
   row.transform([&](double x, int i) { return x + bias[i]; });
 }
 
-void BiasDrift::validate(std::string_view place) const {
+void BiasDrift::validate(std::string_view context) const {
   if (std::isinf(time_constant_s) && std::ranges::any_of(std, [](double s) { return s > 0; })) {
     throw ValueError(fmt::format(
-        "{}: std needs a finite time_constant_s; a random walk is set by density", place));
+        "{}: std needs a finite time_constant_s; a random walk is set by density", context));
   }
 }
 
@@ -84,7 +84,7 @@ void BiasDrift::initialize(const EffectInit& init) {
   bias_.assign(static_cast<std::size_t>(init.num_worlds) * init.size, 0.0);
 }
 
-void BiasDrift::apply(const EffectMoment& moment, const EffectRow& row) {
+void BiasDrift::apply(const EffectTime& moment, const EffectRow& row) {
   double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
   if (moment.first && moment.advance) {
     Rng rng = moment.episode_rng(stream_ ^ 0x5bd1e995u);  // another stream than that of ticks

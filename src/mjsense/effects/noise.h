@@ -14,7 +14,7 @@ namespace mjsense {
 // x <- x + e (or x e, or e), with e drawn for every row and component.
 struct Noise : Effect {
   Draw draw;
-  Word<Operation> operation = Operation::kAdd;
+  NamedEnum<Operation> operation = Operation::kAdd;
   // unit / sqrt(Hz). Adds a Gaussian of std = density / sqrt(period), whose Allan deviation is
   // density / sqrt(tau): the "noise density" of a data sheet. It is added to `draw`.
   PerComponent density = {0.0};
@@ -26,7 +26,7 @@ struct Noise : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Noise>(*this); }
   std::string kind() const override { return "noise"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 
  private:
   std::uint32_t stream_ = 0;
@@ -38,7 +38,8 @@ void visit_fields(V& v, Noise& c) {
   v.object("Noise", "Independent noise for every row and component.", "noise")
       .frozen()
       .module("effects");
-  v("draw", c.draw.law, "Distribution: Gaussian, Uniform or Constant; a number means Constant.");
+  v("draw", c.draw.distribution,
+    "Distribution: Gaussian, Uniform or Constant; a number means Constant.");
   v("operation", c.operation, "How the noise changes the value; abs: it replaces the value.");
   v("density", c.density,
     "Noise density as on a data sheet: std = density / sqrt(period) is added to draw.")
@@ -54,7 +55,7 @@ void visit_fields(V& v, Noise& c) {
 // additive-bias model with "add").
 struct EpisodeBias : Effect {
   Draw draw;
-  Word<Operation> operation = Operation::kAbs;
+  NamedEnum<Operation> operation = Operation::kAbs;
   bool per_component = true;  // false: one number for the whole row
 
   EpisodeBias() = default;
@@ -63,8 +64,8 @@ struct EpisodeBias : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<EpisodeBias>(*this); }
   std::string kind() const override { return "episode_bias"; }
   void initialize(const EffectInit& init) override;
-  void reset(const EffectMoment& moment) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  void reset(const EffectTime& moment) override;
+  void apply(const EffectTime& moment, const EffectRow& row) override;
 
  private:
   std::uint32_t stream_ = 0;
@@ -78,7 +79,8 @@ void visit_fields(V& v, EpisodeBias& c) {
            "episode_bias")
       .frozen()
       .module("effects");
-  v("draw", c.draw.law, "Distribution: Gaussian, Uniform or Constant; a number means Constant.");
+  v("draw", c.draw.distribution,
+    "Distribution: Gaussian, Uniform or Constant; a number means Constant.");
   v("operation", c.operation,
     "What happens at a reset. abs: the bias is drawn anew; add: the draw is added to the previous "
     "bias.");
@@ -98,10 +100,10 @@ struct BiasDrift : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<BiasDrift>(*this); }
   std::string kind() const override { return "bias_drift"; }
-  void validate(std::string_view place) const override;
+  void validate(std::string_view context) const override;
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
-  bool eager() const override { return true; }
+  void apply(const EffectTime& moment, const EffectRow& row) override;
+  bool needs_every_step() const override { return true; }
 
  private:
   std::uint32_t stream_ = 0;

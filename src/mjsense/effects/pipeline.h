@@ -15,13 +15,13 @@ namespace mjsense {
 
 struct PipelineCfg {
   bool enable_corruption = true;
-  std::optional<Draw::Law> noise;
+  std::optional<Draw::Distribution> noise;
   std::optional<PerComponent> bias;
-  Word<Operation> operation = Operation::kAdd;
+  NamedEnum<Operation> operation = Operation::kAdd;
   std::optional<EpisodeBias> episode_bias;
   std::optional<std::array<double, 2>> clip;
   PerComponent scale = {1.0};
-  Word<NanAction> nan_policy = NanAction::kDisabled;
+  NamedEnum<NanAction> nan_policy = NanAction::kDisabled;
   StepDelay delay;
   int history_length = 0;
   bool flatten_history = true;

@@ -13,8 +13,8 @@
 namespace mjsense {
 namespace {
 
-constexpr double kTimeEps = 1e-9;   // s, tolerance for the rounding of tick * period
-constexpr int kMostRows = 100'000;  // maximum number of rows that a ring keeps of a world
+constexpr double kTimeEps = 1e-9;  // s, tolerance for the rounding of tick * period
+constexpr int kMaxRows = 100'000;  // maximum number of rows that a ring keeps of a world
 
 }  // namespace
 
@@ -53,11 +53,11 @@ double FrameRing::time(int world, int age) const {
 
 void Delay::initialize(const EffectInit& init) {
   if (interpolate) check_numeric(init);
-  if (!(init.period > 0)) throw ValueError(fmt::format("{}: needs a period > 0", init.place));
+  if (!(init.period > 0)) throw ValueError(fmt::format("{}: needs a period > 0", init.context));
   const double rows = (std::max(delay_s, delay_max_s) + jitter_s) / init.period;
-  if (!(rows <= kMostRows)) {
+  if (!(rows <= kMaxRows)) {
     throw ValueError(fmt::format("{}: the delay is {:.3g} rows of {:.3g} s: the maximum is {} rows",
-                                 init.place, rows, init.period, kMostRows));
+                                 init.context, rows, init.period, kMaxRows));
   }
   ring_.initialize(init.num_worlds, init.size * dtype_size(init.dtype),
                    static_cast<int>(std::ceil(rows)) + 2);
@@ -66,7 +66,7 @@ void Delay::initialize(const EffectInit& init) {
   stream_ = init.stream;
 }
 
-void Delay::apply(const EffectMoment& moment, const EffectRow& row) {
+void Delay::apply(const EffectTime& moment, const EffectRow& row) {
   const int w = moment.world;
   if (moment.advance) {
     if (moment.first) {
@@ -98,12 +98,12 @@ void Delay::apply(const EffectMoment& moment, const EffectRow& row) {
   }
 }
 
-void StepDelay::validate(std::string_view place) const {
-  if (max_lag > kMostRows)
+void StepDelay::validate(std::string_view context) const {
+  if (max_lag > kMaxRows)
     throw ValueError(
-        fmt::format("{}: max_lag is {}: must be at most {}", place, max_lag, kMostRows));
+        fmt::format("{}: max_lag is {}: must be at most {}", context, max_lag, kMaxRows));
   if (max_lag < min_lag) {
-    throw ValueError(fmt::format("{}: lags [{}, {}]: must satisfy 0 <= min_lag <= max_lag", place,
+    throw ValueError(fmt::format("{}: lags [{}, {}]: must satisfy 0 <= min_lag <= max_lag", context,
                                  min_lag, max_lag));
   }
 }
@@ -116,9 +116,9 @@ void StepDelay::initialize(const EffectInit& init) {
   stream_ = init.stream;
 }
 
-void StepDelay::draw_lag(const EffectMoment& moment) {
+void StepDelay::draw_lag(const EffectTime& moment) {
   const int w = moment.world;
-  EffectMoment source = moment;
+  EffectTime source = moment;
   if (!per_world) source.key = 0;
   Rng rng = source.rng(stream_);
   const int lag = min_lag + static_cast<int>(rng.below(max_lag - min_lag + 1));
@@ -134,7 +134,7 @@ void StepDelay::draw_lag(const EffectMoment& moment) {
   ++rows_[w];
 }
 
-void StepDelay::apply(const EffectMoment& moment, const EffectRow& row) {
+void StepDelay::apply(const EffectTime& moment, const EffectRow& row) {
   const int w = moment.world;
   if (moment.advance) {
     if (moment.first) ring_.clear(w);
@@ -155,7 +155,7 @@ void Rate::initialize(const EffectInit& init) {
   stream_ = init.stream;
 }
 
-void Rate::apply(const EffectMoment& moment, const EffectRow& row) {
+void Rate::apply(const EffectTime& moment, const EffectRow& row) {
   const int w = moment.world;
   if (moment.advance) {
     if (moment.first && random_phase) {
@@ -180,7 +180,7 @@ void Dropout::initialize(const EffectInit& init) {
   stream_ = init.stream;
 }
 
-void Dropout::apply(const EffectMoment& moment, const EffectRow& row) {
+void Dropout::apply(const EffectTime& moment, const EffectRow& row) {
   const bool lost = !moment.first && moment.rng(stream_).uniform() < probability;
   if (mode == Mode::kHold) {
     std::byte* held = held_.data() + moment.world * row_bytes_;

@@ -49,8 +49,8 @@ struct Delay : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Delay>(*this); }
   std::string kind() const override { return "delay"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
-  bool eager() const override { return true; }
+  void apply(const EffectTime& moment, const EffectRow& row) override;
+  bool needs_every_step() const override { return true; }
 
  private:
   std::uint32_t stream_ = 0;
@@ -84,13 +84,13 @@ struct StepDelay : Effect {
   StepDelay(int min_lag, int max_lag) : min_lag(min_lag), max_lag(max_lag) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<StepDelay>(*this); }
   std::string kind() const override { return "step_delay"; }
-  void validate(std::string_view place) const override;
+  void validate(std::string_view context) const override;
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
-  bool eager() const override { return true; }
+  void apply(const EffectTime& moment, const EffectRow& row) override;
+  bool needs_every_step() const override { return true; }
 
  private:
-  void draw_lag(const EffectMoment& moment);
+  void draw_lag(const EffectTime& moment);
 
   std::uint32_t stream_ = 0;
   FrameRing ring_;
@@ -124,8 +124,8 @@ struct Rate : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Rate>(*this); }
   std::string kind() const override { return "rate"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
-  bool eager() const override { return true; }
+  void apply(const EffectTime& moment, const EffectRow& row) override;
+  bool needs_every_step() const override { return true; }
 
  private:
   std::uint32_t stream_ = 0;
@@ -152,11 +152,11 @@ void visit_fields(V& v, Rate& c) {
 // instead. The first row of an episode always arrives.
 enum class DropoutMode { kHold, kNan, kZero };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<DropoutMode>{"hold", "nan", "zero"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<DropoutMode>{"hold", "nan", "zero"};
 struct Dropout : Effect {
   using Mode = DropoutMode;
   double probability = 0.0;
-  Word<Mode> mode = Mode::kHold;
+  NamedEnum<Mode> mode = Mode::kHold;
 
   Dropout() = default;
   explicit Dropout(double probability, Mode mode = Mode::kHold)
@@ -164,8 +164,8 @@ struct Dropout : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Dropout>(*this); }
   std::string kind() const override { return "dropout"; }
   void initialize(const EffectInit& init) override;
-  void apply(const EffectMoment& moment, const EffectRow& row) override;
-  bool eager() const override { return mode == Mode::kHold; }
+  void apply(const EffectTime& moment, const EffectRow& row) override;
+  bool needs_every_step() const override { return mode == Mode::kHold; }
 
  private:
   std::uint32_t stream_ = 0;

@@ -118,7 +118,7 @@ ObjectShape object_shape(const mjModel* model, int body, double spacing) {
   ObjectShape shape;
   for (int g = 0; g < model->ngeom; ++g) {
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    if (!is_below(model, model->geom_bodyid[g], body)) continue;
+    if (!is_descendant_or_self(model, model->geom_bodyid[g], body)) continue;
     const Pose pose = body_in(model, model->geom_bodyid[g], body) *
                       Pose{vec3(model->geom_pos + 3 * g), quat(model->geom_quat + 4 * g)};
     std::vector<Vec3> local;

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
 
 namespace mjsense {
 namespace {
@@ -24,9 +24,9 @@ ModelPtr compile(const std::string& geoms) {
 // Maximum distance of a point from the surface; `distance` returns the distance of one point.
 template <class F>
 double worst(const ObjectShape& shape, F distance) {
-  double most = 0;
-  for (Vec3 p : shape.points) most = std::max(most, std::abs(distance(p)));
-  return most;
+  double maximum = 0;
+  for (Vec3 p : shape.points) maximum = std::max(maximum, std::abs(distance(p)));
+  return maximum;
 }
 
 TEST(ObjectShape, PointsAreOnTheSurfaces) {

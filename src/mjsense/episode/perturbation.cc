@@ -55,7 +55,7 @@ double Perturbation::progress(const World& world, int joint) {
   return world.data->qpos[m->jnt_qposadr[joint]] / (limited ? range[1] - range[0] : 1);
 }
 
-void Perturbation::shove(const World& world, int joint, const StateRow& state) const {
+void Perturbation::push(const World& world, int joint, const StateRow& state) const {
   double* v = state.qvel + world.model->jnt_dofadr[joint];
   v[0] += speed_ * std::cos(direction_);
   v[1] += speed_ * std::sin(direction_);
@@ -74,7 +74,7 @@ void Perturbation::apply(const World& world, const Robot& robot, int object, int
   if (is_free && kind_ == Kind::kShove) {
     // An object that is already held is not shoved.
     if (happened() || held || step != wait_) return;
-    shove(world, joint, state);
+    push(world, joint, state);
     happened_at_ = step;
     return;
   }

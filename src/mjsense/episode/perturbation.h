@@ -32,7 +32,7 @@ class Perturbation {
  private:
   static int joint_of(const mjModel* model, int object);
   static double progress(const World& world, int joint);
-  void shove(const World& world, int joint, const StateRow& state) const;
+  void push(const World& world, int joint, const StateRow& state) const;
 
   Kind kind_ = Kind::kNone;
   // Control steps: of a shove from the start, of a slip from when the gripper has moved the object.

@@ -27,19 +27,20 @@ Task::Task(TaskCfg cfg) : cfg_(std::move(cfg)) {
     throw ValueError(fmt::format("task: horizon = {} must be positive", cfg_.horizon));
 }
 
-SceneCfg Task::whole_scene_cfg() const {
+SceneCfg Task::scene_cfg_with_robot() const {
   SceneCfg scene = scene_cfg();
   scene.options.timestep = 0.001 * cfg_.sim_dt_ms;
   const std::string name(Robot::kPrefix.substr(0, Robot::kPrefix.size() - 1));
-  const auto place = std::ranges::find(scene.entities, name, [](const auto& e) { return e.first; });
-  const bool reserved = place != scene.entities.end() && place->second.model.empty();
+  const auto context =
+      std::ranges::find(scene.entities, name, [](const auto& e) { return e.first; });
+  const bool reserved = context != scene.entities.end() && context->second.model.empty();
   if (cfg_.robot.name.empty()) {
     if (reserved) {
       throw ValueError(fmt::format("task '{}' needs a robot, and none is given", this->name()));
     }
     return scene;
   }
-  if (place != scene.entities.end() && !reserved) {
+  if (context != scene.entities.end() && !reserved) {
     throw ValueError(fmt::format(
         "task '{}' already has a robot in its scene (entity '{}'): robot '{}' cannot be added",
         this->name(), name, cfg_.robot.name));
@@ -47,7 +48,7 @@ SceneCfg Task::whole_scene_cfg() const {
   EntityCfg robot;
   robot.model = cfg_.robot.model;
   if (reserved) {
-    place->second = robot;
+    context->second = robot;
   } else {
     scene.entities.emplace_back(name, robot);
   }
@@ -142,7 +143,7 @@ void Task::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
       [this, all = out.data()](const World& world) { all[world.id] = evaluate(world); });
 }
 
-Evaluation Task::judge(int world, double reward, bool success, bool over) const {
+Evaluation Task::make_evaluation(int world, double reward, bool success, bool over) const {
   const Episode& episode = now(world);
   return {.reward = reward,
           .success = success,
@@ -150,9 +151,9 @@ Evaluation Task::judge(int world, double reward, bool success, bool over) const 
           .truncated = episode.step >= cfg_.horizon};
 }
 
-Evaluation Task::judge_by(int world, double reward, std::string_view lacks) const {
-  Evaluation found = judge(world, reward, lacks.empty());
-  found.lacks = lacks;
+Evaluation Task::make_evaluation_from(int world, double reward, std::string_view missing) const {
+  Evaluation found = make_evaluation(world, reward, missing.empty());
+  found.missing = missing;
   return found;
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 // Interface of tasks: the scene, the episodes and the success criterion. Order of the calls:
 //
-//   whole_scene_cfg()        before compilation: scene_cfg() (furniture, objects, lights) and the
+//   scene_cfg_with_robot()        before compilation: scene_cfg() (furniture, objects, lights) and the
 //                            robot
 //   bind(simulation)         if there is a simulation
 //   initialize(model, B)     after compilation: resolves names; robot() is valid from here on
@@ -79,7 +79,7 @@ struct Evaluation {
   // What is missing for a success, in a few words with static lifetime: "the object is not lifted".
   // The same reason always has the same words, so that they can be counted. "" if the task does not
   // give a reason.
-  std::string_view lacks;
+  std::string_view missing;
 };
 
 // A referring expression with a weight, as in referral_expressions of obs_scene.
@@ -107,7 +107,7 @@ class Task {
   // "robot_0" without a model, the robot takes its place among the entities; else it is added last.
   virtual SceneCfg scene_cfg() const = 0;
   // The scene with the robot and the timestep of cfg().
-  SceneCfg whole_scene_cfg() const;
+  SceneCfg scene_cfg_with_robot() const;
   // The entity of scene_cfg() that is the robot if cfg() names none; "": everything that has
   // actuators.
   virtual std::string robot_entity() const { return "robot_0"; }
@@ -148,7 +148,7 @@ class Task {
 
   // Why the start state in this world, whose data is current, cannot be played; "" if it can. The
   // rollout then draws another one, a limited number of times.
-  virtual std::string start_fault(const World& /*world*/) const { return ""; }
+  virtual std::string start_error(const World& /*world*/) const { return ""; }
 
   // --- all active worlds at once, on the caller's thread
   virtual void begin_all(ActiveWorlds& worlds);
@@ -216,9 +216,9 @@ class Task {
   }
   // Returns an evaluation, with terminal and truncated set. `over`: the task ends the episode for a
   // reason of its own.
-  Evaluation judge(int world, double reward, bool success, bool over = false) const;
-  // The same, where `lacks` says what is missing for a success; "": it is a success.
-  Evaluation judge_by(int world, double reward, std::string_view lacks) const;
+  Evaluation make_evaluation(int world, double reward, bool success, bool over = false) const;
+  // The same, where `missing` says what is missing for a success; "": it is a success.
+  Evaluation make_evaluation_from(int world, double reward, std::string_view missing) const;
 
  private:
   friend class MultiTask;  // this task may be a part of one

@@ -8,9 +8,9 @@
 #include <system_error>
 
 #include "mjsense/core/error.h"
-#include "mjsense/hdf5/chunks.h"
-#include "mjsense/hdf5/guard.h"
+#include "mjsense/hdf5/chunk_checks.h"
 #include "mjsense/hdf5/lzf.h"
+#include "mjsense/hdf5/untrusted_file.h"
 
 namespace mjsense::h5 {
 namespace {
@@ -53,8 +53,8 @@ void write_attribute(hid_t object, const char* name, hid_t file_type, hid_t memo
   check(H5Awrite(attribute, memory, data), name);
 }
 
-// Throws unless there is exactly one element of this class, of at most `most_bytes`.
-void require_one(hid_t space, hid_t type, H5T_class_t cls, std::size_t most_bytes,
+// Throws unless there is exactly one element of this class, of at most `max_bytes`.
+void require_one(hid_t space, hid_t type, H5T_class_t cls, std::size_t max_bytes,
                  std::string_view name) {
   const bool simple = H5Sget_simple_extent_type(space) != H5S_NULL;
   const hssize_t count = simple ? H5Sget_simple_extent_npoints(space) : 0;
@@ -62,7 +62,7 @@ void require_one(hid_t space, hid_t type, H5T_class_t cls, std::size_t most_byte
   const char* expected = cls == H5T_STRING ? "text" : "number";
   if (H5Tget_class(type) != cls)
     throw RuntimeError(fmt::format("'{}' is not a {}", name, expected));
-  if (H5Tget_size(type) > most_bytes)
+  if (H5Tget_size(type) > max_bytes)
     throw RuntimeError(fmt::format("'{}' is a {} of {} bytes", name, expected, H5Tget_size(type)));
 }
 
@@ -71,7 +71,7 @@ std::string read_string(hid_t type, auto&& read) {
     char* text = nullptr;
     const Id memory = text_type();
     read(static_cast<hid_t>(memory), static_cast<void*>(&text));
-    std::string result(text ? text : "", text ? strnlen(text, kMostTextBytes) : 0);
+    std::string result(text ? text : "", text ? strnlen(text, kMaxTextBytes) : 0);
     H5free_memory(text);
     return result;
   }
@@ -239,11 +239,11 @@ std::vector<std::string> children(hid_t group) {
   const auto add = [](hid_t, const char* name, const H5L_info_t*, void* out) -> herr_t {
     auto& all = *static_cast<std::vector<std::string>*>(out);
     all.emplace_back(name);
-    return all.size() > kMostNames ? 1 : 0;
+    return all.size() > kMaxNames ? 1 : 0;
   };
   check(H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &names), "listing a group");
-  if (names.size() > kMostNames)
-    throw RuntimeError(fmt::format("a group has more than {} names", kMostNames));
+  if (names.size() > kMaxNames)
+    throw RuntimeError(fmt::format("a group has more than {} names", kMaxNames));
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -271,7 +271,7 @@ std::string read_text(hid_t parent, const std::string& path) {
   check_storage(dataset, path);
   const Id type(H5Dget_type(dataset), H5Tclose, path);
   const Id space(H5Dget_space(dataset), H5Sclose, path);
-  require_one(space, type, H5T_STRING, kMostTextBytes, path);
+  require_one(space, type, H5T_STRING, kMaxTextBytes, path);
   check_chunks(dataset, path);
   return read_string(type, [&](hid_t memory, void* out) {
     check(H5Dread(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out), path);
@@ -323,7 +323,7 @@ std::string text_attribute(hid_t object, const char* name) {
   const Id attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, name);
   const Id type(H5Aget_type(attribute), H5Tclose, name);
   const Id space(H5Aget_space(attribute), H5Sclose, name);
-  require_one(space, type, H5T_STRING, kMostTextBytes, name);
+  require_one(space, type, H5T_STRING, kMaxTextBytes, name);
   return read_string(
       type, [&](hid_t memory, void* out) { check(H5Aread(attribute, memory, out), name); });
 }

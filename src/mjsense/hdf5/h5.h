@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
-#include "mjsense/core/file_limit.h"
+#include "mjsense/core/file_size_limit.h"
 
 namespace mjsense::h5 {
 
@@ -27,7 +27,7 @@ class H5Lock {
   static void alone();
 
  private:
-  FileLimitIsError limit_;  // the library may write to the file at any time
+  FileLimitGuard limit_;  // the library may write to the file at any time
   std::unique_lock<std::recursive_mutex> lock_;
 };
 

@@ -36,7 +36,7 @@ std::vector<std::pair<int, std::string>> actors_of(const mjModel* m, int robot) 
   for (int j = 0; j < m->njnt; ++j) {
     const int body = m->jnt_bodyid[j];
     if (m->jnt_type[j] != mjJNT_FREE) continue;
-    if (robot >= 0 && is_below(m, body, robot)) continue;
+    if (robot >= 0 && is_descendant_or_self(m, body, robot)) continue;
     const char* name = mj_id2name(m, mjOBJ_BODY, body);
     found.emplace_back(body, name ? name : fmt::format("body_{}", body));
     last.push_back(found.back().second.substr(found.back().second.rfind('/') + 1));

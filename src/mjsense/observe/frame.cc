@@ -7,17 +7,17 @@
 
 namespace mjsense {
 
-Frame Frame::find(const mjModel* model, std::string_view place, std::string_view type,
+Frame Frame::find(const mjModel* model, std::string_view context, std::string_view type,
                   std::string_view name) {
   if (type != "body" && type != "site") {
-    throw ValueError(fmt::format("{}: a frame must be a body or a site, not '{}'", place, type));
+    throw ValueError(fmt::format("{}: a frame must be a body or a site, not '{}'", context, type));
   }
   const mjtObj object = type == "body" ? mjOBJ_BODY : mjOBJ_SITE;
-  return {object, object_id(model, object, place, name)};
+  return {object, object_id(model, object, context, name)};
 }
 
-void BodyRef::resolve(const mjModel* model, std::string_view place) {
-  if (!name.empty()) id_ = object_id(model, mjOBJ_BODY, place, name);
+void BodyRef::resolve(const mjModel* model, std::string_view context) {
+  if (!name.empty()) id_ = object_id(model, mjOBJ_BODY, context, name);
 }
 
 Pose Frame::pose(const mjData* data) const {
@@ -61,9 +61,9 @@ std::vector<std::string> object_names(const mjModel* model, mjtObj type) {
   return names;
 }
 
-int object_id(const mjModel* model, mjtObj type, std::string_view place, std::string_view name) {
+int object_id(const mjModel* model, mjtObj type, std::string_view context, std::string_view name) {
   const int id = mj_name2id(model, type, std::string(name).c_str());
-  if (id < 0) throw_unknown(place, kind_of(model, type).name, name, object_names(model, type));
+  if (id < 0) throw_unknown(context, kind_of(model, type).name, name, object_names(model, type));
   return id;
 }
 

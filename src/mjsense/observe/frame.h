@@ -17,8 +17,8 @@ struct Frame {
   mjtObj type = mjOBJ_UNKNOWN;  // mjOBJ_BODY (the body frame) or mjOBJ_SITE
   int id = -1;
 
-  // `type` is "body" or "site". Throws KeyError with `place` and the nearest names.
-  static Frame find(const mjModel* model, std::string_view place, std::string_view type,
+  // `type` is "body" or "site". Throws KeyError with `context` and the nearest names.
+  static Frame find(const mjModel* model, std::string_view context, std::string_view type,
                     std::string_view name);
   // X_WF, pose in the world (m).
   Pose pose(const mjData* data) const;
@@ -32,8 +32,8 @@ struct BodyRef {
   BodyRef(std::string name) : name(std::move(name)) {}
   BodyRef(const char* name) : name(name) {}
   BodyRef(std::function<int(int)> of) : of(std::move(of)) {}
-  // Resolves a name to the id for all worlds. Throws KeyError with `place`.
-  void resolve(const mjModel* model, std::string_view place);
+  // Resolves a name to the id for all worlds. Throws KeyError with `context`.
+  void resolve(const mjModel* model, std::string_view context);
   int operator()(int world) const { return id_ >= 0 ? id_ : of ? of(world) : -1; }
 
  private:
@@ -42,7 +42,7 @@ struct BodyRef {
 
 // True if `body` is `root` or a descendant of it. Nothing is below a negative id, which means "no
 // body".
-inline bool is_below(const mjModel* model, int body, int root) {
+inline bool is_descendant_or_self(const mjModel* model, int body, int root) {
   if (root < 0) return false;
   // A parent has a smaller id than its children; the world, body 0, is its own parent.
   while (body > root) body = model->body_parentid[body];
@@ -51,6 +51,6 @@ inline bool is_below(const mjModel* model, int body, int root) {
 
 // Names of all objects of a type, "" for those without a name.
 std::vector<std::string> object_names(const mjModel* model, mjtObj type);
-// Id of the named object. Throws KeyError with `place` and the nearest names.
-int object_id(const mjModel* model, mjtObj type, std::string_view place, std::string_view name);
+// Id of the named object. Throws KeyError with `context` and the nearest names.
+int object_id(const mjModel* model, mjtObj type, std::string_view context, std::string_view name);
 }  // namespace mjsense

@@ -62,7 +62,7 @@ void ImagePointsSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
   for (Object& object : objects_) object.body.resolve(m, fmt::format("sensor '{}'", name()));
   pictures_.clear();
-  std::int64_t most = 0;
+  std::int64_t maximum = 0;
   for (const Camera& camera : cameras_) {
     const Field& field = camera.sensor->field(camera.field);
     const Shape& shape = field.spec.shape;
@@ -72,9 +72,9 @@ void ImagePointsSensor::initialize(const SensorInit& init) {
                                    shape.str()));
     }
     pictures_.push_back({&field, static_cast<int>(shape[1]), static_cast<int>(shape[0])});
-    most = std::max(most, shape[0] * shape[1]);
+    maximum = std::max(maximum, shape[0] * shape[1]);
   }
-  scratch_.assign(init.num_worlds, {std::vector<Mask>(m->ngeom), std::vector<Mask>(3 * most)});
+  scratch_.assign(init.num_worlds, {std::vector<Mask>(m->ngeom), std::vector<Mask>(3 * maximum)});
   clear_fields();
   for (const Object& object : objects_) {
     for (const Camera& camera : cameras_) {
@@ -104,7 +104,7 @@ void ImagePointsSensor::compute(const World& world) {
   for (std::size_t o = 0; o < objects_.size(); ++o) {
     const int root = objects_[o].body(world.id);
     for (int g = 0; root >= 0 && g < m->ngeom; ++g) {
-      if (m->geom_group[g] < 3 && is_below(m, m->geom_bodyid[g], root)) {
+      if (m->geom_group[g] < 3 && is_descendant_or_self(m, m->geom_bodyid[g], root)) {
         geom_objects[g] |= Mask(1u << o);
       }
     }

@@ -22,11 +22,11 @@ PoseSensor::PoseSensor(std::string name, Ref frame, Ref reference, std::string d
       description_(std::move(description)) {}
 
 void PoseSensor::initialize(const SensorInit& init) {
-  const std::string place = fmt::format("sensor '{}'", name());
-  frame_ = Frame::find(init.model, place, frame_ref_.type, frame_ref_.name);
+  const std::string context = fmt::format("sensor '{}'", name());
+  frame_ = Frame::find(init.model, context, frame_ref_.type, frame_ref_.name);
   std::string in = "world";
   if (!reference_ref_.name.empty()) {
-    reference_ = Frame::find(init.model, place, reference_ref_.type, reference_ref_.name);
+    reference_ = Frame::find(init.model, context, reference_ref_.type, reference_ref_.name);
     in = fmt::format("{} {}", reference_ref_.type, reference_ref_.name);
   }
   clear_fields();

@@ -162,9 +162,9 @@ TEST(EnvStates, ContainsEveryFreeBodyAndTheRobot) {
               ElementsAre(3, 0, .05f, 1, 0, 0, 0, 0, 1, 2, 3, 4, 5));
   EXPECT_THAT(values<float>(states, "articulations/panda"), ElementsAre(.25f, -2, 0, 0, 0, 0));
   EXPECT_THROW(EnvStatesSensor("env_states", "panda", groups(), 1, "robot/base"), ValueError);
-  EnvStatesSensor least("env_states", "arm", groups(), 0, "robot/base");
-  w.compute(least);
-  EXPECT_THAT(values<float>(least, "articulations/arm"), ElementsAre(.25f, -2));
+  EnvStatesSensor minimum("env_states", "arm", groups(), 0, "robot/base");
+  w.compute(minimum);
+  EXPECT_THAT(values<float>(minimum, "articulations/arm"), ElementsAre(.25f, -2));
 }
 
 // The row of an absent actor is zero and its flag is false. Actors that cannot be absent have no

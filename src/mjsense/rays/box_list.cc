@@ -44,13 +44,13 @@ BoxList::BoxList(int count)
   stale_.assign(num_blocks_, 1);
   ids_.resize(padded_);
   std::iota(ids_.begin(), ids_.end(), 0);
-  place_ = ids_;
+  box_of_geom_ = ids_;
   all_.ids = ids_.data();
   around_ = view(blocks_, nullptr, num_blocks_);
 }
 
 void BoxList::set(int i, const float low[3], const float high[3]) {
-  const int at = num_blocks_ > 0 ? place_[i] : i;
+  const int at = num_blocks_ > 0 ? box_of_geom_[i] : i;
   for (int k = 0; k < 3; ++k) {
     this->low(k)[at] = low[k];
     this->high(k)[at] = high[k];
@@ -69,7 +69,7 @@ void BoxList::update() {
 // Sorts the boxes along a Morton curve, which visits all of a region before it leaves it. Large and
 // infinite boxes come first.
 void BoxList::sort() {
-  std::array<float, 3> least{kInf, kInf, kInf}, most{-kInf, -kInf, -kInf};
+  std::array<float, 3> minimum{kInf, kInf, kInf}, maximum{-kInf, -kInf, -kInf};
   const auto is_large = [&](int i) {
     for (int k = 0; k < 3; ++k)
       if (!(high(k)[i] - low(k)[i] < kLarge)) return true;
@@ -79,24 +79,25 @@ void BoxList::sort() {
   for (int i = 0; i < count_; ++i) {
     if (is_large(i)) continue;
     for (int k = 0; k < 3; ++k) {
-      least[k] = std::min(least[k], middle(i, k));
-      most[k] = std::max(most[k], middle(i, k));
+      minimum[k] = std::min(minimum[k], middle(i, k));
+      maximum[k] = std::max(maximum[k], middle(i, k));
     }
   }
-  const float side = std::max({most[0] - least[0], most[1] - least[1], most[2] - least[2], 1e-6f});
+  const float side =
+      std::max({maximum[0] - minimum[0], maximum[1] - minimum[1], maximum[2] - minimum[2], 1e-6f});
   std::vector<std::uint32_t> code(count_, 0);
   for (int i = 0; i < count_; ++i) {
     if (is_large(i)) continue;
     code[i] = 1u << 31;
     for (int k = 0; k < 3; ++k)
-      code[i] |= spread(static_cast<std::uint32_t>((middle(i, k) - least[k]) / side * 1023.0f))
+      code[i] |= spread(static_cast<std::uint32_t>((middle(i, k) - minimum[k]) / side * 1023.0f))
                  << k;
   }
   std::stable_sort(ids_.begin(), ids_.begin() + count_,
                    [&](int a, int b) { return code[a] < code[b]; });
   const std::vector<float> before = boxes_;
   for (int at = 0; at < count_; ++at) {
-    place_[ids_[at]] = at;
+    box_of_geom_[ids_[at]] = at;
     for (int k = 0; k < 6; ++k)
       low(k)[at] = before[static_cast<std::size_t>(k) * padded_ + ids_[at]];
   }

@@ -43,7 +43,7 @@ class BoxList {
     }
   }
   int object(int k) const { return all_.ids ? all_.ids[k] : k; }  // object of box k
-  const int* place() const { return place_.empty() ? nullptr : place_.data(); }
+  const int* box_of_geom() const { return box_of_geom_.empty() ? nullptr : box_of_geom_.data(); }
 
  private:
   float* low(int k) { return boxes_.data() + static_cast<std::size_t>(k) * padded_; }
@@ -55,7 +55,7 @@ class BoxList {
   std::vector<float> boxes_;  // [6, padded]: minimum x, y, z, maximum x, y, z
   bool sorted_ = false;
   // Object of each box, and box of each object. Empty: box i is object i.
-  std::vector<int> ids_, place_;
+  std::vector<int> ids_, box_of_geom_;
   int num_blocks_ = 0;
   std::vector<float> blocks_;        // [6, padded]
   std::vector<std::uint8_t> stale_;  // blocks with a box that set() changed

@@ -69,8 +69,8 @@ TEST_P(ManyGeoms, BlocksDoNotChangeHits) {
       const RayFilter filter{.exclude_body = n % 5 ? -1 : 7};
       HitPacket found, expected, focused;
       scene.trace(0, filter, rays, found, scratch);
-      scene.focus(0, filter, {&rays, 1}, scratch);
-      scene.trace_focused(0, filter, rays, focused, scratch);
+      scene.cull(0, filter, {&rays, 1}, scratch);
+      scene.trace_culled(0, filter, rays, focused, scratch);
       all.count = 0;
       for (int g = 0; g < scene.num_objects(); ++g) {
         if (m.model->geom_bodyid[g] != filter.exclude_body) all.data()[all.count++] = {0.0f, g};
@@ -119,7 +119,7 @@ TEST(BoxList, BlocksSurroundTheirBoxes) {
     for (int at = 0; at < count; ++at) {
       const int block = at / KernelWorld::kBlock;
       ++seen[all.ids[at]];
-      EXPECT_EQ(list.place()[all.ids[at]], at);
+      EXPECT_EQ(list.box_of_geom()[all.ids[at]], at);
       for (int k = 0; k < 3; ++k) {
         EXPECT_LE(blocks.low[k][block], all.low[k][at]);
         EXPECT_GE(blocks.high[k][block], all.high[k][at]);
@@ -140,7 +140,7 @@ TEST(BoxList, FewObjectsHaveNoBlocks) {
   BoxList list(100);
   EXPECT_EQ(list.blocks().count, 0);
   EXPECT_EQ(list.all().ids, nullptr);
-  EXPECT_EQ(list.place(), nullptr);
+  EXPECT_EQ(list.box_of_geom(), nullptr);
   EXPECT_EQ(list.padded(), 112);
 }
 

@@ -50,7 +50,7 @@ void FlexShapes::add_sheets(RTCDevice device, Flex& flex) {
   std::vector<float> rest = s.rest;
   if (s.dim == 2) rest.insert(rest.end(), s.rest.begin(), s.rest.end());
   flex.smooth.resize(s.rest.size());
-  flex.mesh = SoftMesh(device, s.faces, rest);
+  flex.mesh = DeformableMesh(device, s.faces, rest);
   move_sheets(flex);
   scenes_.push_back(flex.mesh.scene());
   for (const FlexSurface::Part& p : s.parts) {

@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/rays/deformable_mesh.h"
 #include "mjsense/rays/flex_surface.h"
-#include "mjsense/rays/soft_mesh.h"
 
 namespace mjsense {
 
@@ -48,7 +48,7 @@ class FlexShapes {
     std::vector<double> vertices;  // [V, 3] m, world frame
     std::vector<double> smooth;    // [V, 3] unit normals of the vertices
     std::vector<float> normals;    // [F, 3 corners, 3] unit
-    SoftMesh mesh;                 // for dimensions 2 and 3
+    DeformableMesh mesh;           // for dimensions 2 and 3
     std::vector<float> ends;       // [E, 2, 4] m, end positions and radii, for dimension 1
     SceneHandle capsules;
     float box[6];

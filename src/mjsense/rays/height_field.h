@@ -15,11 +15,11 @@
 
 #include <mujoco/mujoco.h>
 
+#include "mjsense/rays/analytic_shapes.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/simd.h"
-#include "mjsense/rays/solids.h"
 
 namespace mjsense {
 namespace {
@@ -143,7 +143,7 @@ struct Walk {
   }
 
   // Lanes whose ray passes above all of its block leap to the block's border. Returns these lanes.
-  Mask leap(const HeightField& field, const GridRay& ray) {
+  Mask skip_block(const HeightField& field, const GridRay& ray) {
     constexpr float kBlock = HeightField::kBlock;
     const Float bx = floor(cx * (1 / kBlock)), by = floor(cy * (1 / kBlock));
     const Float top =
@@ -193,7 +193,7 @@ inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Floa
   const Float at_border = tied(stop) - stop;
   Float fa = 0.0f;  // height above the surface at walk.t; 0 or of the same sign as walk.side
   while (any(walk.active)) {
-    const Mask leapt = far ? walk.leap(field, ray) : mask_of(0);
+    const Mask leapt = far ? walk.skip_block(field, ray) : mask_of(0);
     const Mask here = walk.active & ~leapt;
     if (!any(here)) continue;
     const Int ix = truncate(walk.cx), iy = truncate(walk.cy);

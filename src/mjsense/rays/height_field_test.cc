@@ -12,8 +12,8 @@
 
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/kernels.h"
+#include "mjsense/rays/testing/reference.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/rays/testing/truth.h"
 
 namespace mjsense {
 namespace {

@@ -11,16 +11,16 @@
 #include <memory>
 #include <vector>
 
-#include "mjsense/rays/clusters.h"
+#include "mjsense/rays/triangle_clusters.h"
 
 namespace mjsense {
 
 // Horizons of a mesh in clusters. The mesh may occlude the sky on one side of a face and not on
 // another, so each face has a horizon for every octant of directions in the mesh's frame (bit i of
 // the octant: component i is negative). A horizon is computed by the kernels
-// (render/kernels/horizon.h) only after it was queried so often that casting the rays would have
-// cost as much; faces that are rarely visible cost nothing. The computed value does not depend on
-// which thread computes it or when.
+// (render/kernels/mesh_horizons.h) only after it was queried so often that casting the rays would
+// have cost as much; faces that are rarely visible cost nothing. The computed value does not depend
+// on which thread computes it or when.
 class Horizons {
  public:
   static constexpr int kOctants = 8;
@@ -28,53 +28,53 @@ class Horizons {
   static constexpr float kNever = 2;
   // Number of queries before a horizon is computed. Computing one costs 4 us; a packet's lane that
   // Embree casts costs 0.1 us.
-  static constexpr int kPatience = 50;
+  static constexpr int kMaxRequests = 50;
 
   explicit Horizons(const Clusters& clusters) {
     for (std::size_t i = kClusterSize * clusters.blocks.size(); i-- > 0;) {
       const int face = clusters.blocks[i / kClusterSize].face[i % kClusterSize];
-      if (places_.size() <= static_cast<std::size_t>(face)) places_.resize(face + 1);
+      if (slots_.size() <= static_cast<std::size_t>(face)) slots_.resize(face + 1);
       // Unused lanes repeat the first lane of their block; the lowest index wins.
-      places_[face] = static_cast<int>(i);
+      slots_[face] = static_cast<int>(i);
     }
-    planes_.reserve(places_.size());
-    for (const int place : places_)
-      planes_.push_back(plane_of(clusters.blocks[place / kClusterSize], place % kClusterSize));
-    sines_ = std::make_unique<std::atomic<std::uint8_t>[]>(kOctants * places_.size());
+    planes_.reserve(slots_.size());
+    for (const int slot : slots_)
+      planes_.push_back(plane_of(clusters.blocks[slot / kClusterSize], slot % kClusterSize));
+    sines_ = std::make_unique<std::atomic<std::uint8_t>[]>(kOctants * slots_.size());
   }
 
   // Index of a face in the clusters: kClusterSize * block + lane.
-  int place(int face) const { return places_[face]; }
+  int slot(int face) const { return slots_[face]; }
 
   // The face's plane: its unit normal n, and the offset n . x, m. All zeros if the face has no
   // area.
   const float* plane(int face) const { return planes_[face].data(); }
 
   // Returns the sine of the elevation above the face's plane from which all rays in the octant are
-  // clear of the mesh: kNever for the first kPatience queries, then the result of `find()`, rounded
-  // up.
+  // clear of the mesh: kNever for the first kMaxRequests queries, then the result of `find()`,
+  // rounded up.
   template <class Find>
   float ask(int face, int octant, Find find) const {
     std::atomic<std::uint8_t>& known = sines_[kOctants * face + octant];
     std::uint8_t code = known.load(std::memory_order_relaxed);
-    if (code <= kPatience) {
+    if (code <= kMaxRequests) {
       // Number of queries. Concurrent increments may be lost, which is harmless.
-      if (code < kPatience) {
+      if (code < kMaxRequests) {
         known.store(code + 1, std::memory_order_relaxed);
         return kNever;
       }
       const int steps = static_cast<int>(std::ceil(find() / kStep));
-      code = kLeast + steps < kUnclear ? kLeast + steps : kUnclear;
+      code = kMin + steps < kUnclear ? kMin + steps : kUnclear;
       known.store(code, std::memory_order_relaxed);
     }
-    return code == kUnclear ? kNever : kStep * static_cast<float>(code - kLeast);
+    return code == kUnclear ? kNever : kStep * static_cast<float>(code - kMin);
   }
 
  private:
-  // Values of a byte: up to kPatience a count of queries, then kLeast plus the sine in steps, and
+  // Values of a byte: up to kMaxRequests a count of queries, then kMin plus the sine in steps, and
   // kUnclear.
-  static constexpr int kLeast = kPatience + 1, kUnclear = 255;
-  static constexpr float kStep = 1.0f / (kUnclear - 1 - kLeast);
+  static constexpr int kMin = kMaxRequests + 1, kUnclear = 255;
+  static constexpr float kStep = 1.0f / (kUnclear - 1 - kMin);
 
   static std::array<float, 4> plane_of(const TriangleBlock& block, int lane) {
     float a[3], b[3], n[3];
@@ -96,7 +96,7 @@ class Horizons {
     return out;
   }
 
-  std::vector<int> places_;  // this and the following arrays are indexed by face
+  std::vector<int> slots_;  // this and the following arrays are indexed by face
   std::vector<std::array<float, 4>> planes_;
   std::unique_ptr<std::atomic<std::uint8_t>[]> sines_;
 };

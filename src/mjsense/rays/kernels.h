@@ -12,8 +12,8 @@ namespace mjsense {
 struct LocalPacket;
 struct RayPacket;
 struct HitPacket;
-struct HitRows;
-struct ReturnRows;
+struct RayOutputs;
+struct LidarReturns;
 struct RayGeom;
 struct RayCandidate;
 
@@ -47,7 +47,7 @@ struct KernelWorld {
   static constexpr int kBlock = 64;
   const RayGeom* geoms;
   const KernelBoxes& boxes;    // boxes of all geoms and flexes
-  const int* place;            // box index of each geom; null: geom i has box i
+  const int* box_of_geom;      // box index of each geom; null: geom i has box i
   const KernelBoxes& blocks;   // boxes around each kBlock consecutive boxes; may be empty
   const std::uint32_t* flags;  // [padded]
   const int* bodies;           // [padded]
@@ -62,11 +62,11 @@ struct KernelFilter {
 };
 
 struct RayKernels {
-  void (*place)(const LocalPacket&, const float* rotation, float tmax, RayPacket&);
+  void (*to_world)(const LocalPacket&, const float* rotation, float tmax, RayPacket&);
   // Writes the boxes that any of `count` packets with the same origin can hit into `low`, `high`
   // and `ids`. Returns their number.
-  int (*focus)(const KernelWorld&, const KernelFilter&, const RayPacket*, int count,
-               float* const* low, float* const* high, int* ids);
+  int (*cull)(const KernelWorld&, const KernelFilter&, const RayPacket*, int count,
+              float* const* low, float* const* high, int* ids);
   // Writes the candidates of one packet, nearest first, and returns their number. gather()
   // considers all geoms that pass the filter, gather_from() the given boxes.
   int (*gather)(const KernelWorld&, const KernelFilter&, const RayPacket&, RayCandidate* out);
@@ -78,10 +78,10 @@ struct RayKernels {
   // Discards hits nearer than `nearest` and clamps the distance of others to `farthest`. `bodies`
   // and `materials` are indexed by geom; null if those ids were not requested.
   void (*rows)(const RayPacket&, float nearest, float farthest, const int* bodies,
-               const int* materials, HitPacket&, HitRows&);
+               const int* materials, HitPacket&, RayOutputs&);
   // `rgba`: [objects, 4].
   void (*returns)(const LocalPacket&, const RayPacket&, const HitPacket&, const float* rgba,
-                  ReturnRows&);
+                  LidarReturns&);
 };
 
 const RayKernels& portable_kernels();

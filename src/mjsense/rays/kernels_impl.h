@@ -9,15 +9,15 @@
 
 #include <mujoco/mujoco.h>
 
-#include "mjsense/rays/beam.h"
+#include "mjsense/rays/analytic_shapes.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/height_field.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/packet.h"
+#include "mjsense/rays/packet_culling.h"
 #include "mjsense/rays/ray_geom.h"
-#include "mjsense/rays/rows.h"
+#include "mjsense/rays/ray_outputs.h"
 #include "mjsense/rays/simd.h"
-#include "mjsense/rays/solids.h"
 
 namespace mjsense {
 namespace {
@@ -297,7 +297,7 @@ std::uint32_t occluded(const KernelScene& scene, const KernelWorld& world,
   return hit & active;
 }
 
-void place(const LocalPacket& local, const float* r, float tmax, RayPacket& out) {
+void to_world(const LocalPacket& local, const float* r, float tmax, RayPacket& out) {
   for (int k = 0; k < kPacket; k += kWidth) {
     const Vec3f o = {load(local.o[0] + k), load(local.o[1] + k), load(local.o[2] + k)};
     const Vec3f d = {load(local.d[0] + k), load(local.d[1] + k), load(local.d[2] + k)};
@@ -310,8 +310,8 @@ void place(const LocalPacket& local, const float* r, float tmax, RayPacket& out)
   }
 }
 
-constexpr RayKernels kKernels = {&place, &focus,    &gather, &gather_from,
-                                 &trace, &occluded, &rows,   &returns};
+constexpr RayKernels kKernels = {&to_world, &cull,     &gather, &gather_from,
+                                 &trace,    &occluded, &rows,   &returns};
 
 }  // namespace
 }  // namespace mjsense

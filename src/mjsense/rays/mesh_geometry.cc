@@ -8,7 +8,7 @@
 #include <limits>
 #include <mutex>
 
-#include "mjsense/core/by_content.h"
+#include "mjsense/core/content_cache.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -91,7 +91,7 @@ SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
 
 std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
                                                   std::span<const int> faces, bool clusters) {
-  static ByContent<MeshGeometry> all;
+  static ContentCache<MeshGeometry> all;
   const ContentKey key = ContentKey().add(vertices).add(faces).add(std::span(&clusters, 1));
   return all.get(key, [&] {
     auto made = std::make_shared<MeshGeometry>();

@@ -8,9 +8,9 @@
 #include <span>
 #include <string>
 
-#include "mjsense/rays/clusters.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/horizons.h"
+#include "mjsense/rays/triangle_clusters.h"
 
 namespace mjsense {
 

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "mjsense/core/by_content.h"
+#include "mjsense/core/content_cache.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {

@@ -44,7 +44,7 @@ struct alignas(64) HitPacket {
 };
 
 // Hits in the layout of sensor outputs, ray by ray: x, y, z of the first ray, then of the second...
-struct alignas(64) HitRows {
+struct alignas(64) RayOutputs {
   float distance[kPacket];  // m; -1: no hit
   float pos[3 * kPacket];   // m, world frame; the ray's start if there is no hit
   float normal[3 * kPacket];
@@ -52,7 +52,7 @@ struct alignas(64) HitRows {
 };
 
 // Lidar returns, for a receiver at the ray's origin.
-struct alignas(64) ReturnRows {
+struct alignas(64) LidarReturns {
   float point[3 * kPacket];  // m, sensor frame; 0: no return
   float intensity[kPacket];  // mean of the surface's RGB times the cosine of incidence, 0..1
 };

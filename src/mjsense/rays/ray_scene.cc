@@ -33,7 +33,7 @@ KernelWorld kernel_world(const RayWorld& w) {
   const BoxList& boxes = w.boxes();
   return {w.geoms().data(),
           boxes.all(),
-          boxes.place(),
+          boxes.box_of_geom(),
           boxes.blocks(),
           w.flags().data(),
           w.bodies().data(),
@@ -58,9 +58,9 @@ RayScene::~RayScene() = default;
 
 void RayScene::update(const World& world) { worlds_[world.id].update(world.model, world.data); }
 
-void RayScene::place(const LocalPacket& local, const float rotation[9], float tmax,
-                     RayPacket& rays) const {
-  kernels_->place(local, rotation, tmax, rays);
+void RayScene::to_world(const LocalPacket& local, const float rotation[9], float tmax,
+                        RayPacket& rays) const {
+  kernels_->to_world(local, rotation, tmax, rays);
 }
 
 void RayScene::gather(int world, const RayFilter& filter, const RayPacket& rays,
@@ -76,17 +76,17 @@ void RayScene::trace_candidates(int world, const RayFilter& filter, const RayPac
                   candidates.data(), static_cast<int>(candidates.size()));
 }
 
-void RayScene::focus(int world, const RayFilter& filter, std::span<const RayPacket> packets,
-                     RayScratch& scratch) const {
+void RayScene::cull(int world, const RayFilter& filter, std::span<const RayPacket> packets,
+                    RayScratch& scratch) const {
   float* rows[6];
   for (int k = 0; k < 6; ++k) rows[k] = scratch.boxes_.data() + k * scratch.stride_;
   scratch.num_boxes_ =
-      kernels_->focus(kernel_world(worlds_[world]), kernel_filter(filter), packets.data(),
-                      static_cast<int>(packets.size()), rows, rows + 3, scratch.ids_.data());
+      kernels_->cull(kernel_world(worlds_[world]), kernel_filter(filter), packets.data(),
+                     static_cast<int>(packets.size()), rows, rows + 3, scratch.ids_.data());
 }
 
-void RayScene::trace_focused(int world, const RayFilter& filter, const RayPacket& rays,
-                             HitPacket& hits, RayScratch& scratch) const {
+void RayScene::trace_culled(int world, const RayFilter& filter, const RayPacket& rays,
+                            HitPacket& hits, RayScratch& scratch) const {
   const float* rows[6];
   for (int k = 0; k < 6; ++k) rows[k] = scratch.boxes_.data() + k * scratch.stride_;
   const KernelBoxes boxes{{rows[0], rows[1], rows[2]},
@@ -98,14 +98,14 @@ void RayScene::trace_focused(int world, const RayFilter& filter, const RayPacket
 }
 
 void RayScene::rows(int world, const RayPacket& rays, float nearest, float farthest, bool ids,
-                    HitPacket& hits, HitRows& out) const {
+                    HitPacket& hits, RayOutputs& out) const {
   const RayWorld& w = worlds_[world];
   kernels_->rows(rays, nearest, farthest, ids ? w.bodies().data() : nullptr, w.materials().data(),
                  hits, out);
 }
 
 void RayScene::returns(int world, const LocalPacket& local, const RayPacket& rays,
-                       const HitPacket& hits, ReturnRows& out) const {
+                       const HitPacket& hits, LidarReturns& out) const {
   kernels_->returns(local, rays, hits, worlds_[world].rgba().data(), out);
 }
 

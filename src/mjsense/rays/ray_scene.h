@@ -45,7 +45,7 @@ class RayScratch {
   friend class RayScene;
   int stride_, num_boxes_ = 0;
   std::vector<RayCandidate> candidates_;
-  std::vector<float> boxes_;  // [6, stride]: boxes found by focus()
+  std::vector<float> boxes_;  // [6, stride]: boxes found by cull()
   std::vector<int> ids_;
 };
 
@@ -68,7 +68,8 @@ class RayScene {
 
   // Transforms rays of a sensor to the world. `rotation` is its row-major R_WS; the caller sets the
   // packet's origin.
-  void place(const LocalPacket& local, const float rotation[9], float tmax, RayPacket& rays) const;
+  void to_world(const LocalPacket& local, const float rotation[9], float tmax,
+                RayPacket& rays) const;
 
   // Finds the nearest hits of 16 rays.
   void trace(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
@@ -79,18 +80,18 @@ class RayScene {
   void gather(int world, const RayFilter& filter, const RayPacket& rays, RayScratch& scratch) const;
   void trace_candidates(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                         std::span<const RayCandidate> candidates) const;
-  // For many packets with the same origin: focus() reduces the world to the geoms that any of them
-  // can hit, then trace_focused() traces each packet.
-  void focus(int world, const RayFilter& filter, std::span<const RayPacket> packets,
-             RayScratch& scratch) const;
-  void trace_focused(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
-                     RayScratch& scratch) const;
+  // For many packets with the same origin: cull() reduces the world to the geoms that any of them
+  // can hit, then trace_culled() traces each packet.
+  void cull(int world, const RayFilter& filter, std::span<const RayPacket> packets,
+            RayScratch& scratch) const;
+  void trace_culled(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
+                    RayScratch& scratch) const;
   // Converts hits to sensor outputs. Hits nearer than `nearest` are discarded; distances beyond
   // `farthest` (by rounding) are clamped to it.
   void rows(int world, const RayPacket& rays, float nearest, float farthest, bool ids,
-            HitPacket& hits, HitRows& out) const;
+            HitPacket& hits, RayOutputs& out) const;
   void returns(int world, const LocalPacket& local, const RayPacket& rays, const HitPacket& hits,
-               ReturnRows& out) const;
+               LidarReturns& out) const;
   // Bit i is set if a geom blocks ray i before its tmax.
   [[nodiscard]] std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
                                        RayScratch& scratch) const;

@@ -13,8 +13,8 @@
 
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/rays/testing/kernels.h"
+#include "mjsense/rays/testing/reference.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/rays/testing/truth.h"
 
 namespace mjsense {
 namespace {
@@ -23,8 +23,8 @@ using testing::agree;
 using testing::disagreement;
 using testing::mujoco_ray;
 using testing::ray_count;
+using testing::Reference;
 using testing::TestModel;
-using testing::Truth;
 
 class RandomRays : public ::testing::TestWithParam<const char*> {};
 
@@ -54,18 +54,18 @@ TEST_P(RandomRays, AgreeWithMjRay) {
         const int axis = rng.below(3);
         for (int k = 0; k < 3; ++k) d[k] = k == axis ? (d[k] < 0 ? -1 : 1) : 0;
       }
-      const Truth truth = mujoco_ray(m, o, d);
+      const Reference reference = mujoco_ray(m, o, d);
       const Hit hit = scene.trace(0, {}, o, d);
-      hits += truth.t >= 0;
+      hits += reference.t >= 0;
       if (const std::string text = disagreement(m, o, d, hit); !text.empty()) {
         ADD_FAILURE() << text;
         ASSERT_LT(++wrong, 5);
       }
-      if (truth.t < 0 || !hit || std::abs(hit.t - truth.t) > 1e-5) continue;
-      wrong_geom += hit.geom != truth.geom;
+      if (reference.t < 0 || !hit || std::abs(hit.t - reference.t) > 1e-5) continue;
+      wrong_geom += hit.geom != reference.geom;
       double cosine = 0;
-      for (int k = 0; k < 3; ++k) cosine += truth.normal[k] * hit.normal[k];
-      wrong_normal += hit.geom == truth.geom && cosine < 0.999;
+      for (int k = 0; k < 3; ++k) cosine += reference.normal[k] * hit.normal[k];
+      wrong_normal += hit.geom == reference.geom && cosine < 0.999;
     }
   }
   EXPECT_GT(hits, total / 50) << "too few hits to mean anything";
@@ -112,10 +112,10 @@ TEST_P(Kernels, FocusedAndPlainTracesAreIdentical) {
     RayPacket packets[3] = {random_packet(rng, 5, trial % 3 * 0.3), random_packet(rng, 5, 0.1),
                             random_packet(rng, 5, 2)};
     for (RayPacket& p : packets) std::copy_n(packets[0].origin, 3, p.origin);
-    scene.focus(0, {}, packets, a);
+    scene.cull(0, {}, packets, a);
     for (const RayPacket& p : packets) {
       HitPacket x, y;
-      scene.trace_focused(0, {}, p, x, a);
+      scene.trace_culled(0, {}, p, x, a);
       scene.trace(0, {}, p, y, b);
       EXPECT_EQ(std::memcmp(x.t, y.t, sizeof x.t), 0);
       EXPECT_EQ(std::memcmp(x.geom, y.geom, sizeof x.geom), 0);
@@ -146,9 +146,9 @@ TEST_P(Kernels, RowsEqualTheHits) {
     scene.trace(0, {}, rays, found, scratch);
     hits = found;
     const float nearest = 1.0f, farthest = 4.0f;
-    HitRows rows;
+    RayOutputs rows;
     scene.rows(0, rays, nearest, farthest, true, hits, rows);
-    ReturnRows back;
+    LidarReturns back;
     scene.returns(0, local, rays, hits, back);
     for (int i = 0; i < kPacket; ++i) {
       const bool hit = found.geom[i] >= 0 && found.t[i] >= nearest;
@@ -163,7 +163,7 @@ TEST_P(Kernels, RowsEqualTheHits) {
       const volatile float t = hit ? hits.t[i] : 0.0f;
       float cosine = 0;
       for (int k = 0; k < 3; ++k) {
-        const volatile float way = t * rays.d[k][i], from = rays.o[k][i] + way;
+        const volatile float offset = t * rays.d[k][i], from = rays.o[k][i] + offset;
         EXPECT_TRUE(same(rows.pos[3 * i + k], static_cast<float>(rays.origin[k] + from)));
         EXPECT_TRUE(same(rows.normal[3 * i + k], hit ? found.n[k][i] : 0.0f));
         EXPECT_TRUE(same(back.point[3 * i + k], t * local.d[k][i]));
@@ -223,13 +223,13 @@ TEST_P(Kernels, PreciseFarFromTheWorldOrigin) {
       for (int k = 0; k < 3; ++k) o[k] *= 10;
       testing::aim(rng, 0.2, o, d);
       for (int k = 0; k < 3; ++k) o[k] += m.data->geom_xpos[k];
-      const Truth truth = mujoco_ray(m, o, d);
+      const Reference reference = mujoco_ray(m, o, d);
       const Hit hit = scene.trace(0, {}, o, d);
-      if (truth.t < 0 || !hit) continue;
-      const double cosine = std::abs(mju_dot3(truth.normal, d));
+      if (reference.t < 0 || !hit) continue;
+      const double cosine = std::abs(mju_dot3(reference.normal, d));
       if (cosine < 0.2) continue;  // grazing: a small sideways error is a large error along the ray
       ++hits;
-      worst = std::max(worst, std::abs(hit.t - truth.t));
+      worst = std::max(worst, std::abs(hit.t - reference.t));
     }
     EXPECT_GT(hits, 100) << type;
     EXPECT_LT(worst, 1e-5) << type;

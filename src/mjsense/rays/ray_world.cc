@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "mjsense/rays/box_list.h"
+#include "mjsense/rays/change_detector.h"
 #include "mjsense/rays/flex_shapes.h"
-#include "mjsense/rays/seen.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
 
@@ -19,9 +19,9 @@ constexpr float kEndless = 1e30f;
 
 // Copies of what the last update() read.
 struct RayWorld::Last {
-  Seen<int> body, material, group, type, data;
-  Seen<float> rgba, material_rgba;
-  Seen<double> size, pos, mat;
+  ChangeDetector<int> body, material, group, type, data;
+  ChangeDetector<float> rgba, material_rgba;
+  ChangeDetector<double> size, pos, mat;
 
   explicit Last(const mjModel* m)
       : body(m->ngeom),
@@ -58,7 +58,7 @@ RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
 }
 
 void RayWorld::update(const mjModel* m, const mjData* d) {
-  update_looks(m);
+  update_appearance(m);
   update_geoms(m, d);
   if (flexes_) update_flexes(m, d);
   boxes_->update();
@@ -74,7 +74,7 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
   ++version_;
 }
 
-void RayWorld::update_looks(const mjModel* m) {
+void RayWorld::update_appearance(const mjModel* m) {
   bool changed = version_ == 0;
   changed |= last_->body.changed(m->geom_bodyid);
   changed |= last_->material.changed(m->geom_matid);

@@ -62,7 +62,7 @@ class RayWorld {
  private:
   struct Last;
 
-  void update_looks(const mjModel* model);  // groups, materials and colours of geoms
+  void update_appearance(const mjModel* model);  // groups, materials and colours of geoms
   void update_geoms(const mjModel* model, const mjData* data);
   void update_geom(const mjModel* model, const mjData* data, int id);
   void describe(const mjModel* model, int object, int material, int group, const float* own_rgba);

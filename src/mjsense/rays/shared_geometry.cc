@@ -37,14 +37,14 @@ Triangles surface_of(const HeightField& field) {
 
 float steepest_slope(const HeightField& field) {
   const float dx = 2 * field.size[0] / (field.cols - 1), dy = 2 * field.size[1] / (field.rows - 1);
-  float most = 0;
+  float maximum = 0;
   for (int r = 0; r + 1 < field.rows; ++r)
     for (int c = 0; c + 1 < field.cols; ++c) {
       const float *p = field.data + r * field.cols + c, *q = p + field.cols;
-      most = std::max({most, std::hypot((p[1] - p[0]) / dx, (q[1] - p[1]) / dy),
-                       std::hypot((q[1] - q[0]) / dx, (q[0] - p[0]) / dy)});
+      maximum = std::max({maximum, std::hypot((p[1] - p[0]) / dx, (q[1] - p[1]) / dy),
+                          std::hypot((q[1] - q[0]) / dx, (q[0] - p[0]) / dy)});
     }
-  return most * field.size[2];
+  return maximum * field.size[2];
 }
 
 int blocks(int points) { return (points - 2) / HeightField::kBlock + 1; }

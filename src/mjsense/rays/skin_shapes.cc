@@ -11,8 +11,8 @@ SkinShapes::SkinShapes(RTCDevice device, const mjModel* m) : model_(m), skins_(m
     Skin& skin = skins_[i];
     const std::size_t vertices = m->skin_vertnum[i], faces = m->skin_facenum[i];
     skin.bones.resize(7 * m->skin_bonenum[i]);
-    skin.mesh = SoftMesh(device, {m->skin_face + 3 * m->skin_faceadr[i], 3 * faces},
-                         {m->skin_vert + 3 * m->skin_vertadr[i], 3 * vertices});
+    skin.mesh = DeformableMesh(device, {m->skin_face + 3 * m->skin_faceadr[i], 3 * faces},
+                               {m->skin_vert + 3 * m->skin_vertadr[i], 3 * vertices});
     skin.smooth.resize(3 * vertices);
     skin.normals.resize(9 * faces);
     skin.geom = {.mat = {1, 0, 0, 0, 1, 0, 0, 0, 1},

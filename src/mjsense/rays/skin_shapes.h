@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/rays/deformable_mesh.h"
 #include "mjsense/rays/ray_geom.h"
-#include "mjsense/rays/soft_mesh.h"
 
 namespace mjsense {
 
@@ -42,7 +42,7 @@ class SkinShapes {
     bool stale;                 // the bones have moved since the skin was last bent
     std::uint32_t group;
     int material;
-    SoftMesh mesh;
+    DeformableMesh mesh;
     std::vector<float> smooth;   // [V, 3] unit normals of the vertices
     std::vector<float> normals;  // [F, 3 corners, 3]
     RayGeom geom;

@@ -13,9 +13,9 @@
 #include <span>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fd.h"
-#include "mjsense/core/file_limit.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/file_descriptor.h"
+#include "mjsense/core/file_size_limit.h"
+#include "mjsense/core/regular_file.h"
 #include "mjsense/record/crc32.h"
 #include "mjsense/record/folder.h"
 
@@ -33,8 +33,8 @@ std::string checksum_of(int fd, std::int64_t bytes) {
   Checksum sum;
   std::array<std::uint8_t, kPieceBytes> piece;
   for (std::int64_t at = 0; at < bytes;) {
-    const std::int64_t most = std::min<std::int64_t>(kPieceBytes, bytes - at);
-    const ssize_t n = pread(fd, piece.data(), static_cast<std::size_t>(most), at);
+    const std::int64_t maximum = std::min<std::int64_t>(kPieceBytes, bytes - at);
+    const ssize_t n = pread(fd, piece.data(), static_cast<std::size_t>(maximum), at);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) throw RuntimeError(fmt::format("cannot be read: {}", std::strerror(errno)));
     if (n == 0) break;
@@ -58,9 +58,9 @@ std::string Checksum::text() const { return fmt::format("{:08x}", crc_); }
 std::string checksum_of(int fd) { return checksum_of(fd, file_size(fd)); }
 
 void seal_file(const Folder& folder, const std::string& name) {
-  const FileLimitIsError limit;
+  const FileLimitGuard limit;
   const Fd file(openat(folder.fd(), name.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-  const auto fail = [&] { throw_file("write", folder.shown(name), errno); };
+  const auto fail = [&] { throw_file("write", folder.display_path(name), errno); };
   if (!file) fail();
   const std::int64_t size = file_size(file.get());
   const std::string seal = seal_text(checksum_of(file.get(), size), size);
@@ -75,7 +75,7 @@ Seal check_seal(int fd) {
   std::string found(form.size(), '\0');
   if (pread(fd, found.data(), found.size(), end) != static_cast<ssize_t>(found.size()))
     return Seal::kNone;
-  if (found == seal_text(checksum_of(fd, end), end)) return Seal::kWhole;
+  if (found == seal_text(checksum_of(fd, end), end)) return Seal::kValid;
   // The line itself may be damaged. It counts as a checksum line if more than half of its fixed
   // characters match.
   std::size_t same = 0, fixed = 0;
@@ -84,7 +84,7 @@ Seal check_seal(int fd) {
     ++fixed;
     same += found[i] == form[i];
   }
-  return 2 * same > fixed ? Seal::kBroken : Seal::kNone;
+  return 2 * same > fixed ? Seal::kCorrupt : Seal::kNone;
 }
 
 }  // namespace mjsense

@@ -30,7 +30,7 @@ class Checksum {
 inline constexpr const char* kChecksumAttribute = "crc32";
 inline constexpr const char* kBytesAttribute = "bytes";
 
-enum class Seal { kWhole, kBroken, kNone };
+enum class Seal { kValid, kCorrupt, kNone };
 
 // Appends the checksum line to a closed file. Throws RuntimeError if it cannot be written.
 void seal_file(const Folder& folder, const std::string& name);

@@ -186,7 +186,7 @@ MJSENSE_WIDE std::uint32_t wide(std::uint32_t crc, const std::uint8_t* bytes, st
 }  // namespace
 #endif
 
-std::vector<Crc32> crc32_multiplying() {
+std::vector<Crc32> crc32_clmul() {
   std::vector<Crc32> fast;
 #if defined(__x86_64__)
   if (cpu_isa() >= Isa::kAvx2 && __builtin_cpu_supports("pclmul")) fast.push_back(narrow);
@@ -199,7 +199,7 @@ std::vector<Crc32> crc32_multiplying() {
 
 std::uint32_t crc32_of(std::uint32_t crc, const void* bytes, std::size_t count) {
   static const detail::Crc32 best = [] {
-    const std::vector<detail::Crc32> fast = detail::crc32_multiplying();
+    const std::vector<detail::Crc32> fast = detail::crc32_clmul();
     return fast.empty() ? detail::crc32_portable : fast.back();
   }();
   return best(crc, static_cast<const std::uint8_t*>(bytes), count);

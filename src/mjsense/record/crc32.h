@@ -14,11 +14,11 @@ namespace mjsense {
 [[nodiscard]] std::uint32_t crc32_of(std::uint32_t crc, const void* bytes, std::size_t count);
 
 namespace detail {
-// Implementations that crc32_of() chooses from. crc32_multiplying() returns those with carry-less
+// Implementations that crc32_of() chooses from. crc32_clmul() returns those with carry-less
 // multiplication that this CPU and MJSENSE_ISA allow, the fastest last.
 using Crc32 = std::uint32_t (*)(std::uint32_t crc, const std::uint8_t* bytes, std::size_t count);
 std::uint32_t crc32_portable(std::uint32_t crc, const std::uint8_t* bytes, std::size_t count);
-std::vector<Crc32> crc32_multiplying();
+std::vector<Crc32> crc32_clmul();
 }  // namespace detail
 
 }  // namespace mjsense

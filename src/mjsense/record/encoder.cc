@@ -89,7 +89,7 @@ struct EncoderPool::Impl {
     const bool enough = streams_at_once <= max_encoders;
     max_direct = enough ? max_encoders : max_encoders - std::max(1, max_encoders / 4);
     max_waiting = std::max(1, streams_at_once);
-    wake_fd = os::wake_up();
+    wake_fd = os::make_eventfd();
     if (!wake_fd) {
       throw RuntimeError(fmt::format("cannot create an event fd: {}", std::strerror(errno)));
     }
@@ -167,7 +167,7 @@ struct EncoderPool::Impl {
   void watch(double elapsed) {
     constexpr double kHurrySeconds = 2;
     const bool hurry = leave && leave->load() >= 2;
-    const double most = hurry ? std::min(kHurrySeconds, cfg.ffmpeg_timeout) : cfg.ffmpeg_timeout;
+    const double maximum = hurry ? std::min(kHurrySeconds, cfg.ffmpeg_timeout) : cfg.ffmpeg_timeout;
     const std::lock_guard lock(mutex);
     for (const auto& stream : streams) {
       const bool ending = stream->child.pid >= 0 && !stream->child.in;
@@ -182,9 +182,9 @@ struct EncoderPool::Impl {
       stream->idle_s = now != stream->seen ? 0 : stream->idle_s + elapsed - without;
       stream->seen = now;
       stream->waited_s = waited;
-      if (stream->idle_s < most) continue;
+      if (stream->idle_s < maximum) continue;
       stream->failure = fmt::format("ffmpeg {} for {:g} s and was killed (ffmpeg_timeout)",
-                                    ending ? "did not finish" : "accepted no frame", most);
+                                    ending ? "did not finish" : "accepted no frame", maximum);
       changed.notify_all();
     }
   }
@@ -212,10 +212,10 @@ struct EncoderPool::Impl {
       if (n < 0 && errno == EAGAIN) return;
       const std::lock_guard lock(mutex);
       if (n < 0) {
-        stream.failure =
-            stream.direct ? "ffmpeg stopped reading"
-                          : fmt::format("cannot write '{}': {}", stream.folder->shown(stream.spool),
-                                        std::strerror(errno));
+        stream.failure = stream.direct ? "ffmpeg stopped reading"
+                                       : fmt::format("cannot write '{}': {}",
+                                                     stream.folder->display_path(stream.spool),
+                                                     std::strerror(errno));
       } else {
         stream.offset += static_cast<std::size_t>(n);
         stream.written += n;
@@ -260,7 +260,8 @@ struct EncoderPool::Impl {
       stream.spool_file =
           Fd(openat(stream.folder->fd(), stream.spool.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
       try {
-        if (!stream.spool_file) throw_file("read", stream.folder->shown(stream.spool), errno);
+        if (!stream.spool_file)
+          throw_file("read", stream.folder->display_path(stream.spool), errno);
         stream.child = start_process(encoder_command(cfg, fps, *stream.video, stream.output),
                                      stream.spool_file, stream.folder->fd());
         ++running;
@@ -346,7 +347,8 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
     stream->spool = output + ".raw";
     stream->spool_file = Fd(openat(stream->folder->fd(), stream->spool.c_str(),
                                    O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
-    if (!stream->spool_file) throw_file("write", stream->folder->shown(stream->spool), errno);
+    if (!stream->spool_file)
+      throw_file("write", stream->folder->display_path(stream->spool), errno);
   }
   return impl_->streams.emplace_back(std::move(stream)).get();
 }

@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "mjsense/record/folder.h"
-#include "mjsense/record/layout.h"
 #include "mjsense/record/recording.h"
+#include "mjsense/record/recording_plan.h"
 
 namespace mjsense {
 

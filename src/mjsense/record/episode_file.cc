@@ -8,8 +8,8 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
-#include "mjsense/hdf5/guard.h"
-#include "mjsense/record/depth.h"
+#include "mjsense/hdf5/untrusted_file.h"
+#include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/molmospaces.h"
 
 namespace mjsense {
@@ -50,20 +50,20 @@ void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& v
 void add_file_name(hid_t trajectory, const RecordingCfg& cfg, const VideoStream& video) {
   const hsize_t size = kFileNameBytes;
   const h5::Id space(H5Screate_simple(1, &size, nullptr), H5Sclose, "HDF5 space");
-  const std::string place = "obs/sensor_data/" + video.key;
-  const h5::Id dataset(H5Dcreate2(trajectory, place.c_str(), H5T_STD_U8LE, space,
+  const std::string path = "obs/sensor_data/" + video.key;
+  const h5::Id dataset(H5Dcreate2(trajectory, path.c_str(), H5T_STD_U8LE, space,
                                   h5::link_properties(), h5::dataset_properties(), H5P_DEFAULT),
-                       H5Dclose, place);
+                       H5Dclose, path);
   char name[kFileNameBytes] = {};
   const std::string file = video.stem + video.extension;
   std::memcpy(name, file.data(), std::min(file.size(), kFileNameBytes));
-  h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), place);
+  h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), path);
   describe_video(dataset, cfg, video);
 }
 
 }  // namespace
 
-std::string_view own_place(int stream) {
+std::string_view own_path(int stream) {
   constexpr std::string_view kPlaces[kOwnStreams] = {"rewards", "success", "fail", "terminated",
                                                      "truncated"};
   return kPlaces[stream];
@@ -76,7 +76,7 @@ EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string
                          const EpisodeMeta& meta)
     : folder_(std::move(folder)), name_(name), gzip_(cfg.gzip), plan_(plan) {
   const h5::H5Lock lock;
-  file_ = h5::create_file(folder_->reachable(name), folder_->shown(name));
+  file_ = h5::create_file(folder_->fd_path(name), folder_->display_path(name));
   h5::set_attribute(file_, "format", "mjsense 1");
   h5::set_attribute(file_, "recording", plan.fingerprint);
   trajectory_ = h5::create_group(file_, "traj_0");
@@ -85,13 +85,13 @@ EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string
   for (const char* group : standard_groups()) h5::create_group(trajectory_, group);
   datasets_.reserve(plan.arrays.size() + kOwnStreams);
   for (const ArrayStream& stream : plan.arrays) {
-    add_dataset(stream.place, stream.spec.dtype, stream.spec.shape, stream.chunk_rows,
+    add_dataset(stream.path, stream.spec.dtype, stream.spec.shape, stream.chunk_rows,
                 stream.shuffled);
     describe(datasets_.back().id, stream.sensor->name(), stream.kind(), stream.spec);
     if (stream.spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
   }
   for (int i = 0; i < kOwnStreams; ++i)
-    add_dataset(own_place(i), own_dtype(i), Shape{}, chunk_rows(dtype_size(own_dtype(i))));
+    add_dataset(own_path(i), own_dtype(i), Shape{}, chunk_rows(dtype_size(own_dtype(i))));
   for (const VideoStream& video : plan.videos) add_file_name(trajectory_, cfg, video);
 }
 
@@ -102,11 +102,11 @@ EpisodeFile::~EpisodeFile() {
   file_.reset();
 }
 
-void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& row,
+void EpisodeFile::add_dataset(std::string_view path, DType dtype, const Shape& row,
                               std::int64_t chunk_rows, bool shuffled) {
   Dataset dataset;
   hsize_t chunk[Shape::kMaxRank + 1] = {static_cast<hsize_t>(chunk_rows)};
-  hsize_t most[Shape::kMaxRank + 1] = {H5S_UNLIMITED};
+  hsize_t maximum[Shape::kMaxRank + 1] = {H5S_UNLIMITED};
   dataset.rank = row.rank() + 1;
   dataset.row_bytes = static_cast<std::size_t>(row.size()) * dtype_size(dtype);
   if (shuffled && gzip_ > 0) dataset.shuffled = dtype_size(dtype);
@@ -115,11 +115,11 @@ void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& 
     const auto size = static_cast<hsize_t>(row[i]);
     dataset.dims[i + 1] = size;
     chunk[i + 1] = std::max<hsize_t>(1, size);
-    most[i + 1] = size == 0 ? H5S_UNLIMITED : size;
+    maximum[i + 1] = size == 0 ? H5S_UNLIMITED : size;
   }
 
-  const std::string name(place);
-  const h5::Id space(H5Screate_simple(dataset.rank, dataset.dims, most), H5Sclose, name);
+  const std::string name(path);
+  const h5::Id space(H5Screate_simple(dataset.rank, dataset.dims, maximum), H5Sclose, name);
   const h5::Id properties = h5::dataset_properties();
   h5::check(H5Pset_chunk(properties, dataset.rank, chunk), name);
   if (dataset.shuffled > 0) h5::check(H5Pset_shuffle(properties), name);
@@ -158,7 +158,7 @@ std::span<const std::uint8_t> EpisodeFile::packed(std::span<const std::uint8_t> 
   uLongf size = packed_.size();
   if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
     throw RuntimeError(fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(),
-                                   folder_->shown(name_)));
+                                   folder_->display_path(name_)));
   }
   return {packed_.data(), size};
 }
@@ -178,7 +178,7 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   Dataset& dataset = datasets_[stream];
   hsize_t offset[Shape::kMaxRank + 1] = {dataset.dims[0]};
   dataset.dims[0] += static_cast<hsize_t>(rows);
-  const std::string what = fmt::format("cannot write '{}'", folder_->shown(name_));
+  const std::string what = fmt::format("cannot write '{}'", folder_->display_path(name_));
   h5::check(H5Dset_extent(dataset.id, dataset.dims), what);
   if (chunk.empty()) return;
   h5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
@@ -226,7 +226,7 @@ void EpisodeFile::finish(std::span<const VideoSum> videos) {
   }
   datasets_.clear();
   trajectory_.reset();
-  file_.close(fmt::format("cannot write '{}'", folder_->shown(name_)));
+  file_.close(fmt::format("cannot write '{}'", folder_->display_path(name_)));
   seal_file(*folder_, name_);
 }
 

@@ -13,13 +13,13 @@
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"
-#include "mjsense/record/layout.h"
+#include "mjsense/record/recording_plan.h"
 
 namespace mjsense {
 
 // Streams that the recorder adds to those of the suite.
 enum OwnStream { kRewards, kSuccess, kFail, kTerminated, kTruncated, kOwnStreams };
-std::string_view own_place(int stream);
+std::string_view own_path(int stream);
 DType own_dtype(int stream);
 
 class EpisodeFile {
@@ -58,7 +58,7 @@ class EpisodeFile {
   // Returns a chunk converted to text; valid until the next call.
   std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
                                          std::span<const std::uint8_t> kept);
-  void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows,
+  void add_dataset(std::string_view path, DType dtype, const Shape& row, std::int64_t chunk_rows,
                    bool shuffled = false);
   // Compresses a chunk; the result is valid until the next call.
   std::span<const std::uint8_t> packed(std::span<const std::uint8_t> chunk, std::size_t shuffled);

@@ -15,9 +15,9 @@
 #include <span>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_limit.h"
+#include "mjsense/core/file_size_limit.h"
 #include "mjsense/core/os.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 
 namespace fs = std::filesystem;
 
@@ -75,30 +75,30 @@ Folder Folder::open(const fs::path& path) {
   return {std::move(fd), path};
 }
 
-fs::path Folder::reachable(const std::string& name) const { return os::path_of(fd()) / name; }
+fs::path Folder::fd_path(const std::string& name) const { return os::path_of(fd()) / name; }
 
-Folder Folder::find(const std::string& name) const {
+Folder Folder::find_dir(const std::string& name) const {
   Fd inner(openat(fd(), name.c_str(), kFolderFlags | O_NOFOLLOW));
   if (inner) return {std::move(inner), path_ / name};
   const int error = errno;
   if (error == ENOENT) return {};
   struct stat about = {};
   if (fstatat(fd(), name.c_str(), &about, AT_SYMLINK_NOFOLLOW) == 0 && S_ISLNK(about.st_mode))
-    throw ValueError(
-        fmt::format("'{}' is a symbolic link, which is not followed: remove it", shown(name)));
-  throw_file("open the directory", shown(name), error);
+    throw ValueError(fmt::format("'{}' is a symbolic link, which is not followed: remove it",
+                                 display_path(name)));
+  throw_file("open the directory", display_path(name), error);
 }
 
-Folder Folder::at(const std::string& name) const {
-  Folder inner = find(name);
-  if (!inner) throw_file("open the directory", shown(name), ENOENT);
+Folder Folder::open_dir(const std::string& name) const {
+  Folder inner = find_dir(name);
+  if (!inner) throw_file("open the directory", display_path(name), ENOENT);
   return inner;
 }
 
-Folder Folder::make(const std::string& name) const {
+Folder Folder::make_dir(const std::string& name) const {
   if (mkdirat(fd(), name.c_str(), 0755) != 0)
-    throw_file("create the directory", shown(name), errno);
-  return at(name);
+    throw_file("create the directory", display_path(name), errno);
+  return open_dir(name);
 }
 
 bool Folder::contains(const std::string& name) const {
@@ -139,16 +139,16 @@ void Folder::sync() const {
 
 void Folder::sync(const std::string& name) const {
   const Fd file(openat(fd(), name.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (!file || fsync(file.get()) != 0) throw_file("sync", shown(name), errno);
+  if (!file || fsync(file.get()) != 0) throw_file("sync", display_path(name), errno);
 }
 
 void Folder::rename(const std::string& name, const Folder& to, const std::string& new_name) const {
   if (renameat(fd(), name.c_str(), to.fd(), new_name.c_str()) != 0)
-    throw_file("write", to.shown(new_name), errno);
+    throw_file("write", to.display_path(new_name), errno);
 }
 
 void Folder::write(const std::string& name, std::string_view text) const {
-  const FileLimitIsError limit;
+  const FileLimitGuard limit;
   const std::string part = name + ".part";
   unlinkat(fd(), part.c_str(), 0);
   {
@@ -157,7 +157,7 @@ void Folder::write(const std::string& name, std::string_view text) const {
     if (!file || !write_all(file, std::as_bytes(std::span(text))) || fsync(file.get()) != 0) {
       const int error = errno;
       unlinkat(fd(), part.c_str(), 0);
-      throw_file("write", shown(name), error);
+      throw_file("write", display_path(name), error);
     }
   }
   rename(part, *this, name);
@@ -165,17 +165,18 @@ void Folder::write(const std::string& name, std::string_view text) const {
 
 void Folder::reserve_space(const std::string& name, std::int64_t bytes) const {
   const Fd file(openat(fd(), name.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
-  if (!file) throw_file("write", shown(name), errno);
+  if (!file) throw_file("write", display_path(name), errno);
   rlimit limit{};
   if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(bytes))
-    throw_file("write", shown(name), EFBIG);
+    throw_file("write", display_path(name), EFBIG);
   if (os::reserve(file.get(), bytes)) return;
-  if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", shown(name), errno);
+  if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG)
+    throw_file("write", display_path(name), errno);
   // If space cannot be reserved (some network file systems), at least check that enough is free.
   std::error_code error;
   const fs::space_info space = fs::space(os::path_of(file.get()), error);
   if (!error && space.available < static_cast<std::uintmax_t>(bytes))
-    throw_file("write", shown(name), ENOSPC);
+    throw_file("write", display_path(name), ENOSPC);
 }
 
 void Folder::remove(const std::string& name) const { remove_entry(fd(), name); }

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 
 namespace mjsense {
 
@@ -25,16 +25,16 @@ class Folder {
   int fd() const { return fd_.get(); }
   // Path at the time of opening, for messages.
   const std::filesystem::path& path() const { return path_; }
-  std::string shown(const std::string& name) const { return (path_ / name).string(); }
+  std::string display_path(const std::string& name) const { return (path_ / name).string(); }
   // Path that leads through the descriptor, for libraries that open files by path.
-  std::filesystem::path reachable(const std::string& name) const;
+  std::filesystem::path fd_path(const std::string& name) const;
 
   // Opens the subdirectory `name`; the Folder is empty if there is none. Throws ValueError for a
   // symbolic link and RuntimeError for an entry that cannot be opened.
-  Folder find(const std::string& name) const;
-  Folder at(const std::string& name) const;  // throws RuntimeError if missing
+  Folder find_dir(const std::string& name) const;
+  Folder open_dir(const std::string& name) const;  // throws RuntimeError if missing
   // Creates the subdirectory `name`. Throws RuntimeError if the name is taken.
-  Folder make(const std::string& name) const;
+  Folder make_dir(const std::string& name) const;
 
   bool contains(const std::string& name) const;                   // an entry of any kind
   bool contains(const std::string& name, const Fd& file) const;   // the same file (inode)

@@ -63,7 +63,7 @@ void write_element(JsonWriter& json, DType dtype, const std::uint8_t* at) {
 
 }  // namespace
 
-bool JsonRows::suits(const Sensor& sensor) {
+bool JsonRows::can_convert(const Sensor& sensor) {
   return !sensor.fields().empty() && std::ranges::all_of(sensor.fields(), [](const Field& field) {
     return !field.name.empty() && field.spec.storage == Storage::kArray && !field.spec.is_dict &&
            field.spec.shape.rank() <= 1;

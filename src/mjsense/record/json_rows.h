@@ -20,7 +20,7 @@ namespace mjsense {
 class JsonRows {
  public:
   // True if every field has a name and is a number or a row of numbers.
-  static bool suits(const Sensor& sensor);
+  static bool can_convert(const Sensor& sensor);
   // Throws ValueError if the longest possible text exceeds `text_bytes`, or if one field would be
   // inside another.
   JsonRows(const Sensor& sensor, int text_bytes);

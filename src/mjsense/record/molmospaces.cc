@@ -44,7 +44,7 @@ std::string units_of(const Sensor& sensor) {
 
 }  // namespace
 
-std::string place_of(std::string_view stream) {
+std::string path_of(std::string_view stream) {
   constexpr std::string_view kParam = "sensor_param_";
   if (stream == "qpos" || stream == "qvel") return fmt::format("obs/agent/{}", stream);
   if (stream.starts_with("actions/") || stream.starts_with("env_states/") ||
@@ -67,7 +67,7 @@ std::optional<SensorSpec> text_of(const Sensor& sensor) {
     return t.sensor.ends_with('_') ? sensor.name().starts_with(t.sensor)
                                    : sensor.name() == t.sensor;
   });
-  if (text == std::end(kTexts) || !JsonRows::suits(sensor)) return std::nullopt;
+  if (text == std::end(kTexts) || !JsonRows::can_convert(sensor)) return std::nullopt;
   SensorSpec spec;
   spec.name = sensor.name();
   spec.dtype = DType::kUint8;

@@ -13,7 +13,7 @@
 namespace mjsense {
 
 // "qpos" -> "obs/agent/qpos", "feet/force" -> "obs/extra/feet/force" ...
-std::string place_of(std::string_view stream);
+std::string path_of(std::string_view stream);
 
 // Groups that exist in every episode, even if they are empty.
 std::span<const char* const> standard_groups();

@@ -23,11 +23,11 @@ namespace mjsense {
 namespace {
 
 std::string last_words(int log) {
-  constexpr off_t kMost = 600;
+  constexpr off_t kMax = 600;
   const off_t size = lseek(log, 0, SEEK_END);
   if (size <= 0) return "";
-  std::string text(std::min(size, kMost), '\0');
-  const ssize_t n = pread(log, text.data(), text.size(), std::max<off_t>(0, size - kMost));
+  std::string text(std::min(size, kMax), '\0');
+  const ssize_t n = pread(log, text.data(), text.size(), std::max<off_t>(0, size - kMax));
   text.resize(std::max<ssize_t>(0, n));
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
   for (char& c : text) {
@@ -95,9 +95,9 @@ bool wait_process(Child& child, bool block, Exit& result) {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   result.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
-  const std::string words = last_words(child.log.get());
+  const std::string stderr_tail = last_words(child.log.get());
   if (got < 0) {
-    result.ok = words.empty();
+    result.ok = stderr_tail.empty();
     result.why =
         "its exit status is not known, because this process ignores SIGCHLD or collects all of its "
         "children (set SIGCHLD to SIG_DFL)";
@@ -111,7 +111,7 @@ bool wait_process(Child& child, bool block, Exit& result) {
   } else {
     result.ok = true;
   }
-  if (!result.ok && !words.empty()) result.why += ": " + words;
+  if (!result.ok && !stderr_tail.empty()) result.why += ": " + stderr_tail;
   return true;
 }
 
@@ -122,15 +122,15 @@ void kill_process(Child& child) {
   wait_process(child, true, ignored);
 }
 
-std::string run_process(const std::vector<std::string>& argv, const Patience& patience,
-                        std::string* words) {
+std::string run_process(const std::vector<std::string>& argv, const ProcessLimits& limits,
+                        std::string* stderr_tail) {
   Child child = start_process(argv, false, true);
-  if (patience.cpu_s > 0) {
-    const rlimit limit{patience.cpu_s, patience.cpu_s + 1};
+  if (limits.cpu_s > 0) {
+    const rlimit limit{limits.cpu_s, limits.cpu_s + 1};
     prlimit(child.pid, RLIMIT_CPU, &limit, nullptr);
   }
-  if (patience.memory > 0) {
-    const rlimit limit{patience.memory, patience.memory};
+  if (limits.memory > 0) {
+    const rlimit limit{limits.memory, limits.memory};
     prlimit(child.pid, RLIMIT_DATA, &limit, nullptr);
   }
   std::string output;
@@ -141,28 +141,27 @@ std::string run_process(const std::vector<std::string>& argv, const Patience& pa
   char buffer[1 << 14];
   while (true) {
     pollfd polled{child.out.get(), POLLIN, 0};
-    constexpr double kMostMs = 1e9;  // eleven days
-    const int ready =
-        poll(&polled, 1, static_cast<int>(std::min(kMostMs, 1000 * patience.silence_s)));
+    constexpr double kMaxMs = 1e9;  // eleven days
+    const int ready = poll(&polled, 1, static_cast<int>(std::min(kMaxMs, 1000 * limits.silence_s)));
     if (ready < 0 && errno == EINTR) continue;
-    if (ready == 0) give_up(fmt::format("it printed nothing for {:g} s", patience.silence_s));
+    if (ready == 0) give_up(fmt::format("it printed nothing for {:g} s", limits.silence_s));
     const ssize_t n = read(child.out.get(), buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) break;
     output.append(buffer, static_cast<std::size_t>(n));
-    if (output.size() > patience.most_bytes)
-      give_up(fmt::format("it printed more than {} bytes", patience.most_bytes));
+    if (output.size() > limits.max_bytes)
+      give_up(fmt::format("it printed more than {} bytes", limits.max_bytes));
   }
   Exit result;
   // The program may have closed its output but continue to run.
   for (double waited = 0; !wait_process(child, false, result); waited += 5e-4) {
-    if (waited > patience.silence_s)
-      give_up(fmt::format("it did not finish within {:g} s", patience.silence_s));
+    if (waited > limits.silence_s)
+      give_up(fmt::format("it did not finish within {:g} s", limits.silence_s));
     usleep(500);
   }
   if (!result.ok)
     throw RuntimeError(fmt::format("the program '{}' failed: {}", argv[0], result.why));
-  if (words) *words = last_words(child.log.get());
+  if (stderr_tail) *stderr_tail = last_words(child.log.get());
   return output;
 }
 

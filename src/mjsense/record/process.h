@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 
 namespace mjsense {
 
@@ -45,16 +45,16 @@ bool wait_process(Child& child, bool block, Exit& result);
 void kill_process(Child& child);  // sends SIGKILL and waits
 
 // Limits of a program: time without output, amount of output, CPU time and memory.
-struct Patience {
+struct ProcessLimits {
   double silence_s = 60;
   std::uint64_t cpu_s = 0, memory = 0;  // CPU time in seconds, memory in bytes; 0: unlimited
-  std::size_t most_bytes = std::size_t{1} << 30;
+  std::size_t max_bytes = std::size_t{1} << 30;
 };
 
-// Runs a program and returns its stdout; `words` receives the end of its stderr. Throws
+// Runs a program and returns its stdout; `stderr_tail` receives the end of its stderr. Throws
 // RuntimeError if it fails or exceeds a limit, in which case it is killed.
-std::string run_process(const std::vector<std::string>& argv, const Patience& patience = {},
-                        std::string* words = nullptr);
+std::string run_process(const std::vector<std::string>& argv, const ProcessLimits& limits = {},
+                        std::string* stderr_tail = nullptr);
 
 // ffmpeg program: `wanted`, otherwise $MJSENSE_FFMPEG, otherwise "ffmpeg".
 std::string ffmpeg_program(const std::string& wanted);

@@ -60,9 +60,9 @@ TEST(Process, LeadsAProcessGroupWithDefaultSignals) {
   EXPECT_THAT(out, HasSubstr("SigIgn:\t0000000000000000"));
 }
 
-std::string why_ended(const std::string& script, const Patience& patience) {
+std::string why_ended(const std::string& script, const ProcessLimits& limits) {
   try {
-    run_process({"python3", "-c", script}, patience);
+    run_process({"python3", "-c", script}, limits);
     return "";
   } catch (const RuntimeError& e) {
     return e.what();
@@ -70,10 +70,10 @@ std::string why_ended(const std::string& script, const Patience& patience) {
 }
 
 TEST(Process, CpuTimeAndMemoryAreLimited) {
-  const Patience patience{.silence_s = 100, .cpu_s = 1, .memory = std::size_t{1} << 28};
-  EXPECT_EQ(why_ended("print(len(bytearray(1 << 20)))", patience), "");
-  EXPECT_THAT(why_ended("while True: pass", patience), HasSubstr("exceeded its CPU time limit"));
-  EXPECT_THAT(why_ended("import time\ntime.sleep(.3)\nbytearray(1 << 29)", patience),
+  const ProcessLimits limits{.silence_s = 100, .cpu_s = 1, .memory = std::size_t{1} << 28};
+  EXPECT_EQ(why_ended("print(len(bytearray(1 << 20)))", limits), "");
+  EXPECT_THAT(why_ended("while True: pass", limits), HasSubstr("exceeded its CPU time limit"));
+  EXPECT_THAT(why_ended("import time\ntime.sleep(.3)\nbytearray(1 << 29)", limits),
               HasSubstr("MemoryError"));
 }
 

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
 #include "mjsense/core/process_state.h"
+#include "mjsense/core/regular_file.h"
 #include "mjsense/record/recorder_impl.h"
 
 namespace mjsense {
@@ -77,7 +77,7 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
 
 Recorder::Impl::~Impl() {
   for (int w = 0; w < cfg.num_worlds; ++w) {
-    if (worlds[w]) give_up(w, Fate::kAbandoned, "");
+    if (worlds[w]) give_up(w, Outcome::kAbandoned, "");
   }
   {
     std::unique_lock lock(mutex);
@@ -106,11 +106,11 @@ void Recorder::Impl::rethrow() const {
   if (failure) std::rethrow_exception(failure);
 }
 
-Recorder::Impl::Episode& Recorder::Impl::running(int world, const char* deed) const {
+Recorder::Impl::Episode& Recorder::Impl::running(int world, const char* action) const {
   check_world(world);
   if (!worlds[world])
     throw ValueError(
-        fmt::format("cannot {}: no episode has been started in world {}", deed, world));
+        fmt::format("cannot {}: no episode has been started in world {}", action, world));
   return *worlds[world];
 }
 
@@ -141,7 +141,7 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
   try {
     for (const VideoStream& video : plan.videos) open_video(episode, video);
   } catch (...) {
-    give_up(world, Fate::kAbandoned, "");
+    give_up(world, Outcome::kAbandoned, "");
     throw;
   }
   wait_s += seconds_since(start);
@@ -197,7 +197,7 @@ void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_v
   for (int s = 0; s < streams; ++s) {
     if (kept->chunk_fill[s] > 0) hand_over(kept, s);
   }
-  kept->fate = Fate::kKept;
+  kept->outcome = Outcome::kKept;
   Job close{Job::kClose, kept};
   close.obs_scene = obs_scene;
   close.outcome = outcome;
@@ -208,9 +208,9 @@ void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_v
   leave(world, *kept);
 }
 
-void Recorder::Impl::give_up(int world, Fate fate, std::string_view why) {
+void Recorder::Impl::give_up(int world, Outcome outcome, std::string_view why) {
   const EpisodePtr episode = worlds[world];
-  episode->fate = fate;
+  episode->outcome = outcome;
   episode->why = why;
   abort_videos(*episode);
   {
@@ -226,8 +226,8 @@ void Recorder::Impl::give_up(int world, Fate fate, std::string_view why) {
 void Recorder::Impl::leave(int world, const Episode& episode) {
   const std::lock_guard lock(mutex);
   worlds[world].reset();
-  if (episode.fate != Fate::kAbandoned)
-    decisions.add(episode.meta.episode, episode.fate == Fate::kKept);
+  if (episode.outcome != Outcome::kAbandoned)
+    decisions.add(episode.meta.episode, episode.outcome == Outcome::kKept);
 }
 
 void Recorder::Impl::abort_videos(Episode& episode) {
@@ -276,11 +276,11 @@ void Recorder::finish_episode(int world, std::string_view obs_scene, std::string
 }
 void Recorder::discard_episode(int world, std::string_view why) {
   impl_->running(world, "discard an episode");
-  impl_->give_up(world, Impl::Fate::kDiscarded, why);
+  impl_->give_up(world, Impl::Outcome::kDiscarded, why);
 }
 void Recorder::abandon_episode(int world) {
   impl_->running(world, "abandon an episode");
-  impl_->give_up(world, Impl::Fate::kAbandoned, "");
+  impl_->give_up(world, Impl::Outcome::kAbandoned, "");
 }
 
 bool Recorder::recording(int world) const {
@@ -307,7 +307,7 @@ int Recorder::discarded() const {
   return impl_->decisions.discarded();
 }
 
-bool Recorder::enough() const {
+bool Recorder::has_all_episodes() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->house->ended() ||
          static_cast<int>(impl_->decisions.settled().size()) >= impl_->cfg.episodes;

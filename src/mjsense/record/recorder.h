@@ -80,7 +80,7 @@ class Recorder {
   [[nodiscard]] std::vector<std::string> damage() const;
   int discarded() const;
   // True if cfg.episodes are kept and no earlier attempt is undecided.
-  [[nodiscard]] bool enough() const;
+  [[nodiscard]] bool has_all_episodes() const;
 
   // Waits until every finished episode is safe on disk.
   void flush();

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/depth.h"
+#include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/recorder_impl.h"
 #include "mjsense/record/yuv.h"
 
@@ -15,15 +15,16 @@ namespace {
 void copy_row(const ArrayStream& stream, int world, std::uint8_t* to) {
   if (stream.text) return stream.text->copy(world, to);
   const std::byte* from = stream.field->data.row_data(world);
-  const std::size_t most = stream.row_bytes();
+  const std::size_t maximum = stream.row_bytes();
   if (stream.present && stream.present->data.row_data(world)[0] == std::byte{0}) {
     constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-    for (std::size_t at = 0; at < most; at += sizeof kNaN) std::memcpy(to + at, &kNaN, sizeof kNaN);
+    for (std::size_t at = 0; at < maximum; at += sizeof kNaN)
+      std::memcpy(to + at, &kNaN, sizeof kNaN);
     return;
   }
   // Only the text of a dict row is copied; the rest is zero in both buffers.
   const bool text = stream.spec.is_dict;
-  std::memcpy(to, from, text ? strnlen(reinterpret_cast<const char*>(from), most) : most);
+  std::memcpy(to, from, text ? strnlen(reinterpret_cast<const char*>(from), maximum) : maximum);
 }
 
 }  // namespace
@@ -70,14 +71,14 @@ void Recorder::Impl::check_texts(int world, Episode& episode) const {
   for (const ArrayStream& stream : plan.arrays) {
     if (stream.text || !stream.spec.is_dict) continue;
     const char* text = reinterpret_cast<const char*>(stream.field->data.row_data(world));
-    const std::size_t most = stream.field->data.row_bytes();
-    const std::size_t size = strnlen(text, most);
-    if (size < most || (size > 0 && (text[size - 1] == '}' || text[size - 1] == ']'))) continue;
+    const std::size_t maximum = stream.field->data.row_bytes();
+    const std::size_t size = strnlen(text, maximum);
+    if (size < maximum || (size > 0 && (text[size - 1] == '}' || text[size - 1] == ']'))) continue;
     episode.refused = true;
     throw ValueError(
         fmt::format("sensor '{}': step {} of episode {}: its text does not fit str_max_len = {}; "
                     "the episode cannot be kept",
-                    stream.sensor->name(), episode.rows, episode.meta.episode, most));
+                    stream.sensor->name(), episode.rows, episode.meta.episode, maximum));
   }
 }
 

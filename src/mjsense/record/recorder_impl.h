@@ -17,9 +17,9 @@
 
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/episode_file.h"
-#include "mjsense/record/layout.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recording_plan.h"
 
 namespace mjsense {
 
@@ -34,13 +34,13 @@ struct Recorder::Impl {
   // Chunk buffers per stream and world: one is written while the next is filled.
   static constexpr int kBuffersPerWorld = 2;
 
-  enum class Fate { kRunning, kKept, kDiscarded, kAbandoned };
+  enum class Outcome { kRunning, kKept, kDiscarded, kAbandoned };
 
   // One attempt, from begin_episode() until its directory is renamed or removed.
   struct Episode {
     EpisodeMeta meta;
     std::shared_ptr<const Folder> folder;  // folder of its files, until the episode is kept
-    Fate fate = Fate::kRunning;
+    Outcome outcome = Outcome::kRunning;
     std::int64_t rows = 0;
     bool refused = false;  // a row contained truncated text
     double waited_s = 0;   // waiting time for free buffers
@@ -96,7 +96,7 @@ struct Recorder::Impl {
 
   // ---- the caller's side
   void rethrow() const;
-  Episode& running(int world, const char* deed) const;
+  Episode& running(int world, const char* action) const;
   void check_world(int world) const;
   void begin(int world, const EpisodeMeta& meta);
   void check_begin(int world, std::int64_t number) const;
@@ -113,7 +113,7 @@ struct Recorder::Impl {
   void hand_over(const EpisodePtr& episode, int s);
   void finish(int world, std::string_view obs_scene, std::string_view outcome,
               std::vector<EpisodeArray> arrays);
-  void give_up(int world, Fate fate, std::string_view why);
+  void give_up(int world, Outcome outcome, std::string_view why);
   void leave(int world, const Episode& episode);
   void abort_videos(Episode& episode);
   [[noreturn]] void wait_for_failure();

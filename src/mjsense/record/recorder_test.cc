@@ -12,12 +12,12 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/hdf5/guard.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/record/video_file.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/replay/recording_tools.h"
 
 namespace mjsense {
 namespace {
@@ -163,7 +163,7 @@ TEST(Recorder, InterruptedPublicationIsCompleted) {
         RecordingCfg cfg = fake_recording(broken.path, suite, 2, 8);
         cfg.resume = true;
         Recorder recorder(cfg);
-        EXPECT_TRUE(recorder.enough());
+        EXPECT_TRUE(recorder.has_all_episodes());
         EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {7, 0}); }), HasSubstr("is complete"));
       }
       EXPECT_EQ(tree(broken.path), tree(whole.path)) << moved;
@@ -192,7 +192,7 @@ TEST(Recorder, BatchWaitsForEarlierEpisodes) {
   recorder.flush();
   EXPECT_THAT(tree(dir.path / "house_0"),
               ::testing::Not(::testing::Contains(HasSubstr("batch_1_of_2"))));
-  EXPECT_FALSE(recorder.enough());
+  EXPECT_FALSE(recorder.has_all_episodes());
   recorder.discard_episode(0, "for the test");
   recorder.flush();
   EXPECT_THAT(tree(dir.path / "house_0"),

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recorder_impl.h"
 #include "mjsense/record/video_file.h"
@@ -63,7 +63,7 @@ void Recorder::Impl::run(Job& job, bool failed) {
       if (!failed && episode.file) episode.file->write_chunk(job.stream, job.rows, job.chunk);
       break;
     case Job::kClose:
-      if (!failed && episode.file && episode.fate == Fate::kKept) {
+      if (!failed && episode.file && episode.outcome == Outcome::kKept) {
         episode.file->write_scene(job.obs_scene, job.outcome);
         for (const EpisodeArray& array : job.arrays) episode.file->write_array(array);
       }
@@ -121,10 +121,10 @@ std::vector<EpisodeFile::VideoSum> Recorder::Impl::check_videos(const Episode& e
 
 void Recorder::Impl::settle(Episode& episode, bool failed) {
   const std::int64_t number = episode.meta.episode;
-  if (failed || episode.fate != Fate::kKept) episode.file.reset();
-  if (failed || episode.fate == Fate::kAbandoned) {
+  if (failed || episode.outcome != Outcome::kKept) episode.file.reset();
+  if (failed || episode.outcome == Outcome::kAbandoned) {
     house->abandon(number);
-  } else if (episode.fate == Fate::kDiscarded) {
+  } else if (episode.outcome == Outcome::kDiscarded) {
     house->discard(number, episode.why);
     house->publish_ready();
   } else {

@@ -16,12 +16,12 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/os.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/hdf5/guard.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/description.h"
-#include "mjsense/record/layout.h"
+#include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_lock.h"
+#include "mjsense/record/recording_plan.h"
 
 namespace fs = std::filesystem;
 
@@ -39,10 +39,10 @@ void make_dir(const fs::path& path) {
 
 // Reads a small file of the recording; "" if it cannot be read.
 std::string read_whole(const Folder& folder, const char* name) {
-  constexpr std::int64_t kMostBytes = 1 << 24;
+  constexpr std::int64_t kMaxBytes = 1 << 24;
   try {
     const Fd file = open_plain(folder.fd(), name);
-    std::string text(static_cast<std::size_t>(std::min(size_of(file), kMostBytes)), '\0');
+    std::string text(static_cast<std::size_t>(std::min(size_of(file), kMaxBytes)), '\0');
     const ssize_t n = pread(file.get(), text.data(), text.size(), 0);
     text.resize(std::max<ssize_t>(0, n));
     return text;
@@ -163,7 +163,7 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
   dir_ = Folder::open(dir);
   // First, because a process that holds the lock may still publish.
   lock_ = lock_recording(dir_, false);
-  staging_ = dir_.find(kStagingDir);
+  staging_ = dir_.find_dir(kStagingDir);
   const std::vector<std::string> published = published_files(dir_);
   const bool any_published = !published.empty();
   load_published(published, fingerprint);
@@ -190,7 +190,7 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
     lock_.reset();
     return;
   }
-  if (!staging_) staging_ = dir_.make(kStagingDir);
+  if (!staging_) staging_ = dir_.make_dir(kStagingDir);
   if (!lock_) {
     lock_ = lock_recording(dir_, true);
     // Another process may have recorded between the reads above and the acquisition of the lock.
@@ -229,7 +229,7 @@ void RecordingFolder::load_published(const std::vector<std::string>& files,
                                      const std::string& fingerprint) {
   for (const std::string& name : files) {
     const Fd file = open_plain(dir_.fd(), name);
-    const std::string shown = dir_.shown(name);
+    const std::string shown = dir_.display_path(name);
     const auto found =
         nlohmann::json::parse(h5::in_child(
                                   shown, static_cast<std::uint64_t>(size_of(file)),
@@ -263,7 +263,7 @@ void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& st
       ++batch;
     const int index = static_cast<int>(static_cast<std::int64_t>(at) - batches_.first(batch));
     for (const StagedVideo& video : found->second.videos) {
-      const Folder home = staging_.at(episode_name(found->first));
+      const Folder home = staging_.open_dir(episode_name(found->first));
       const std::string away = final_name_of(video, index, batch, batches_.count);
       if (!published_.contains(batch) && !home.contains(video.name) && dir_.is_plain_file(away))
         dir_.rename(away, home, video.name);
@@ -272,13 +272,14 @@ void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& st
 }
 
 void RecordingFolder::set_aside(const std::string& name, const std::string& why) {
-  Folder damaged = dir_.find(kDamagedDir);
-  if (!damaged) damaged = dir_.make(kDamagedDir);
+  Folder damaged = dir_.find_dir(kDamagedDir);
+  if (!damaged) damaged = dir_.make_dir(kDamagedDir);
   std::string to = name;
   for (int n = 2; damaged.contains(to); ++n) to = fmt::format("{}.{}", name, n);
   staging_.rename(name, damaged, to);
   damaged.sync();
-  damage_.push_back(fmt::format("{} {}; it was set aside as '{}'", name, why, damaged.shown(to)));
+  damage_.push_back(
+      fmt::format("{} {}; it was set aside as '{}'", name, why, damaged.display_path(to)));
 }
 
 void RecordingFolder::load_staged() {
@@ -291,12 +292,12 @@ void RecordingFolder::load_staged() {
       try {
         if (name != episode_name(*finished))
           throw RuntimeError("is not a valid name for an episode's folder");
-        StagedEpisode episode = read_staged(staging_.at(name));
+        StagedEpisode episode = read_staged(staging_.open_dir(name));
         const std::string difference = fingerprint_difference(episode.recording, fingerprint_);
         if (!difference.empty())
           throw RuntimeError("belongs to a different recording: " + difference);
         staged.emplace(*finished, std::move(episode));
-      } catch (const h5::Ended&) {
+      } catch (const h5::ReaderInterrupted&) {
         throw;
       } catch (const Error& e) {
         set_aside(name, e.what());
@@ -311,7 +312,7 @@ void RecordingFolder::load_staged() {
   for (const auto& [number, episode] : staged) {
     const std::string name = episode_name(number);
     try {
-      check_staged_videos(staging_.at(name), episode);
+      check_staged_videos(staging_.open_dir(name), episode);
       decisions_.add(number, true);
     } catch (const Error& e) {
       set_aside(name, e.what());
@@ -331,7 +332,7 @@ std::shared_ptr<const Folder> RecordingFolder::begin(std::int64_t episode) {
   const std::string part = part_name(episode);
   staging_.remove(part);
   // The folder must be new: one that another process created may contain symbolic links.
-  return std::make_shared<const Folder>(staging_.make(part));
+  return std::make_shared<const Folder>(staging_.make_dir(part));
 }
 
 void RecordingFolder::keep(std::int64_t episode, const Folder& part) {
@@ -357,9 +358,9 @@ void RecordingFolder::abandon(std::int64_t episode) { staging_.remove(part_name(
 
 std::vector<std::int64_t> RecordingFolder::batch_of(int batch,
                                                     const std::vector<std::int64_t>& kept) const {
-  const auto most = static_cast<std::int64_t>(kept.size());
-  const std::int64_t first = std::min(batches_.first(batch), most),
-                     last = std::min(batches_.first(batch + 1), most);
+  const auto maximum = static_cast<std::int64_t>(kept.size());
+  const std::int64_t first = std::min(batches_.first(batch), maximum),
+                     last = std::min(batches_.first(batch + 1), maximum);
   return {kept.begin() + first, kept.begin() + last};
 }
 
@@ -393,7 +394,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   require_in_place();
   const int batches = batches_.count;
   const std::string part = "batch.part";
-  const std::string what = fmt::format("cannot write '{}'", staging_.shown(part));
+  const std::string what = fmt::format("cannot write '{}'", staging_.display_path(part));
   // If writing fails, incomplete files are removed to free their disk space. Their episodes stay
   // staged.
   struct Removed {
@@ -404,18 +405,20 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   std::vector<Move> moves;
   {
     const h5::H5Lock lock;
-    h5::Id file = h5::create_file(staging_.reachable(part), staging_.shown(part));
-    std::int64_t most = 1 << 17;  // margin for the file's contents apart from its episodes, bytes
+    h5::Id file = h5::create_file(staging_.fd_path(part), staging_.display_path(part));
+    std::int64_t maximum =
+        1 << 17;  // margin for the file's contents apart from its episodes, bytes
     for (const std::int64_t episode : episodes)
-      most += staging_.at(episode_name(episode)).size_of(kEpisodeFile) * 9 / 8;
-    staging_.reserve_space(part, most);
+      maximum += staging_.open_dir(episode_name(episode)).size_of(kEpisodeFile) * 9 / 8;
+    staging_.reserve_space(part, maximum);
     h5::set_attribute(file, "format", "mjsense 1");
     h5::set_attribute(file, "recording", fingerprint_);
     for (std::size_t i = 0; i < episodes.size(); ++i) {
       const std::string name = fmt::format("traj_{}", i);
-      const Folder staged = staging_.at(episode_name(episodes[i]));
+      const Folder staged = staging_.open_dir(episode_name(episodes[i]));
       const Fd bytes = open_plain(staged.fd(), kEpisodeFile);
-      h5::Id source = h5::open_file(os::path_of(bytes.get()), false, staged.shown(kEpisodeFile));
+      h5::Id source =
+          h5::open_file(os::path_of(bytes.get()), false, staged.display_path(kEpisodeFile));
       h5::check(H5Ocopy(source, "traj_0", file, name.c_str(), H5P_DEFAULT, h5::link_properties()),
                 what);
       const h5::Id trajectory = h5::open_group(file, name);
@@ -428,7 +431,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   staging_.sync(part);
   for (const Move& move : moves) {
     // A missing video was already moved by an earlier, interrupted publication.
-    const Folder staged = staging_.at(move.episode);
+    const Folder staged = staging_.open_dir(move.episode);
     if (staged.contains(move.name) || !dir_.contains(move.final_name))
       staged.rename(move.name, dir_, move.final_name);
     published_bytes_ += dir_.size_of(move.final_name);
@@ -482,7 +485,7 @@ std::string unfinished_recording(const Folder& staging) {
   std::map<std::string, int> said;
   for (const std::string& episode : finished_names(staging)) {
     try {
-      const std::string recording = read_staged(staging.at(episode)).recording;
+      const std::string recording = read_staged(staging.open_dir(episode)).recording;
       if (!is_description(recording)) continue;
       if (sound && fingerprint_difference(recording, text).empty()) return text;
       ++said[recording];

@@ -25,9 +25,9 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 #include "mjsense/record/folder.h"
-#include "mjsense/record/layout.h"
+#include "mjsense/record/recording_plan.h"
 #include "mjsense/record/staged_episode.h"
 
 namespace mjsense {

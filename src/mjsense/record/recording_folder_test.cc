@@ -19,7 +19,7 @@
 
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/record/testing/tools.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/replay/recording_tools.h"
 
 namespace mjsense {
 namespace {

@@ -27,11 +27,11 @@ Fd lock_recording(const Folder& house, bool make) {
   const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | (make ? O_CREAT : 0);
   for (int n = 0; n < kTries; ++n) {
     if (n > 0) usleep(kPauseMicroseconds);
-    const Folder staging = make ? house.at(kStagingDir) : house.find(kStagingDir);
+    const Folder staging = make ? house.open_dir(kStagingDir) : house.find_dir(kStagingDir);
     if (!staging) return {};
     Fd lock(openat(staging.fd(), kLockFile, flags, 0644));
     if (!lock && !make && errno == ENOENT) return {};
-    if (!lock) throw_file("write", staging.shown(kLockFile), errno);
+    if (!lock) throw_file("write", staging.display_path(kLockFile), errno);
     // The process that held the lock may have removed the file; the name then belongs to another
     // one.
     if (flock(lock.get(), LOCK_EX | LOCK_NB) == 0 && staging.contains(kLockFile, lock)) return lock;

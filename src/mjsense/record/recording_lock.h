@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 #include "mjsense/record/folder.h"
 
 namespace mjsense {

@@ -7,12 +7,12 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/os.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/hdf5/chunks.h"
-#include "mjsense/hdf5/guard.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/chunk_checks.h"
+#include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/layout.h"
 #include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recording_plan.h"
 #include "mjsense/record/video_file.h"
 
 namespace mjsense {
@@ -68,7 +68,7 @@ std::vector<StagedVideo> staged_videos(hid_t trajectory) {
 
 StagedEpisode read_staged(const Folder& folder) {
   const Fd file = open_plain(folder.fd(), kEpisodeFile);
-  if (check_seal(file.get()) == Seal::kBroken)
+  if (check_seal(file.get()) == Seal::kCorrupt)
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", kEpisodeFile));
   StagedEpisode episode;
   try {

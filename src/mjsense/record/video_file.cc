@@ -15,8 +15,8 @@
 namespace mjsense {
 namespace {
 
-constexpr std::uint64_t kMostTableBytes = 1 << 26;
-constexpr int kMostElements = 10'000'000;
+constexpr std::uint64_t kMaxTableBytes = 1 << 26;
+constexpr int kMaxElements = 10'000'000;
 
 struct Unreadable {
   const char* why;
@@ -116,7 +116,7 @@ VideoFacts read_mp4(const File& file) {
   for (std::uint64_t at = 0; at < file.size();) {
     std::uint8_t head[16] = {};
     const std::size_t got = file.read(at, head);
-    if (got < 8 || ++boxes > kMostElements) throw Unreadable{"its last box is truncated"};
+    if (got < 8 || ++boxes > kMaxElements) throw Unreadable{"its last box is truncated"};
     std::uint64_t size = big_endian({head, 4}), header = 8;
     if (size == 1 && got == 16) {
       size = big_endian({head + 8, 8});
@@ -130,7 +130,7 @@ VideoFacts read_mp4(const File& file) {
     if (letters == "mdat") media_bytes += size - header;
     if (letters == "moof") throw Unreadable{"it is fragmented"};
     if (letters == "moov") {
-      if (size > kMostTableBytes) throw Unreadable{"its tables are longer than 64 MiB"};
+      if (size > kMaxTableBytes) throw Unreadable{"its tables are longer than 64 MiB"};
       tables.resize(size - header);
       if (file.read(at + header, tables) != tables.size())
         throw Unreadable{"its tables are truncated"};
@@ -203,7 +203,7 @@ class Matroska {
   template <class Visit>
   void each(std::uint64_t begin, std::uint64_t end, Visit&& visit) {
     while (begin < end) {
-      if (++elements_ > kMostElements) throw Unreadable{"it has too many elements"};
+      if (++elements_ > kMaxElements) throw Unreadable{"it has too many elements"};
       std::uint8_t head[16];
       const std::size_t got = file_.read(
           begin, {head, static_cast<std::size_t>(std::min<std::uint64_t>(16, end - begin))});
@@ -230,8 +230,8 @@ class Matroska {
 
   // The first bytes of an element, as text.
   std::string text(const Element& e) const {
-    constexpr std::uint64_t kMostBytes = 64;
-    std::string bytes(static_cast<std::size_t>(std::min(e.end - e.begin, kMostBytes)), '\0');
+    constexpr std::uint64_t kMaxBytes = 64;
+    std::string bytes(static_cast<std::size_t>(std::min(e.end - e.begin, kMaxBytes)), '\0');
     bytes.resize(
         file_.read(e.begin, {reinterpret_cast<std::uint8_t*>(bytes.data()), bytes.size()}));
     return bytes;
@@ -263,9 +263,9 @@ class Matroska {
           if (v.id == kHeight) height = integer(v);
         });
       });
-      constexpr std::uint64_t kVideoTrack = 1, kMostPixels = 1 << 16;
+      constexpr std::uint64_t kVideoTrack = 1, kMaxPixels = 1 << 16;
       if (type != kVideoTrack) return;
-      if (number == 0 || width > kMostPixels || height > kMostPixels)
+      if (number == 0 || width > kMaxPixels || height > kMaxPixels)
         throw Unreadable{"its video has no tables"};
       track_ = number;
       facts_.codec = codec_of(codec, description);
@@ -286,8 +286,8 @@ class Matroska {
 
   void count_block(const Element& e) {
     std::uint8_t head[8];
-    const std::size_t most = std::min<std::uint64_t>(8, e.end - e.begin);
-    const std::size_t got = file_.read(e.begin, {head, most});
+    const std::size_t maximum = std::min<std::uint64_t>(8, e.end - e.begin);
+    const std::size_t got = file_.read(e.begin, {head, maximum});
     std::size_t at = 0;
     if (variable({head, got}, at, false) == track_) ++facts_.frames;
   }

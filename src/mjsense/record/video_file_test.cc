@@ -8,7 +8,7 @@
 
 #include <random>
 
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"
 #include "mjsense/record/testing/tools.h"
@@ -97,14 +97,14 @@ TEST(Checksum, SealIsAppendedToTheFile) {
   write(path, "some bytes");
   EXPECT_EQ(seal(), Seal::kNone);
   seal_file(Folder::open(path.parent_path()), path.filename());
-  EXPECT_EQ(seal(), Seal::kWhole);
+  EXPECT_EQ(seal(), Seal::kValid);
   const std::string whole = read_file(path);
   for (std::size_t i = 0; i < whole.size(); ++i) {
     for (int bit = 0; bit < 8; ++bit) {
       std::string damaged = whole;
       damaged[i] = static_cast<char>(damaged[i] ^ 1 << bit);
       write(path, damaged);
-      EXPECT_EQ(seal(), Seal::kBroken) << i << " " << bit;
+      EXPECT_EQ(seal(), Seal::kCorrupt) << i << " " << bit;
     }
   }
 }

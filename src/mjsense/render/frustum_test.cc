@@ -11,14 +11,14 @@
 
 #include "mjsense/core/rng.h"
 #include "mjsense/rays/box_list.h"
-#include "mjsense/render/testing/studio.h"
+#include "mjsense/render/testing/test_renderer.h"
 
 namespace mjsense {
 namespace {
 
 using testing::kFlat;
 using testing::Picture;
-using testing::Studio;
+using testing::TestRenderer;
 
 // `count` shapes around the origin, every tenth on a moving body, on an infinite plane.
 std::string crowd(int count, const std::string& lights = "") {
@@ -48,10 +48,10 @@ Eye eye(std::array<double, 3> at, double yaw, double pitch) {
   return {at, {c, s, 0}, {-s * std::sin(pitch), c * std::sin(pitch), std::cos(pitch)}};
 }
 
-void expect_nothing_missed(Studio& s, const Eye& e, const PixelGrid& grid) {
-  s.options.everything = true;
+void expect_nothing_missed(TestRenderer& s, const Eye& e, const PixelGrid& grid) {
+  s.options.disable_culling = true;
   const Picture all = s.take(e.at, e.x, e.y, grid);
-  s.options.everything = false;
+  s.options.disable_culling = false;
   const Picture seen = s.take(e.at, e.x, e.y, grid);
   EXPECT_EQ(all.rgb, seen.rgb);
   EXPECT_EQ(all.depth, seen.depth);
@@ -59,7 +59,7 @@ void expect_nothing_missed(Studio& s, const Eye& e, const PixelGrid& grid) {
   EXPECT_EQ(all.normals, seen.normals);
 }
 
-int in_view(Studio& s, const Eye& e, const PixelGrid& grid) {
+int in_view(TestRenderer& s, const Eye& e, const PixelGrid& grid) {
   std::vector<std::uint64_t> candidates((s.model->ngeom + 63) / 64);
   const std::array<double, 3>&x = e.x, &y = e.y;
   double r[9];
@@ -78,21 +78,21 @@ int in_view(Studio& s, const Eye& e, const PixelGrid& grid) {
 TEST(Frustum, CullingDoesNotChangeImages) {
   for (const int count : {60, 700}) {  // tested one by one, and in blocks
     SCOPED_TRACE(count);
-    Studio s(crowd(count));
+    TestRenderer s(crowd(count));
     s.update();
     const PixelGrid pyramid = grid_from_fovy(48, 32, 50, false);
     PixelGrid slab = grid_from_fovy(48, 32, 8, true);
     slab.orthographic = true;
-    int most = 0;
+    int maximum = 0;
     for (int k = 0; k < 12; ++k) {
       SCOPED_TRACE(k);
       const Eye e = eye({3.0 * (k % 3 - 1), 2.0 * (k % 5 - 2), 1.5}, 0.6 * k, -0.2 * (k % 3));
       expect_nothing_missed(s, e, pyramid);
       expect_nothing_missed(s, e, slab);
-      most = std::max(most, in_view(s, e, pyramid));
+      maximum = std::max(maximum, in_view(s, e, pyramid));
     }
-    EXPECT_LT(most, s.model->ngeom / 2);  // otherwise culling saves nothing
-    EXPECT_GT(most, 5);
+    EXPECT_LT(maximum, s.model->ngeom / 2);  // otherwise culling saves nothing
+    EXPECT_GT(maximum, 5);
   }
 }
 
@@ -114,7 +114,7 @@ TEST(Frustum, CullingDoesNotChangeShadows) {
                               kinds[(i + k) % 3], x, y, z, rng.uniform(-1, 1), rng.uniform(-1, 1),
                               rng.uniform(-1, -0.1));
       }
-      Studio s(testing::kDark + crowd(count, lights));
+      TestRenderer s(testing::kDark + crowd(count, lights));
       s.update();
       s.options.shadows = true;
       const Eye e = eye({3.0 * (k % 3 - 1), 2.0 * (k % 5 - 2), 1.5}, 0.6 * k, -0.2 * (k % 3));
@@ -145,7 +145,7 @@ TEST(Frustum, KeepsCastersOfLongShadows) {
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.what);
-    Studio s(fmt::format(
+    TestRenderer s(fmt::format(
         "{}<worldbody><light type='directional' castshadow='true' diffuse='5 5 5' pos='-9 0 9' "
         "dir='{}'/>{}<geom type='box' size='.3 .3 .3' pos='0 0 2'/></worldbody>",
         testing::kDark, c.dir, c.what));
@@ -163,7 +163,7 @@ TEST(Frustum, KeepsCastersOfLongShadows) {
 // Culling depends neither on earlier poses nor on earlier sizes.
 TEST(Frustum, GeomsThatMoveIntoTheImageAreVisible) {
   for (const int count : {60, 700}) {
-    Studio s(crowd(count));
+    TestRenderer s(crowd(count));
     s.update();
     const Eye e = eye({0, -14, 1.5}, 0, 0);
     const PixelGrid grid = grid_from_fovy(48, 32, 30, false);

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mjsense/render/kernels/shade.h"
+#include "mjsense/render/kernels/shading.h"
 #include "mjsense/render/view/view_builder.h"
 
 namespace mjsense {
@@ -14,13 +14,13 @@ namespace {
 
 TEST(Highlight, IsZeroBelowTheThreshold) {
   for (float exponent : {0.0f, 1.0f, 3.9f, 4.0f, 13.0f, 27.5f, 64.0f, 128.0f, 1000.0f, 1e5f}) {
-    const float dull = dull_below(exponent);
+    const float highlight_threshold = highlight_threshold_of(exponent);
     const auto of = [&](float x) { return first_lane(power(splat(x), splat(exponent))); };
     if (exponent < 4) {
-      EXPECT_LT(dull, 0) << exponent;
+      EXPECT_LT(highlight_threshold, 0) << exponent;
       continue;
     }
-    const float x = std::sqrt(dull);
+    const float x = std::sqrt(highlight_threshold);
     for (float part : {0.0f, 0.5f, 0.99f, 1.0f}) EXPECT_EQ(of(part * x), 0) << exponent;
     EXPECT_GT(of(std::min(1.0f, std::pow(1.1f * x, 0.8f))), 0) << exponent;
   }

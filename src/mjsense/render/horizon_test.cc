@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rays above a mesh's horizon must not hit any of its triangles.
 
-#include "mjsense/render/kernels/horizon.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "mjsense/core/rng.h"
 #include "mjsense/rays/mesh_geometry.h"
+#include "mjsense/render/kernels/mesh_horizons.h"
 
 namespace mjsense {
 namespace {
@@ -31,7 +30,7 @@ struct Mesh {
 float sine(const Mesh& mesh, int face, int octant) {
   const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
   const float* h = geometry->box.data() + 3;
-  return find_horizon(geometry->clusters, geometry->horizons->place(face), octant,
+  return find_horizon(geometry->clusters, geometry->horizons->slot(face), octant,
                       std::hypot(h[0], h[1], h[2]));
 }
 
@@ -93,7 +92,7 @@ TEST(Horizon, IsComputedOnceAndNotForTheFirstRays) {
       });
     };
     const int before = found;
-    for (int i = 0; i < Horizons::kPatience; ++i) EXPECT_EQ(ask(), Horizons::kNever);
+    for (int i = 0; i < Horizons::kMaxRequests; ++i) EXPECT_EQ(ask(), Horizons::kNever);
     EXPECT_EQ(found, before);
     for (int i = 0; i < 5; ++i) {
       const float known = ask();

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mjsense/render/testing/studio.h"
+#include "mjsense/render/testing/test_renderer.h"
 
 namespace mjsense {
 namespace {
@@ -14,7 +14,7 @@ using testing::kDark;
 using testing::kFlat;
 using testing::kMatte;
 using testing::Pixel;
-using testing::Studio;
+using testing::TestRenderer;
 
 int byte(double value) { return static_cast<int>(255 * std::clamp(value, 0.0, 1.0) + 0.5); }
 
@@ -24,8 +24,8 @@ int byte(double value) { return static_cast<int>(255 * std::clamp(value, 0.0, 1.
 //        |     |     (x, y, sqrt(1 - x^2 - y^2)); the brightness is the cosine to the light.
 //         \ _ /
 TEST(Light, MatteSphereHasLambertsCosine) {
-  Studio s(std::string(kDark) +
-           R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
+  TestRenderer s(std::string(kDark) +
+                 R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
     <light type="directional" dir=".766044443 0 -.642787610" diffuse="1 1 1" specular="0 0 0" castshadow="false"/>
     <geom size="1" material="m"/></worldbody>)");
   for (const auto& [x, y] : {std::pair{-0.7, 0.0},
@@ -48,7 +48,7 @@ TEST(Light, MatteSphereHasLambertsCosine) {
 TEST(Light, SurfaceFacingAwayHasNoHighlight) {
   const auto seen = [](double degrees) {
     const double a = degrees * M_PI / 180;
-    Studio s(
+    TestRenderer s(
         std::string(kDark) +
         R"(<asset><material name="m" rgba="0 0 0 1" specular="1" shininess="0.0078125"/></asset>
       <worldbody><light type="directional" dir=")" +
@@ -63,7 +63,7 @@ TEST(Light, SurfaceFacingAwayHasNoHighlight) {
 }
 
 TEST(Light, EmissionNeedsNoLight) {
-  Studio s(
+  TestRenderer s(
       std::string(kDark) +
       R"(<asset><material name="m" rgba="1 .5 .2 1" emission=".6" specular="0"/></asset><worldbody>
     <light pos="0 0 -5" dir="0 0 -1" castshadow="false"/>
@@ -73,15 +73,15 @@ TEST(Light, EmissionNeedsNoLight) {
 
 // MuJoCo's rule: a scene without any light gets an ambient light of 0.3.
 TEST(Light, SceneWithoutLightsGetsAmbientLight) {
-  Studio s(std::string(kDark) +
-           R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 .5 .2 1"/></worldbody>)");
+  TestRenderer s(std::string(kDark) +
+                 R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 .5 .2 1"/></worldbody>)");
   expect_pixel(s.from_above(0, 0), {byte(.3), byte(.15), byte(.06)});
 }
 
 // Contributions of several lights add up; the sum is clamped to white.
 TEST(Light, TwoLightsAddUp) {
-  Studio s(std::string(kDark) +
-           R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
+  TestRenderer s(std::string(kDark) +
+                 R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
     <light type="directional" dir="0 0 -1" diffuse=".4 .4 .4" specular="0 0 0" castshadow="false"/>
     <light type="directional" dir="0 -.6 -.8" diffuse=".5 .5 .5" specular="0 0 0" castshadow="false"/>
     <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
@@ -94,8 +94,8 @@ TEST(Light, TwoLightsAddUp) {
 //   -----------
 TEST(Shadow, IsCastByGeomsBetweenLightAndPoint) {
   for (const char* kind : {"spot", "directional"}) {
-    Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 2" dir="0 0 -1" type=")" +
-             kind + R"(" cutoff="85"
+    TestRenderer s(std::string(kDark) + kMatte +
+                   R"(<worldbody><light pos="0 0 2" dir="0 0 -1" type=")" + kind + R"(" cutoff="85"
       exponent="0" diffuse="1 1 1" specular="0 0 0"/><geom type="plane" size="5 5 1" material="matte"/>
       <geom type="box" size=".2 .2 .1" pos="0 0 2.2" material="matte"/>
       <geom type="box" size=".2 .2 .1" pos="1 0 .5" material="matte"/></worldbody>)");
@@ -117,12 +117,12 @@ TEST(Shadow, IsCastByGeomsBetweenLightAndPoint) {
 //   ---====---
 TEST(Shadow, OfSlantedDirectionalLight) {
   for (const char* shape : {"type='box' size='.1 .3 .1'", "type='mesh' mesh='block'"}) {
-    Studio s(std::string(kDark) + kMatte +
-             R"(<asset><mesh name="block" vertex="-.1 -.3 -.1 .1 -.3 -.1 -.1 .3 -.1 .1 .3 -.1
+    TestRenderer s(std::string(kDark) + kMatte +
+                   R"(<asset><mesh name="block" vertex="-.1 -.3 -.1 .1 -.3 -.1 -.1 .3 -.1 .1 .3 -.1
       -.1 -.3 .1 .1 -.3 .1 -.1 .3 .1 .1 .3 .1"/></asset><worldbody>
       <light type="directional" pos="-3 0 3" dir="1 0 -1" diffuse="1 1 1" specular="0 0 0"/>
       <geom type="plane" size="5 5 1" material="matte"/><geom pos="0 0 .5" material="matte" )" +
-             shape + "/></worldbody>");
+                   shape + "/></worldbody>");
     s.options.shadows = true;
     const auto lit = [&](double x, double y) {
       return s.center({x, y, 0.2}, {1, 0, 0}, {0, 1, 0}, 0.1)[0] > 100;
@@ -164,8 +164,8 @@ TEST(Shadow, OfAMeshOnItself) {
   add_box({0.2, 0.3, -1, 1, 0, 0.5}, 8);
   // MuJoCo chooses the origin of the mesh's frame; the geom is placed so that the vertices keep
   // their positions.
-  Studio s(std::string(kDark) + kMatte + "<asset><mesh name='step' inertia='shell' vertex='" +
-           vertices + "' face='" + faces + R"('/></asset><worldbody>
+  TestRenderer s(std::string(kDark) + kMatte + "<asset><mesh name='step' inertia='shell' vertex='" +
+                 vertices + "' face='" + faces + R"('/></asset><worldbody>
     <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse="1 1 1" specular="0 0 0"/>
     <geom type="mesh" mesh="step" material="matte"/></worldbody>)");
   s.options.shadows = true;
@@ -178,7 +178,7 @@ TEST(Shadow, OfAMeshOnItself) {
 
 // A shadow removes only the light that casts it.
 TEST(Shadow, DoesNotAffectOtherLights) {
-  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+  TestRenderer s(std::string(kDark) + kMatte + R"(<worldbody>
     <light type="directional" pos="0 0 3" dir="0 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
     <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
     <geom type="plane" size="5 5 1" material="matte"/><geom type="box" size=".2 .2 .05" pos="0 0 1" material="matte"/>

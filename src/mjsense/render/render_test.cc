@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
-#include "mjsense/render/testing/studio.h"
+#include "mjsense/render/testing/test_renderer.h"
 #include "mjsense/render/view/camera_model.h"
 #include "mjsense/render/view/view_builder.h"
 
@@ -21,11 +21,11 @@ using testing::kDark;
 using testing::kFlat;
 using testing::kMatte;
 using testing::Pixel;
-using testing::Studio;
+using testing::TestRenderer;
 
 TEST(Shading, HeadlightIsAmbientPlusDiffuseTimesCosine) {
-  Studio s(std::string(kMatte) +
-           R"(<worldbody><geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
+  TestRenderer s(std::string(kMatte) +
+                 R"(<worldbody><geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
   // Default headlight: ambient 0.1, diffuse 0.4.
   expect_pixel(s.from_above(0, 0), {128, 64, 26});
   // From 45 degrees the headlight meets the floor at 45 degrees.
@@ -35,7 +35,7 @@ TEST(Shading, HeadlightIsAmbientPlusDiffuseTimesCosine) {
 }
 
 TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
-  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+  TestRenderer s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 2" dir="0 0 -1" cutoff="30" exponent="2" attenuation="0 .5 .25" diffuse="1 1 1" specular="0 0 0"
            castshadow="false"/>
     <geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
@@ -48,7 +48,7 @@ TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
 }
 
 TEST(Shading, SpecularHighlightFollowsTheHalfVector) {
-  Studio s(
+  TestRenderer s(
       std::string(kDark) +
       R"(<asset><material name="m" rgba="0 0 0 1" specular=".5" shininess=".25"/></asset><worldbody>
     <light pos="1 0 2" dir="0 0 -1" type="directional" diffuse="1 1 1" specular="1 1 1" castshadow="false"/>
@@ -64,7 +64,7 @@ TEST(Shading, SpecularHighlightFollowsTheHalfVector) {
 TEST(Shading, ShadowsHaveSharpEdges) {
   // A box of half size 0.2 at height 1, light at height 3: its shadow reaches to 0.2 * 3 / 1.8 =
   // 1/3.
-  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+  TestRenderer s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 3" dir="0 0 -1" diffuse="1 1 1" specular="0 0 0" castshadow="true" cutoff="80" exponent="0"/>
     <geom type="plane" size="5 5 1" material="matte"/><geom type="box" size=".2 .2 .2" pos="0 0 1" material="matte"/>
     </worldbody>)");
@@ -78,8 +78,8 @@ TEST(Shading, ShadowsHaveSharpEdges) {
 }
 
 TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
-  Studio s(std::string(kFlat) +
-           R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
     <material name="m" texture="t" texrepeat="2 1"/></asset><worldbody>
     <geom type="plane" size="1 1 1" material="m"/></worldbody>)");
   const std::array<Pixel, 4> texels{{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}}};
@@ -96,8 +96,8 @@ TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
 TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
   const std::array<Pixel, 6> faces{
       {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 0}, {0, 255, 255}, {255, 0, 255}}};
-  Studio s(std::string(kFlat) +
-           R"(<asset><texture name="t" type="cube" builtin="flat" width="8" height="48"/>
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><texture name="t" type="cube" builtin="flat" width="8" height="48"/>
     <texture name="sky" type="skybox" builtin="flat" width="8" height="48"/><material name="m" texture="t"/></asset>
     <worldbody><geom type="box" size=".5 .4 .3" material="m"/></worldbody>)");
   for (int t = 0; t < 2; ++t) s.paint(t, [&](int i) { return faces[i / 64]; });
@@ -115,7 +115,7 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
 // The sky is a cylinder of radius 0.7 * 50 * 1 m and the camera is 7 m above the floor, so a ray
 // that falls by 0.2 s per metre meets the floor at 1 / s of that radius.
 TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {
-  Studio s(
+  TestRenderer s(
       std::string(R"(<statistic extent="1"/><visual><map haze=".3"/><rgba haze="0 0 1 1"/>
     <headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)") +
       R"(<asset><texture name="sky" type="skybox" builtin="flat" rgb1="0 1 0" rgb2="0 1 0" width="8" height="48"/></asset>
@@ -140,14 +140,15 @@ TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {
 }
 
 TEST(Shading, TransparentGeomsAreDrawnTwice) {
-  Studio s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
+  TestRenderer s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom type="box" size=".5 .5 .1" pos="0 0 .5" rgba="0 0 0 .5"/></worldbody>)");
   expect_pixel(s.from_above(0, 0), {64, 64, 64});  // 1 * (1 - .5)^2
 }
 
 TEST(Shading, FloorReflectsByItsReflectance) {
-  Studio s(std::string(kFlat) +
-           R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
+  TestRenderer s(
+      std::string(kFlat) +
+      R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
     <geom type="plane" size="5 5 1" material="mirror"/><geom type="box" size=".5 .1 .5" pos="0 1 1" rgba="1 0 0 1"/>
     </worldbody>)");
   s.options.reflections = true;
@@ -161,7 +162,7 @@ TEST(Shading, FloorReflectsByItsReflectance) {
 }
 
 TEST(Kernels, EveryInstructionSetRendersTheSameImage) {
-  Studio s(
+  TestRenderer s(
       R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
     <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
     <material name="m" texture="t" texrepeat="3 3"/><material name="n" texture="q"/>
@@ -192,7 +193,7 @@ TEST(Kernels, EveryInstructionSetRendersTheSameImage) {
 }
 
 TEST(Shading, SamplesSoftenEdges) {
-  Studio s(
+  TestRenderer s(
       std::string(kFlat) +
       R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1" euler="0 0 20"/></worldbody>)");
   const auto partly = [](const std::vector<std::uint8_t>& image) {
@@ -226,7 +227,7 @@ TEST(CameraModel, GridsFollowTheirFormulas) {
 TEST(CameraModel, DistortionIsUndone) {
   const PixelGrid grid = grid_from_intrinsics(64, 48, 60, 60, 32, 24);
   const double k[5] = {-0.2, 0.05, 0.001, -0.002, 0.01};
-  const auto rays = bent_rays(grid, Lens::kBrownConrady, k, "camera 'c'");
+  const auto rays = distorted_rays(grid, Lens::kBrownConrady, k, "camera 'c'");
   for (int y = 0; y < 48; y += 7)
     for (int x = 0; x < 64; x += 7) {
       const double a = rays[2 * (64 * y + x)], b = -rays[2 * (64 * y + x) + 1], r2 = a * a + b * b;
@@ -240,13 +241,13 @@ TEST(CameraModel, DistortionIsUndone) {
   // off the axis.
   const double none[4] = {};
   const double f = 32 / (69.5 * M_PI / 180);
-  const auto wide =
-      bent_rays(grid_from_intrinsics(64, 48, f, f, 32, 24), Lens::kFisheye, none, "camera 'c'");
+  const auto wide = distorted_rays(grid_from_intrinsics(64, 48, f, f, 32, 24), Lens::kFisheye, none,
+                                   "camera 'c'");
   EXPECT_NEAR(std::atan(std::hypot(wide[2 * 64 * 24], wide[2 * 64 * 24 + 1])) * 180 / M_PI,
               69.5 * 31.504 / 32, 0.1);
-  EXPECT_THROW(
-      bent_rays(grid_from_intrinsics(64, 48, 10, 10, 32, 24), Lens::kFisheye, none, "camera 'c'"),
-      ValueError);
+  EXPECT_THROW(distorted_rays(grid_from_intrinsics(64, 48, 10, 10, 32, 24), Lens::kFisheye, none,
+                              "camera 'c'"),
+               ValueError);
 }
 
 // An image whose aspect ratio differs from the sensor's shows a part of the sensor, with square

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "mjsense/core/cpu.h"
-#include "mjsense/render/testing/studio.h"
+#include "mjsense/render/testing/test_renderer.h"
 
 namespace mjsense {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 using testing::kDark;
 using testing::kMatte;
 using testing::Picture;
-using testing::Studio;
+using testing::TestRenderer;
 
 struct Lot {
   std::mt19937 random;
@@ -60,7 +60,7 @@ std::string scene(Lot& lot, const std::string& light, double yaw) {
 
 // Whether the light reaches p, slightly above a surface with normal n. -1 if undecided: MuJoCo's
 // rays from around p disagree, or the light grazes the surface.
-int reached(const Studio& s, const double* p, const double* n) {
+int reached(const TestRenderer& s, const double* p, const double* n) {
   const mjModel* m = s.model.get();
   const double *pos = s.data->light_xpos, *dir = s.data->light_xdir;
   const bool directional = m->light_type[0] == mjLIGHT_DIRECTIONAL;
@@ -114,7 +114,7 @@ TEST(Shadow, AgreesWithMuJoCosRays) {
     for (unsigned seed = 0; seed < 24; ++seed) {
       Lot lot{std::mt19937(seed)};
       const double yaw = lot.in(0, 6.28), c = std::cos(yaw), d = std::sin(yaw);
-      Studio s(scene(lot, light, yaw));
+      TestRenderer s(scene(lot, light, yaw));
       s.options.shadows = true;
       s.render = kernels[seed % kernels.size()];
       const double h = std::sqrt(0.5);

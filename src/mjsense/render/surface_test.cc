@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "mjsense/render/testing/studio.h"
+#include "mjsense/render/testing/test_renderer.h"
 #include "mjsense/render/view/fixed_layer.h"
 
 namespace mjsense {
@@ -19,7 +19,7 @@ using testing::kFlat;
 using testing::kMatte;
 using testing::Picture;
 using testing::Pixel;
-using testing::Studio;
+using testing::TestRenderer;
 
 constexpr Pixel kRed{255, 0, 0}, kGreen{0, 255, 0}, kBlue{0, 0, 255}, kWhite{255, 255, 255};
 
@@ -33,7 +33,7 @@ std::string painted(const char* geoms, const char* material = "") {
 
 constexpr Pixel kFields[] = {kRed, kGreen, kBlue, kWhite};
 
-void paint(Studio& s, const Pixel* fields = kFields, int size = 32) {
+void paint(TestRenderer& s, const Pixel* fields = kFields, int size = 32) {
   s.paint(0, [&](int i) { return fields[2 * (i / size >= size / 2) + (i % size >= size / 2)]; });
 }
 
@@ -42,7 +42,7 @@ TEST(Texture, IsUprightOnEveryShape) {
   for (const char* shape :
        {"type='box' size='.5 .5 .5'", "type='sphere' size='.5'", "type='ellipsoid' size='.4 .5 .6'",
         "type='cylinder' size='.4 .5'", "type='capsule' size='.3 .5'"}) {
-    Studio s(painted((std::string("<geom ") + shape + " material='m'/>").c_str()));
+    TestRenderer s(painted((std::string("<geom ") + shape + " material='m'/>").c_str()));
     paint(s);
     const auto from_side = [&](double y, double z) {
       return s.center({2, y, z}, {0, 1, 0}, {0, 0, 1}, 0.1);
@@ -58,7 +58,7 @@ TEST(Texture, IsUprightOnEveryShape) {
 
 // On a sphere the texture starts at the +x axis and runs towards +y: its left half is at y > 0.
 TEST(Texture, GoesAroundASphereFromXToY) {
-  Studio s(painted("<geom size='.5' material='m'/>"));
+  TestRenderer s(painted("<geom size='.5' material='m'/>"));
   paint(s);
   for (const double angle : {0.25, 0.5, 0.75, 1.25, 1.5, 1.75}) {  // in units of pi
     const double c = std::cos(angle * M_PI), t = std::sin(angle * M_PI);
@@ -72,7 +72,7 @@ TEST(Texture, GoesAroundASphereFromXToY) {
 // The texture covers a capsule from pole to pole: its first row is at the upper pole, its last at
 // the lower.
 TEST(Texture, CoversACapsuleFromPoleToPole) {
-  Studio s(painted("<geom type='capsule' size='.5 .3' material='m'/>"));
+  TestRenderer s(painted("<geom type='capsule' size='.5 .3' material='m'/>"));
   constexpr Pixel kRows[] = {kRed, kRed, kBlue, kBlue};
   paint(s, kRows);
   expect_pixel(s.from_above(0.05, 0.05), kRed);
@@ -81,7 +81,7 @@ TEST(Texture, CoversACapsuleFromPoleToPole) {
 
 // Each end of a cylinder shows the whole texture, projected along the axis.
 TEST(Texture, IsProjectedOntoTheEndsOfACylinder) {
-  Studio s(painted("<geom type='cylinder' size='.5 .3' material='m'/>"));
+  TestRenderer s(painted("<geom type='cylinder' size='.5 .3' material='m'/>"));
   paint(s);
   expect_pixel(s.from_above(-0.25, -0.25), kRed);
   expect_pixel(s.from_above(0.25, -0.25), kGreen);
@@ -90,7 +90,7 @@ TEST(Texture, IsProjectedOntoTheEndsOfACylinder) {
 }
 
 TEST(Texture, FirstRowIsAtPlusYOnTopOfABox) {
-  Studio s(painted("<geom type='box' size='.5 .4 .3' material='m'/>"));
+  TestRenderer s(painted("<geom type='box' size='.5 .4 .3' material='m'/>"));
   paint(s);
   expect_pixel(s.from_above(-0.25, 0.2), kRed);
   expect_pixel(s.from_above(0.25, 0.2), kGreen);
@@ -101,8 +101,8 @@ TEST(Texture, FirstRowIsAtPlusYOnTopOfABox) {
 // A mesh uses the texture coordinates of its corners. u points right; the direction of v is
 // MuJoCo's choice.
 TEST(Texture, UsesTheTexcoordsOfAMesh) {
-  Studio s(std::string(kFlat) +
-           R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
     <material name="m" texture="t"/><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     texcoord="0 1 1 1 1 0 0 0" face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" material="m" contype="0" conaffinity="0"/></worldbody>)");
   paint(s, kFields, 2);
@@ -124,8 +124,8 @@ TEST(Texture, UsesTheTexcoordsOfAMesh) {
 
 // A pixel shows the mean of a texture that is finer than the pixels.
 TEST(Texture, IsFilteredIfFinerThanPixels) {
-  Studio s(std::string(kFlat) +
-           R"(<asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/>
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/>
     <material name="m" texture="t" texrepeat="40 40"/></asset><worldbody><geom type="plane" size="5 5 1" material="m"/></worldbody>)");
   s.paint(0, [](int i) { return (i % 64 + i / 64) % 2 ? kWhite : Pixel{0, 0, 0}; });
   const auto image = s.shoot({0.03, 0.02, 5}, {1, 0, 0}, {0, 1, 0}, 24, 60);
@@ -135,8 +135,8 @@ TEST(Texture, IsFilteredIfFinerThanPixels) {
 // With texuniform a texture has the same size in metres on shapes of any size.
 TEST(Texture, UniformRepeatIsPerMetre) {
   const auto borders_per_metre = [](const char* size, const char* material) {
-    Studio s(painted((std::string("<geom type='plane' material='m' size='") + size + "'/>").c_str(),
-                     material));
+    TestRenderer s(painted(
+        (std::string("<geom type='plane' material='m' size='") + size + "'/>").c_str(), material));
     constexpr Pixel kColumns[] = {kWhite, {0, 0, 0}, kWhite, {0, 0, 0}};
     paint(s, kColumns);
     // A row of 400 pixels over 4 m, i.e. 1 cm each, near the middle of both planes.
@@ -163,8 +163,8 @@ TEST(Triangles, OfABoxRenderLikeTheBox) {
     for (const double distance :
          {0.7, 1.5, 9.0}) {  // larger than the image, inside it, and a few pixels
       const auto see = [&](const char* shape) {
-        Studio s(std::string(kFlat) + mesh + "<worldbody><geom rgba='1 .5 .2 1' " + shape + " " +
-                 pose + "/></worldbody>");
+        TestRenderer s(std::string(kFlat) + mesh + "<worldbody><geom rgba='1 .5 .2 1' " + shape +
+                       " " + pose + "/></worldbody>");
         return s.take({0.1, -distance, 0.1}, {1, 0, 0}, {0, 0, 1},
                       grid_from_fovy(80, 60, 50, false));
       };
@@ -194,8 +194,8 @@ TEST(Triangles, OfABoxRenderLikeTheBox) {
 // The front of an open sheet is where its corners are counterclockwise. From behind it is
 // invisible.
 TEST(Triangles, AreVisibleFromTheFrontOnly) {
-  Studio s(std::string(kFlat) +
-           R"(<asset><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" rgba="1 1 1 1" contype="0" conaffinity="0"/></worldbody>)");
   for (const double height : {0.5, 40.0}) {
     const double fovy = height < 1 ? 60 : 5;
@@ -217,17 +217,18 @@ TEST(Triangles, AreVisibleFromTheFrontOnly) {
 
 TEST(Surface, HigherIdWinsIfSurfacesCoincide) {
   for (const char* shape : {"type='box' size='.3 .3 .3'", "type='mesh' mesh='block'"}) {
-    Studio s(std::string(kFlat) +
-             R"(<asset><mesh name="block" vertex="-.3 -.3 -.3 .3 -.3 -.3 -.3 .3 -.3 .3 .3 -.3
+    TestRenderer s(std::string(kFlat) +
+                   R"(<asset><mesh name="block" vertex="-.3 -.3 -.3 .3 -.3 -.3 -.3 .3 -.3 .3 .3 -.3
       -.3 -.3 .3 .3 -.3 .3 -.3 .3 .3 .3 .3 .3"/></asset><worldbody><geom rgba="1 0 0 1" )" +
-             shape + "/><geom rgba='0 0 1 1' " + shape + "/></worldbody>");
+                   shape + "/><geom rgba='0 0 1 1' " + shape + "/></worldbody>");
     expect_pixel(s.center({0.05, 0.1, 1}, {1, 0, 0}, {0, 1, 0}), kBlue);
   }
 }
 
 // A geom's own colour, unless it is the default, takes precedence over its material's.
 TEST(Surface, OwnColourOverridesTheMaterials) {
-  Studio s(std::string(kFlat) + R"(<asset><material name="m" rgba="0 0 1 1"/></asset><worldbody>
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><material name="m" rgba="0 0 1 1"/></asset><worldbody>
     <geom type="box" size=".1 .1 .1" pos="-1 0 0" material="m"/><geom type="box" size=".1 .1 .1" pos="0 0 0" material="m" rgba="1 0 0 1"/>
     <geom type="box" size=".1 .1 .1" pos="1 0 0" rgba="0 1 0 1"/></worldbody>)");
   expect_pixel(s.from_above(-1, 0), kBlue);
@@ -237,7 +238,7 @@ TEST(Surface, OwnColourOverridesTheMaterials) {
 
 // From below a plane is drawn as a veil of alpha 0.3, blended twice: its weight is 1 - 0.7^2.
 TEST(Surface, PlaneFromBelowIsTranslucent) {
-  Studio s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
+  TestRenderer s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom size=".5" pos="2 0 2" rgba="0 0 1 1"/></worldbody>)");
   const int veil = static_cast<int>(255 * (1 - 0.7 * 0.7) + 0.5);
   const auto up = [&](double x) { return s.center({x, 0, -2}, {1, 0, 0}, {0, -1, 0}, 1); };
@@ -247,8 +248,9 @@ TEST(Surface, PlaneFromBelowIsTranslucent) {
 
 // Only the top of a box reflects, not its sides.
 TEST(Surface, OnlyTheTopOfABoxReflects) {
-  Studio s(std::string(kFlat) +
-           R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
+  TestRenderer s(
+      std::string(kFlat) +
+      R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
     <geom type="box" size="1 1 .5" pos="0 0 -.5" material="mirror"/>
     <geom type="box" size="9 .1 9" pos="0 3 0" rgba="1 0 0 1"/><geom type="box" size="9 .1 9" pos="0 -30 0" rgba="0 1 0 1"/>
     </worldbody>)");
@@ -262,8 +264,8 @@ TEST(Surface, OnlyTheTopOfABoxReflects) {
 
 // The four rays of a pixel have four different heights, so an edge along the rows is softened too.
 TEST(Surface, SamplesSoftenEdgesInBothDirections) {
-  Studio s(std::string(kFlat) +
-           R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1"/></worldbody>)");
+  TestRenderer s(std::string(kFlat) +
+                 R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1"/></worldbody>)");
   // 8 pixels over 2 m, orthographic, from 10 m above: pixels of 0.25 m, the box's edge at 0.5 m.
   // After a shift by a quarter of a pixel, the pixels along the edge are covered by a quarter.
   for (const bool rows : {false, true}) {
@@ -286,10 +288,10 @@ TEST(Window, GeomReachingBehindTheCameraIsFullyVisible) {
   for (const char* shape :
        {"type='box' size='.1 20 .1'", "type='capsule' size='.1 20' euler='90 0 0'",
         "type='mesh' mesh='beam'"}) {
-    Studio s(std::string(kFlat) +
-             R"(<asset><mesh name="beam" vertex="-.1 -20 -.1 .1 -20 -.1 -.1 20 -.1 .1 20 -.1
+    TestRenderer s(std::string(kFlat) +
+                   R"(<asset><mesh name="beam" vertex="-.1 -20 -.1 .1 -20 -.1 -.1 20 -.1 .1 20 -.1
       -.1 -20 .1 .1 -20 .1 -.1 20 .1 .1 20 .1"/></asset><worldbody><geom pos=".5 0 0" rgba="1 1 1 1" )" +
-             shape + "/></worldbody>");
+                   shape + "/></worldbody>");
     const Picture p = s.take({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, grid_from_fovy(64, 64, 90, false));
     // The beam's near side is at x = 0.4: it fills the row of the horizon from 0.4 / 20 to the
     // right border.
@@ -302,7 +304,7 @@ TEST(Window, GeomReachingBehindTheCameraIsFullyVisible) {
 // An orthographic camera shows an object at the same position and size at any distance.
 TEST(Window, OrthographicSizeIsIndependentOfDistance) {
   for (const double distance : {2.0, 8.0, 200.0}) {
-    Studio s(
+    TestRenderer s(
         std::string(kFlat) +
         R"(<worldbody><geom type="box" size=".3 .2 .1" pos=".5 .4 0" rgba="1 1 1 1"/></worldbody>)");
     const Picture p =
@@ -322,7 +324,7 @@ TEST(Window, OrthographicSizeIsIndependentOfDistance) {
 // The layer of fixed geoms is reused. Moving geoms and their shadows are drawn over it; if any
 // fixed geom or light changes, the layer is no longer used.
 TEST(FixedLayer, IsUsedWhileItsInputsAreUnchanged) {
-  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+  TestRenderer s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 3" dir="0 0 -1" cutoff="80" exponent="0" diffuse="1 1 1" specular="0 0 0"/>
     <geom type="plane" size="5 5 1" material="matte"/><geom name="fixed" type="box" size=".2 .2 .1" pos=".6 0 .1" material="matte"/>
     <body mocap="true" pos="-.6 0 0"><geom type="box" size=".2 .2 .1" material="matte"/><body/></body>
@@ -392,7 +394,7 @@ TEST(FixedLayer, IsUsedWhileItsInputsAreUnchanged) {
 // One common layer serves all worlds that look the same. The first worlds also have layers of their
 // own, up to the memory limit.
 TEST(FixedLayer, WorldsThatLookTheSameShareALayer) {
-  Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
+  TestRenderer s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
     <geom type="plane" size="5 5 1" material="matte"/><camera pos="0 0 4"/></worldbody>)");
   s.options.shadows = s.options.layered = true;
   s.update();
@@ -427,7 +429,8 @@ TEST(FixedLayer, WorldsThatLookTheSameShareALayer) {
 
 TEST(FixedLayer, NeedsAFixedCameraAndFixedLights) {
   const auto possible = [](const char* world) {
-    Studio s(std::string("<worldbody><geom type='plane' size='1 1 1'/>") + world + "</worldbody>");
+    TestRenderer s(std::string("<worldbody><geom type='plane' size='1 1 1'/>") + world +
+                   "</worldbody>");
     return FixedLayer::possible(s.model.get(), 0);
   };
   EXPECT_TRUE(possible("<light pos='0 0 2'/><camera/>"));

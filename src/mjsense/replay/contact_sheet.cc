@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
 #include "mjsense/core/png.h"
-#include "mjsense/hdf5/guard.h"
-#include "mjsense/record/depth.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/untrusted_file.h"
+#include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/video_file.h"
-#include "mjsense/replay/check.h"
-#include "mjsense/replay/small_text.h"
+#include "mjsense/replay/bitmap_font.h"
+#include "mjsense/replay/recording_tools.h"
 #include "mjsense/replay/trajectory.h"
 #include "mjsense/replay/video_probe.h"
 
@@ -26,8 +26,8 @@ namespace {
 constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap, kApart = 14;
 constexpr std::uint8_t kBackground = 24;
 // Limits of a sheet that is still useful, whatever the file claims.
-constexpr int kMostTileWidth = 8 * kTileHeight, kMostFrames = 10'000'000;
-constexpr std::size_t kMostStrips = 128, kMostText = 200;
+constexpr int kMaxTileWidth = 8 * kTileHeight, kMaxFrames = 10'000'000;
+constexpr std::size_t kMaxStrips = 128, kMaxText = 200;
 
 // The episode's task description and its outcome: "Pick up the red block: success".
 std::string story(hid_t trajectory) {
@@ -52,7 +52,7 @@ struct Strip {
   bool depth16 = false;
   double unit = 0;  // m per depth value
   int tile_width() const {
-    return std::clamp(kTileHeight * width / std::max(1, height), 8, kMostTileWidth);
+    return std::clamp(kTileHeight * width / std::max(1, height), 8, kMaxTileWidth);
   }
 
   // Indices of the frames that `columns` tiles show, evenly spaced from first to last.
@@ -82,12 +82,12 @@ std::string describe(const fs::path& path, int shown) {
   for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), std::max(0, shown)); ++i) {
     const h5::Id trajectory = h5::open_group(file, names[i]);
     if (!h5::exists(trajectory, "obs/sensor_data")) continue;
-    const std::string told = story(trajectory).substr(0, kMostText);
+    const std::string told = story(trajectory).substr(0, kMaxText);
     const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");
     for (const std::string& key : h5::children(videos)) {
       const h5::Id dataset = h5::open_dataset(videos, key);
-      out["strips"].push_back({names[i], told, key.substr(0, kMostText),
-                               read_file_name(videos, key), h5::text_attribute(dataset, "encoding"),
+      out["strips"].push_back({names[i], told, key.substr(0, kMaxText), read_file_name(videos, key),
+                               h5::text_attribute(dataset, "encoding"),
                                h5::double_attribute(dataset, "metres_per_unit", 0)});
     }
   }
@@ -98,7 +98,7 @@ VideoFacts facts_of(const fs::path& folder, const std::string& video, const std:
   const Fd file = open_plain(folder, video);
   VideoFacts facts = read_video_facts(file.get());
   if (!facts.error.empty()) {  // a format that only ffmpeg may be able to read
-    const VideoProbe probe = probe_video(folder / video, false, kMostFrames, ffmpeg);
+    const VideoProbe probe = probe_video(folder / video, false, kMaxFrames, ffmpeg);
     facts = {probe.frames, probe.width, probe.height, probe.error};
   }
   if (!facts.error.empty() || facts.frames < 1 || facts.width < 1 || facts.height < 1)
@@ -125,7 +125,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
     episodes += found.at("episodes").get<int>();
     for (const Json& s : found.at("strips")) {
       // each strip starts an ffmpeg process, so only the first ones are shown
-      if (strips.size() == kMostStrips) break;
+      if (strips.size() == kMaxStrips) break;
       const std::string trajectory = s.at(0), told = s.at(1), key = s.at(2), video = s.at(3);
       const VideoFacts facts = facts_of(folder, video, ffmpeg);
       Strip strip;
@@ -134,7 +134,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
       strip.unit = s.at(5).is_number() ? s.at(5).get<double>() : 0;
       strip.width = facts.width;
       strip.height = facts.height;
-      strip.frames = static_cast<int>(std::min<std::int64_t>(facts.frames, kMostFrames));
+      strip.frames = static_cast<int>(std::min<std::int64_t>(facts.frames, kMaxFrames));
       strip.episode = fmt::format("{}  {}  {}", recorded.name, trajectory, told);
       strip.camera = fmt::format("{}, {} frames", key, strip.frames);
       strips.push_back(std::move(strip));

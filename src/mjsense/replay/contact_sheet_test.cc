@@ -16,8 +16,8 @@
 
 #include "mjsense/core/testing/png.h"
 #include "mjsense/record/testing/tools.h"
-#include "mjsense/replay/check.h"
-#include "mjsense/replay/small_text.h"
+#include "mjsense/replay/bitmap_font.h"
+#include "mjsense/replay/recording_tools.h"
 
 namespace mjsense {
 namespace {

@@ -10,13 +10,13 @@
 #include <span>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/hdf5/guard.h"
-#include "mjsense/record/description.h"
-#include "mjsense/record/outcome.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/untrusted_file.h"
+#include "mjsense/record/episode_outcome.h"
+#include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_lock.h"
-#include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
+#include "mjsense/replay/recording_tools.h"
 #include "mjsense/replay/trajectory.h"
 
 namespace fs = std::filesystem;
@@ -25,7 +25,7 @@ namespace mjsense {
 namespace {
 
 // A file whose rows are more than this many times its own size is taken for a decompression bomb.
-constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kMaxUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
 // Mean and standard deviation in one pass, accurate for values far from zero (Welford).
 struct Accumulator {
@@ -105,7 +105,7 @@ class Inspector {
       if (name.starts_with("obs/sensor_data/")) return;
       const RowDataset dataset(trajectory, name);
       unpacked_ += dataset.bytes();
-      if (unpacked_ > kFreeBytes + kMostUnpacked * bytes_)
+      if (unpacked_ > kFreeBytes + kMaxUnpacked * bytes_)
         throw RuntimeError(
             fmt::format("'{}': the files declare far more data than they contain", name));
       Stream& stream = stream_of(dataset, name);
@@ -122,9 +122,9 @@ class Inspector {
           if (!values.empty()) last = values.back();
         });
         if (name != "success") return;
-        constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+        constexpr std::int64_t kMax = std::numeric_limits<int>::max();
         entry.steps =
-            static_cast<int>(std::min(kMost, entry.steps + std::min(kMost, dataset.rows())));
+            static_cast<int>(std::min(kMax, entry.steps + std::min(kMax, dataset.rows())));
         entry.successes += last != 0;
       }
     });

@@ -17,15 +17,15 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_limit.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/hdf5/guard.h"
+#include "mjsense/core/file_size_limit.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"
-#include "mjsense/record/layout.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/recording_lock.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/record/recording_plan.h"
+#include "mjsense/replay/recording_tools.h"
 #include "mjsense/replay/trajectory.h"
 
 namespace fs = std::filesystem;
@@ -44,7 +44,7 @@ void remove_remains(const fs::path& house, const Folder& folder,
         fmt::format("'{}' contains {} finished episodes, but none of them identifies its "
                     "recording; nothing was removed",
                     staging.string(), episodes));
-  if (!folder.remove(kStagingDir, folder.at(kStagingDir)))
+  if (!folder.remove(kStagingDir, folder.open_dir(kStagingDir)))
     throw RuntimeError(fmt::format("cannot remove '{}'", staging.string()));
   actions.push_back(fmt::format("{}: removed the remains of '{}'", house.string(), kStagingDir));
 }
@@ -55,7 +55,7 @@ void finish_house(const fs::path& house, std::vector<std::string>& actions) {
   {
     // A recording that is starting has not written its fingerprint yet.
     const Fd lock = lock_recording(folder, true);
-    fingerprint = unfinished_recording(folder.at(kStagingDir));
+    fingerprint = unfinished_recording(folder.open_dir(kStagingDir));
     if (fingerprint.empty()) return remove_remains(house, folder, actions);
   }
   const std::size_t waiting = finished_episodes(house).size();
@@ -69,23 +69,23 @@ void finish_house(const fs::path& house, std::vector<std::string>& actions) {
 
 // A new file with the bytes and the rights of `from`.
 void copy_file(const Fd& from, const Folder& folder, const std::string& name) {
-  const FileLimitIsError limit;
+  const FileLimitGuard limit;
   folder.remove(name);
   struct stat about = {};
   if (fstat(from.get(), &about) != 0)
-    throw_file("read the source of the copy", folder.shown(name), errno);
+    throw_file("read the source of the copy", folder.display_path(name), errno);
   const Fd file(openat(folder.fd(), name.c_str(),
                        O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
   if (!file || fchmod(file.get(), about.st_mode & 0777) != 0)
-    throw_file("write", folder.shown(name), errno);
+    throw_file("write", folder.display_path(name), errno);
   std::vector<std::byte> piece(1 << 20);
   for (off_t at = 0;;) {
     const ssize_t n = pread(from.get(), piece.data(), piece.size(), at);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw_file("read the source of the copy", folder.shown(name), errno);
+    if (n < 0) throw_file("read the source of the copy", folder.display_path(name), errno);
     if (n == 0) break;
     if (!write_all(file, std::span(piece).first(static_cast<std::size_t>(n))))
-      throw_file("write", folder.shown(name), errno);
+      throw_file("write", folder.display_path(name), errno);
     at += n;
   }
 }
@@ -113,11 +113,11 @@ std::string missing_names(const fs::path& path, int batch, int batches) {
       for (const std::string& key : {camera, camera + "_depth"}) {
         const std::string name =
             video_file(key, ".mp4", std::atoi(trajectory.c_str() + 5), batch - 1, batches);
-        const std::string place = trajectory + "/obs/sensor_data";
-        if (!h5::exists(file, place + "/" + key) && is_plain_name(name) &&
+        const std::string context = trajectory + "/obs/sensor_data";
+        if (!h5::exists(file, context + "/" + key) && is_plain_name(name) &&
             printable(name) == name && name.size() <= kFileNameBytes &&
             is_plain_file(path.parent_path() / name))
-          missing.push_back({place, key, name});
+          missing.push_back({context, key, name});
       }
     }
   }
@@ -139,7 +139,7 @@ int name_videos(const fs::path& path) {
   if (!number) return 0;
   const Fd bytes = open_plain(path.parent_path(), path.filename().string());
   const Seal seal = check_seal(bytes.get());
-  if (seal == Seal::kBroken)
+  if (seal == Seal::kCorrupt)
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", path.string()));
   const auto missing = nlohmann::json::parse(
       h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
@@ -160,15 +160,15 @@ int name_videos(const fs::path& path) {
                        size_of(bytes) + kNameBytes * static_cast<std::int64_t>(missing.size() + 1));
   {
     const h5::H5Lock lock;
-    h5::Id file = h5::open_file(folder.reachable(part), true, folder.shown(part));
+    h5::Id file = h5::open_file(folder.fd_path(part), true, folder.display_path(part));
     for (const auto& m : missing) {
-      const std::string place = m.at(0);
-      if (!h5::exists(file, place)) h5::create_group(file, place);
-      add_file_name(h5::open_group(file, place), m.at(1), m.at(2));
+      const std::string context = m.at(0);
+      if (!h5::exists(file, context)) h5::create_group(file, context);
+      add_file_name(h5::open_group(file, context), m.at(1), m.at(2));
     }
-    file.close(fmt::format("cannot write '{}'", folder.shown(part)));
+    file.close(fmt::format("cannot write '{}'", folder.display_path(part)));
   }
-  if (seal == Seal::kWhole) seal_file(folder, part);
+  if (seal == Seal::kValid) seal_file(folder, part);
   folder.sync(part);
   folder.rename(part, folder, name);
   folder.sync();
@@ -184,9 +184,9 @@ RepairResult repair(const fs::path& path) {
     throw ValueError(fmt::format(
         "'{}' is not named trajectories_batch_*_of_*.h5: repair accepts such files and folders",
         path.string()));
-  const auto attempt = [&](const fs::path& what, auto&& deed) {
+  const auto attempt = [&](const fs::path& what, auto&& action) {
     try {
-      deed();
+      action();
     } catch (const std::runtime_error& e) {  // an mjsense::Error or a filesystem_error
       result.failures.push_back(fmt::format("{}: {}", what.string(), e.what()));
     }

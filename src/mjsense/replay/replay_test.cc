@@ -15,10 +15,10 @@
 #include <fstream>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fd.h"
+#include "mjsense/core/file_descriptor.h"
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/testing/tools.h"
-#include "mjsense/replay/check.h"
+#include "mjsense/replay/recording_tools.h"
 #include "mjsense/replay/trajectory.h"
 
 namespace mjsense {
@@ -192,8 +192,8 @@ TEST_F(RepairNames, AreAddedAtomically) {
   for (const int more : {-1000, 10, 1000, 3000}) {
     const pid_t pid = fork();
     if (pid == 0) {
-      const auto most = static_cast<rlim_t>(static_cast<int>(bytes.size()) + more);
-      const rlimit limit{most, most};
+      const auto maximum = static_cast<rlim_t>(static_cast<int>(bytes.size()) + more);
+      const rlimit limit{maximum, maximum};
       setrlimit(RLIMIT_FSIZE, &limit);
       const RepairResult result = repair(dir.path);
       _exit(result.text().find("File too large") != std::string::npos ? 0 : 1);

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
-#include "mjsense/hdf5/chunks.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/hdf5/chunk_checks.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/json_text.h"
@@ -20,8 +20,8 @@ namespace mjsense {
 namespace {
 
 constexpr std::size_t kPieceBytes = 1 << 22;
-constexpr std::size_t kMostNameBytes = 4096;
-constexpr hsize_t kLeastTextWidth =
+constexpr std::size_t kMaxNameBytes = 4096;
+constexpr hsize_t kMinTextWidth =
     100;  // MolmoSpaces' dict rows have 1000 bytes or more, its other uint8 rows have 1
 
 bool is_trajectory_file(const fs::path& path) {
@@ -125,7 +125,7 @@ RowDataset::RowDataset(hid_t parent, const std::string& path)
   const bool bytes = H5Tequal(type_, H5T_STD_U8LE) > 0 && dims_.size() == 2;
   const bool described = h5::has_attribute(id_, "spec");
   json_ = bytes &&
-          (described ? h5::text_attribute(id_, "encoding") == "json" : dims_[1] >= kLeastTextWidth);
+          (described ? h5::text_attribute(id_, "encoding") == "json" : dims_[1] >= kMinTextWidth);
 }
 
 std::int64_t RowDataset::row_size() const {
@@ -238,7 +238,7 @@ void RowDataset::each_number(const std::function<void(std::span<const double>)>&
 }
 
 std::string read_file_name(hid_t sensor_data, const std::string& key) {
-  const std::string bytes = h5::read_bytes(sensor_data, key, kMostNameBytes);
+  const std::string bytes = h5::read_bytes(sensor_data, key, kMaxNameBytes);
   std::string name(trim_row(bytes));
   if (!is_plain_name(name) || printable(name) != name)
     throw RuntimeError(fmt::format(

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/hdf5/guard.h"
 #include "mjsense/hdf5/h5.h"
+#include "mjsense/hdf5/untrusted_file.h"
 
 namespace mjsense {
 

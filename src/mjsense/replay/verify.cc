@@ -8,15 +8,15 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/parallel.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/description.h"
+#include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/record/video_file.h"
-#include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
+#include "mjsense/replay/recording_tools.h"
 #include "mjsense/replay/trajectory.h"
 #include "mjsense/replay/video_probe.h"
 
@@ -27,15 +27,15 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::int64_t kMostSteps = 10'000'000;  // per episode: a week at 15 Hz
-constexpr std::size_t kMostFindings = 200;       // per file
+constexpr std::int64_t kMaxSteps = 10'000'000;  // per episode: a week at 15 Hz
+constexpr std::size_t kMaxFindings = 200;       // per file
 // A file whose rows are more than this many times its own size is taken for a decompression bomb.
-constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kMaxUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
 constexpr const char* kChanged = "changed while it was being read: verify it again";
 
 struct VideoCheck {
-  std::string place;
+  std::string context;
   fs::path folder;
   std::string name;
   std::int64_t frames = 0;
@@ -61,15 +61,15 @@ class FileVerifier {
   }
 
  private:
-  void add(bool is_error, const std::string& place, const std::string& text) {
-    if (++findings_ == kMostFindings)
+  void add(bool is_error, const std::string& context, const std::string& text) {
+    if (++findings_ == kMaxFindings)
       return out_["findings"].push_back(
           {is_error, recorded_.name, "has further findings, which are not listed"});
-    if (findings_ < kMostFindings)
-      out_["findings"].push_back({is_error, printable(place), printable(text)});
+    if (findings_ < kMaxFindings)
+      out_["findings"].push_back({is_error, printable(context), printable(text)});
   }
-  void error(const std::string& place, const std::string& text) { add(true, place, text); }
-  void note(const std::string& place, const std::string& text) { add(false, place, text); }
+  void error(const std::string& context, const std::string& text) { add(true, context, text); }
+  void note(const std::string& context, const std::string& text) { add(false, context, text); }
 
   void check_file() {
     const h5::H5Lock lock;
@@ -83,15 +83,15 @@ class FileVerifier {
     const std::vector<std::string> names = trajectory_names(file);
     if (names.empty()) error(recorded_.name, "contains no trajectory");
     for (std::size_t i = 0; i < names.size(); ++i) {
-      const std::string place = recorded_.name + " " + names[i];
+      const std::string context = recorded_.name + " " + names[i];
       if (names[i] != fmt::format("traj_{}", i)) {
         error(recorded_.name,
               fmt::format("trajectory {} is named '{}', expected 'traj_{}'", i, names[i], i));
       }
       try {
-        check_trajectory(h5::open_group(file, names[i]), place);
+        check_trajectory(h5::open_group(file, names[i]), context);
       } catch (const Error& e) {
-        error(place, e.what());
+        error(context, e.what());
       }
     }
     if (ours_ && without_sum_ > 0) {
@@ -105,84 +105,84 @@ class FileVerifier {
     }
   }
 
-  void check_trajectory(hid_t trajectory, const std::string& place) {
+  void check_trajectory(hid_t trajectory, const std::string& context) {
     ++episodes_;
     if (!h5::exists(trajectory, "success"))
-      return error(place, "has no 'success': its length is unknown");
+      return error(context, "has no 'success': its length is unknown");
     const RowDataset success(trajectory, "success");
     if (!success.is_number() || success.row_size() != 1)
-      return error(place, "has a 'success' that is not a one-dimensional array of booleans");
+      return error(context, "has a 'success' that is not a one-dimensional array of booleans");
     const std::int64_t T = success.rows();
-    if (T > kMostSteps) return error(place, fmt::format("declares {} steps", T));
+    if (T > kMaxSteps) return error(context, fmt::format("declares {} steps", T));
     steps_ += T;
-    if (T == 0) error(place, "has no steps");
+    if (T == 0) error(context, "has no steps");
     for (const char* name : {"rewards", "fail", "terminated", "truncated", "obs_scene"}) {
-      if (!h5::exists(trajectory, name)) error(place, fmt::format("has no '{}'", name));
+      if (!h5::exists(trajectory, name)) error(context, fmt::format("has no '{}'", name));
     }
     h5::each_dataset(trajectory, [&](const std::string& name) {
       if (name.starts_with("obs/sensor_data/")) return;
       try {
-        check_dataset(trajectory, name, T, place + "/" + name);
+        check_dataset(trajectory, name, T, context + "/" + name);
       } catch (const Error& e) {
-        error(place + "/" + name, e.what());
+        error(context + "/" + name, e.what());
       }
     });
-    check_success(trajectory, place);
+    check_success(trajectory, context);
     for (const char* name : {"obs/agent/qpos", "obs/agent/qvel"}) {
       if (!h5::exists(trajectory, name))
-        note(place, fmt::format("has no '{}', which MolmoSpaces' tools require", name));
+        note(context, fmt::format("has no '{}', which MolmoSpaces' tools require", name));
     }
-    check_sensor_data(trajectory, T, place);
+    check_sensor_data(trajectory, T, context);
   }
 
   // Compares with the checksum stored in the object's attribute.
-  void compare(hid_t object, const std::string& place, const Checksum& sum) {
+  void compare(hid_t object, const std::string& context, const Checksum& sum) {
     const std::string stated = h5::text_attribute(object, kChecksumAttribute);
     ++(stated.empty() ? without_sum_ : with_sum_);
     if (!stated.empty() && stated != sum.text())
-      error(place, fmt::format("differs from what was recorded: its checksum is {}, expected {}",
-                               sum.text(), stated));
+      error(context, fmt::format("differs from what was recorded: its checksum is {}, expected {}",
+                                 sum.text(), stated));
   }
 
   void check_dataset(hid_t trajectory, const std::string& name, std::int64_t T,
-                     const std::string& place) {
+                     const std::string& context) {
     const RowDataset dataset(trajectory, name);
     unpacked_ += dataset.bytes();
-    if (unpacked_ > kFreeBytes + kMostUnpacked * bytes_)
-      return error(place, "is not read: the file declares far more data than it contains");
+    if (unpacked_ > kFreeBytes + kMaxUnpacked * bytes_)
+      return error(context, "is not read: the file declares far more data than it contains");
     Checksum sum;
     if (name == "obs_scene") {
       const std::string text = h5::read_text(trajectory, name);
       if (const auto wrong = parse_json(text); !wrong.empty())
-        error(place, "is not JSON text: " + wrong);
+        error(context, "is not JSON text: " + wrong);
       sum.add(text.data(), text.size());
-      return compare(dataset.id(), place, sum);
+      return compare(dataset.id(), context, sum);
     }
     const bool every_step = !name.starts_with("replay/model/") && name != "replay/held";
     if (every_step && (dataset.scalar() || dataset.rows() != T)) {
-      return error(
-          place, fmt::format("has {} rows, expected {}", dataset.scalar() ? 0 : dataset.rows(), T));
+      return error(context, fmt::format("has {} rows, expected {}",
+                                        dataset.scalar() ? 0 : dataset.rows(), T));
     }
     if (dataset.is_json()) {
       int bad = 0;
       dataset.each_text([&](std::int64_t t, std::string_view text) {
         const std::string wrong = parse_json(text);
         if (!wrong.empty() && bad++ == 0)
-          error(place, fmt::format("row {} is not JSON text: {}", t, wrong));
+          error(context, fmt::format("row {} is not JSON text: {}", t, wrong));
       });
-      if (bad > 1) error(place, fmt::format("{} rows are not JSON text", bad));
+      if (bad > 1) error(context, fmt::format("{} rows are not JSON text", bad));
     }
     if (!dataset.is_number()) {
-      if (ours_) error(place, fmt::format("is {}, which is never recorded", dataset.dtype()));
+      if (ours_) error(context, fmt::format("is {}, which is never recorded", dataset.dtype()));
       return;
     }
     dataset.each_bytes([&](std::string_view bytes) { sum.add(bytes.data(), bytes.size()); });
-    compare(dataset.id(), place, sum);
-    if (ours_ && dataset.dtype().starts_with("float")) check_nan(dataset, place);
+    compare(dataset.id(), context, sum);
+    if (ours_ && dataset.dtype().starts_with("float")) check_nan(dataset, context);
   }
 
   // A stream may hold NaN if its description says what that means.
-  void check_nan(const RowDataset& dataset, const std::string& place) {
+  void check_nan(const RowDataset& dataset, const std::string& context) {
     if (h5::text_attribute(dataset.id(), "description").find("NaN") != std::string::npos) return;
     std::int64_t at = 0, first = -1, count = 0;
     dataset.each_number([&](std::span<const double> values) {
@@ -192,20 +192,20 @@ class FileVerifier {
       }
     });
     if (count > 0) {
-      error(place, fmt::format("holds {} NaN, the first in row {}, and its description does not "
-                               "say what NaN means",
-                               count, first / dataset.row_size()));
+      error(context, fmt::format("holds {} NaN, the first in row {}, and its description does not "
+                                 "say what NaN means",
+                                 count, first / dataset.row_size()));
     }
   }
 
-  void check_success(hid_t trajectory, const std::string& place) {
+  void check_success(hid_t trajectory, const std::string& context) {
     if (!h5::exists(trajectory, "fail")) return;
     std::vector<std::int8_t> success, fail;
     const auto read = [&](const char* name, std::vector<std::int8_t>& out) {
       const RowDataset dataset(trajectory, name);
       if (!dataset.is_number())
-        return error(place + "/" + name, fmt::format("is {}, expected bool", dataset.dtype()));
-      if (dataset.rows() > kMostSteps || dataset.row_size() != 1) return;
+        return error(context + "/" + name, fmt::format("is {}, expected bool", dataset.dtype()));
+      if (dataset.rows() > kMaxSteps || dataset.row_size() != 1) return;
       dataset.each_number([&](auto v) {
         for (const double x : v) out.push_back(x == 0 ? 0 : x == 1 ? 1 : 2);
       });
@@ -214,17 +214,17 @@ class FileVerifier {
     read("fail", fail);
     for (std::size_t t = 0; t < std::min(success.size(), fail.size()); ++t) {
       if (success[t] + fail[t] != 1)
-        return error(place + "/fail", fmt::format("row {} is not the opposite of success", t));
+        return error(context + "/fail", fmt::format("row {} is not the opposite of success", t));
     }
   }
 
-  void check_sensor_data(hid_t trajectory, std::int64_t T, const std::string& place) {
+  void check_sensor_data(hid_t trajectory, std::int64_t T, const std::string& context) {
     std::set<std::string> named;
     if (h5::exists(trajectory, "obs/sensor_data")) {
       const h5::Id group = h5::open_group(trajectory, "obs/sensor_data");
       for (const std::string& key : h5::children(group)) {
         named.insert(key);
-        const std::string video_place = place + "/obs/sensor_data/" + key;
+        const std::string video_place = context + "/obs/sensor_data/" + key;
         try {
           const h5::Id dataset = h5::open_dataset(group, key);
           const std::string crc = h5::text_attribute(dataset, kChecksumAttribute);
@@ -245,7 +245,7 @@ class FileVerifier {
       return;
     for (const std::string& camera : h5::children(h5::open_group(trajectory, "obs/sensor_param"))) {
       if (!named.contains(camera))
-        note(place, fmt::format("names no video of camera '{}' (repair adds the names)", camera));
+        note(context, fmt::format("names no video of camera '{}' (repair adds the names)", camera));
     }
   }
 
@@ -275,11 +275,11 @@ class Verifier {
   }
 
  private:
-  void error(const std::string& place, std::string text) {
-    result_.findings.push_back({true, printable(place), printable(text)});
+  void error(const std::string& context, std::string text) {
+    result_.findings.push_back({true, printable(context), printable(text)});
   }
-  void note(const std::string& place, std::string text) {
-    result_.findings.push_back({false, printable(place), printable(text)});
+  void note(const std::string& context, std::string text) {
+    result_.findings.push_back({false, printable(context), printable(text)});
   }
 
   void check_file(const RecordedFile& recorded) {
@@ -301,7 +301,7 @@ class Verifier {
         failure = e.what();
       }
       if (state_of(recorded.path) != before) return error(recorded.name, kChanged);
-      if (seal == Seal::kBroken) error(recorded.name, "is damaged: its checksum is wrong");
+      if (seal == Seal::kCorrupt) error(recorded.name, "is damaged: its checksum is wrong");
       if (!failure.empty()) return error(recorded.name, failure);
       take(recorded, Json::parse(answer));
     } catch (const Json::exception&) {
@@ -325,7 +325,7 @@ class Verifier {
       if (used_.insert(video.folder / video.name).second) {
         videos_.push_back(std::move(video));
       } else {
-        error(video.place, fmt::format("'{}' is also the video of another episode", video.name));
+        error(video.context, fmt::format("'{}' is also the video of another episode", video.name));
       }
     }
   }
@@ -337,7 +337,7 @@ class Verifier {
     pool.run(static_cast<int>(videos_.size()),
              [&](int i, int) { wrong[i] = check_video(videos_[i]); });
     for (std::size_t i = 0; i < videos_.size(); ++i) {
-      if (!wrong[i].empty()) error(videos_[i].place, wrong[i]);
+      if (!wrong[i].empty()) error(videos_[i].context, wrong[i]);
     }
   }
 
@@ -404,35 +404,35 @@ class Verifier {
     for (const RecordedFile& file : listed_) {
       if (file.published || file.path.parent_path().parent_path() != house / kStagingDir) continue;
       std::erase_if(result_.findings,
-                    [&](const Finding& f) { return f.place.starts_with(printable(file.name)); });
+                    [&](const Finding& f) { return f.context.starts_with(printable(file.name)); });
     }
   }
 
   void check_leftovers(const fs::path& house) {
-    const std::string place = house.filename().string();
+    const std::string context = house.filename().string();
     if (fs::is_symlink(house / kStagingDir))
-      return error(place,
+      return error(context,
                    fmt::format("'{}' is a symbolic link, which is not followed", kStagingDir));
     if (const bool locked = is_locked(house); locked || has_moved(house)) {
       forget_waiting(house);
-      return error(place, locked
-                              ? "is being recorded: verify it again after the recording has ended"
-                              : kChanged);
+      return error(context, locked
+                                ? "is being recorded: verify it again after the recording has ended"
+                                : kChanged);
     }
     if (fs::exists(house / kStagingDir)) {
       const std::size_t waiting = finished_episodes(house).size();
-      error(place, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
-                               "the recording, or repair",
-                               waiting));
+      error(context, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
+                                 "the recording, or repair",
+                                 waiting));
       return;  // an interrupted publication may already have moved some videos
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
       const fs::path& path = entry.path();
       if (path.filename() == kDamagedDir)
-        note(place + "/" + kDamagedDir, "contains damaged episodes that were set aside");
+        note(context + "/" + kDamagedDir, "contains damaged episodes that were set aside");
       const bool video = path.extension() == ".mp4" || path.extension() == ".mkv";
       if (video && !used_.contains(path))
-        note(place + "/" + path.filename().string(), "does not belong to an episode");
+        note(context + "/" + path.filename().string(), "does not belong to an episode");
     }
   }
 
@@ -456,7 +456,7 @@ bool VerifyResult::ok() const {
 std::string VerifyResult::text() const {
   std::string out;
   for (const Finding& f : findings)
-    out += fmt::format("{}: {} {}\n", f.error ? "error" : "note", f.place, f.text);
+    out += fmt::format("{}: {} {}\n", f.error ? "error" : "note", f.context, f.text);
   out += fmt::format("{}: {} files, {} episodes, {} steps, {} videos",
                      ok() ? "intact" : "NOT intact", files, episodes, steps, videos);
   if (unpublished > 0) out += fmt::format(", {} episodes not published", unpublished);
@@ -468,7 +468,7 @@ std::string VerifyResult::json() const {
                    {"steps", steps}, {"videos", videos}, {"unpublished", unpublished}};
   j["findings"] = nlohmann::json::array();
   for (const Finding& f : findings)
-    j["findings"].push_back({{"error", f.error}, {"place", f.place}, {"text", f.text}});
+    j["findings"].push_back({{"error", f.error}, {"place", f.context}, {"text", f.text}});
   return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

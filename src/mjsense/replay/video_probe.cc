@@ -14,17 +14,18 @@ namespace mjsense {
 
 namespace {
 
-constexpr double kPatience = 60;  // s without output
+constexpr double kSilenceLimit = 60;  // s without output
 constexpr std::size_t kLineBytes = 96;
 // A small file may claim images that take hours and all memory to decode. Real videos need a tenth
 // of this time.
-constexpr std::uint64_t kLeastSeconds = 60, kBytesPerSecond = 50'000;
+constexpr std::uint64_t kMinSeconds = 60, kBytesPerSecond = 50'000;
 constexpr std::uint64_t kMemory = std::uint64_t{4} << 30;
 
-Patience patience(const std::filesystem::path& path, double silence_s, std::size_t most_bytes) {
+ProcessLimits process_limits(const std::filesystem::path& path, double silence_s,
+                             std::size_t max_bytes) {
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(path, ignored);
-  return {silence_s, kLeastSeconds + (ignored ? 0 : bytes / kBytesPerSecond), kMemory, most_bytes};
+  return {silence_s, kMinSeconds + (ignored ? 0 : bytes / kBytesPerSecond), kMemory, max_bytes};
 }
 
 // "-f mov -c:v h264 -i file:/data/x.mp4"
@@ -67,11 +68,12 @@ VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int6
   command.insert(command.end(), {"-f", "framecrc", "pipe:1"});
   std::string listing;
   try {
-    const auto most = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
-    std::string words;
-    listing = run_process(command, patience(path, kPatience, most * kLineBytes), &words);
+    const auto maximum = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
+    std::string stderr_tail;
+    listing = run_process(command, process_limits(path, kSilenceLimit, maximum * kLineBytes),
+                          &stderr_tail);
     // ffmpeg only prints a message about damaged FFV1 slices and exits with success.
-    if (decode && !words.empty()) probe.error = words;
+    if (decode && !stderr_tail.empty()) probe.error = stderr_tail;
   } catch (const Error& error) {
     probe.error = error.what();
   }
@@ -102,8 +104,8 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
   command.insert(command.end(),
                  {"-vf", filters, "-frames:v", fmt::format("{}", frames.size()), "-f", "rawvideo",
                   "-pix_fmt", grey16 ? "gray16le" : "rgb24", "pipe:1"});
-  const std::size_t most = frames.size() * width * height * 3 + 1;
-  const std::string raw = run_process(command, patience(path, 2 * kPatience, most));
+  const std::size_t maximum = frames.size() * width * height * 3 + 1;
+  const std::string raw = run_process(command, process_limits(path, 2 * kSilenceLimit, maximum));
   return {raw.begin(), raw.end()};
 }
 

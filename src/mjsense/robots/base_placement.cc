@@ -26,8 +26,8 @@ double distance(const Pose& a, const Pose& b) {
 }  // namespace
 
 BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const int> joints,
-                             std::string place)
-    : place_(std::move(place)), base_name_(name_of(m, mjOBJ_BODY, base_body)) {
+                             std::string context)
+    : context_(std::move(context)), base_name_(name_of(m, mjOBJ_BODY, base_body)) {
   std::vector<int> path;
   for (int b = base_body; b != 0; b = m->body_parentid[b]) {
     const int joint = m->body_jntnum[b] > 0 ? m->body_jntadr[b] : -1;
@@ -87,7 +87,7 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
   }
   if (!fault_.empty())
     throw ValueError(
-        fmt::format("{}: the base '{}' cannot be placed: {}", place_, base_name_, fault_));
+        fmt::format("{}: the base '{}' cannot be placed: {}", context_, base_name_, fault_));
   if (mocap_ >= 0 && is_mocap_) {
     write_vec(base.p, state.mocap_pos + 3 * mocap_);
     write_quat(base.q, state.mocap_quat + 4 * mocap_);
@@ -140,7 +140,7 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
         "{}: the base '{}' cannot be placed at ({:g}, {:g}, {:g}), rotation ({:g}, {:g}, {:g}, "
         "{:g}): it is fixed to the world, and the nearest position is ({:g}, {:g}, {:g}). Attach "
         "it with EntityCfg.mocap_base, make the base a mocap body, or give it a free joint",
-        place_, base_name_, base.p.x, base.p.y, base.p.z, base.q.w, base.q.x, base.q.y, base.q.z,
+        context_, base_name_, base.p.x, base.p.y, base.p.z, base.q.w, base.q.x, base.q.y, base.q.z,
         now.p.x, now.p.y, now.p.z));
   }
 }

@@ -23,9 +23,9 @@ namespace mjsense {
 class BasePlacement {
  public:
   BasePlacement() = default;
-  // `joints`: ids of the joints of the base's move group. `place` starts the messages of errors.
+  // `joints`: ids of the joints of the base's move group. `context` starts the messages of errors.
   BasePlacement(const mjModel* model, int base_body, std::span<const int> joints,
-                std::string place);
+                std::string context);
 
   // Throws ValueError if the base cannot be put there; the message says how to make it placeable.
   void write(const StateRow& state, const Pose& base) const;
@@ -33,7 +33,7 @@ class BasePlacement {
  private:
   Pose from_root(const StateRow& state) const;  // X_RB
 
-  std::string place_, base_name_;
+  std::string context_, base_name_;
   std::string fault_;  // why the base cannot be placed; empty if it can
   int free_qpos_ = -1, free_dof_ = -1;
   int mocap_ = -1;

@@ -15,10 +15,11 @@ bool fingers_touch(const World& world, const MoveGroup& gripper, int body) {
     const mjContact& contact = world.data->contact[c];
     if (contact.exclude != 0 || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
     const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-    const bool first = is_below(m, a, body);
-    if (first == is_below(m, b, body)) continue;
+    const bool first = is_descendant_or_self(m, a, body);
+    if (first == is_descendant_or_self(m, b, body)) continue;
     for (int f = 0; f < 2; ++f) {
-      if (is_below(m, first ? b : a, m->site_bodyid[gripper.pad_sites[f]])) touches[f] = true;
+      if (is_descendant_or_self(m, first ? b : a, m->site_bodyid[gripper.pad_sites[f]]))
+        touches[f] = true;
     }
   }
   return touches[0] && touches[1];

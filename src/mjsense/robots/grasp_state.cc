@@ -17,14 +17,14 @@ GraspStateSensor::GraspStateSensor(std::string name, BodyRef object, std::vector
 
 void GraspStateSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
-  const std::string place = fmt::format("sensor '{}'", name());
-  object_.resolve(m, place);
+  const std::string context = fmt::format("sensor '{}'", name());
+  object_.resolve(m, context);
   gripper_bits_.assign(m->ngeom, 0);
   clear_fields();
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
-    const int root = object_id(m, mjOBJ_BODY, place, grippers_[i].body);
+    const int root = object_id(m, mjOBJ_BODY, context, grippers_[i].body);
     for (int g = 0; g < m->ngeom; ++g) {
-      if (is_below(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
+      if (is_descendant_or_self(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
     }
     SensorSpec spec;
     spec.dtype = DType::kBool;
@@ -42,7 +42,9 @@ void GraspStateSensor::compute(const World& world) {
   const mjModel* m = world.model;
   const mjData* d = world.data;
   const int root = object_(world.id);
-  const auto in_object = [&](int geom) { return is_below(m, m->geom_bodyid[geom], root); };
+  const auto in_object = [&](int geom) {
+    return is_descendant_or_self(m, m->geom_bodyid[geom], root);
+  };
   for (int c = 0; root >= 0 && c < d->ncon; ++c) {
     const mjContact& contact = d->contact[c];
     const int a = contact.geom[0], b = contact.geom[1];

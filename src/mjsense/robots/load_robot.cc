@@ -10,10 +10,10 @@
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/toml_value.h"
-#include "mjsense/robots/meshes.h"
+#include "mjsense/robots/real_meshes.h"
 #include "mjsense/robots/sensor_tables.h"
-#include "mjsense/scene/parts.h"
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
+#include "mjsense/scene/model_parts.h"
 
 namespace mjsense {
 namespace {
@@ -23,31 +23,31 @@ namespace fs = std::filesystem;
 constexpr std::string_view kEmbedded = "embedded:";
 constexpr DataFolder kRobots{"robot", "robots/", "/robot.toml"};
 
-void check_unique(std::string_view place, const char* what, const std::string& name,
+void check_unique(std::string_view context, const char* what, const std::string& name,
                   std::set<std::string>& seen) {
-  if (name.empty()) throw ValueError(fmt::format("{}: a {} has an empty name", place, what));
+  if (name.empty()) throw ValueError(fmt::format("{}: a {} has an empty name", context, what));
   if (name.find('/') != std::string::npos)
-    throw ValueError(fmt::format("{}: {} '{}': '/' is not allowed in a name", place, what, name));
+    throw ValueError(fmt::format("{}: {} '{}': '/' is not allowed in a name", context, what, name));
   if (!seen.insert(name).second)
-    throw ValueError(fmt::format("{}: duplicate {} '{}'", place, what, name));
+    throw ValueError(fmt::format("{}: duplicate {} '{}'", context, what, name));
 }
 
 // Throws KeyError unless the model has every element that `cfg` names.
 void check_references(const RobotCfg& cfg, const mjSpec* spec, const std::string& path) {
-  const auto check = [&](mjtObj type, const std::string& name, const std::string& place) {
-    find_in_spec(spec, type, name, place);
+  const auto check = [&](mjtObj type, const std::string& name, const std::string& context) {
+    find_in_spec(spec, type, name, context);
   };
   check(mjOBJ_BODY, cfg.base_body, path + ": base");
   for (const MoveGroupCfg& group : cfg.groups) {
-    const std::string place = fmt::format("{}: move group '{}': ", path, group.name);
-    for (const std::string& name : group.joints) check(mjOBJ_JOINT, name, place + "joints");
+    const std::string context = fmt::format("{}: move group '{}': ", path, group.name);
+    for (const std::string& name : group.joints) check(mjOBJ_JOINT, name, context + "joints");
     for (const std::string& name : group.actuators)
-      check(mjOBJ_ACTUATOR, name, place + "actuators");
-    for (const std::string& name : group.pad_sites) check(mjOBJ_SITE, name, place + "pad_sites");
-    if (!group.leaf_site.empty()) check(mjOBJ_SITE, group.leaf_site, place + "leaf_site");
-    if (!group.root_body.empty()) check(mjOBJ_BODY, group.root_body, place + "root_body");
+      check(mjOBJ_ACTUATOR, name, context + "actuators");
+    for (const std::string& name : group.pad_sites) check(mjOBJ_SITE, name, context + "pad_sites");
+    if (!group.leaf_site.empty()) check(mjOBJ_SITE, group.leaf_site, context + "leaf_site");
+    if (!group.root_body.empty()) check(mjOBJ_BODY, group.root_body, context + "root_body");
     if (const auto* base = std::get_if<FreeBaseCfg>(&group.controller))
-      check(mjOBJ_BODY, base->target, place + "controller.target");
+      check(mjOBJ_BODY, base->target, context + "controller.target");
   }
   for (const CameraMount& camera : cfg.cameras)
     check(mjOBJ_CAMERA, camera.mjcf_camera, fmt::format("{}: camera '{}'", path, camera.name));
@@ -55,50 +55,51 @@ void check_references(const RobotCfg& cfg, const mjSpec* spec, const std::string
 
 }  // namespace
 
-void validate(const MoveGroupCfg& cfg, std::string_view place) {
+void validate(const MoveGroupCfg& cfg, std::string_view context) {
   if (!cfg.spread.empty() && cfg.spread.size() != cfg.init.size()) {
-    throw ValueError(fmt::format("{}: '{}': spread has {} values, init has {}", place, cfg.name,
+    throw ValueError(fmt::format("{}: '{}': spread has {} values, init has {}", context, cfg.name,
                                  cfg.spread.size(), cfg.init.size()));
   }
-  if (!cfg.stooped.empty() && cfg.stooped.size() != cfg.init.size()) {
-    throw ValueError(fmt::format("{}: '{}': stooped has {} values, init has {}", place, cfg.name,
-                                 cfg.stooped.size(), cfg.init.size()));
+  if (!cfg.low_init.empty() && cfg.low_init.size() != cfg.init.size()) {
+    throw ValueError(fmt::format("{}: '{}': stooped has {} values, init has {}", context, cfg.name,
+                                 cfg.low_init.size(), cfg.init.size()));
   }
   if (cfg.kind == GroupKind::kBase && !cfg.init.empty()) {
     throw ValueError(
         fmt::format("{}: the base '{}' must not have start positions (init): the task places it",
-                    place, cfg.name));
+                    context, cfg.name));
   }
   if (cfg.kind != GroupKind::kGripper) return;
   if (cfg.pad_sites.size() != 2) {
-    throw ValueError(fmt::format("{}: the gripper '{}' needs 2 pad_sites, has {}", place, cfg.name,
-                                 cfg.pad_sites.size()));
+    throw ValueError(fmt::format("{}: the gripper '{}' needs 2 pad_sites, has {}", context,
+                                 cfg.name, cfg.pad_sites.size()));
   }
   if (cfg.root_body.empty()) {
     throw ValueError(
         fmt::format("{}: the gripper '{}' needs root_body, the body whose subtree is the gripper",
-                    place, cfg.name));
+                    context, cfg.name));
   }
   if (cfg.leaf_site.empty()) {
     throw ValueError(fmt::format("{}: the gripper '{}' needs leaf_site, the site of its tool frame",
-                                 place, cfg.name));
+                                 context, cfg.name));
   }
 }
 
-void validate(const RobotCfg& cfg, std::string_view place) {
+void validate(const RobotCfg& cfg, std::string_view context) {
   std::set<std::string> groups, cameras;
   for (const MoveGroupCfg& group : cfg.groups)
-    check_unique(place, "move group", group.name, groups);
-  for (const CameraMount& camera : cfg.cameras) check_unique(place, "camera", camera.name, cameras);
+    check_unique(context, "move group", group.name, groups);
+  for (const CameraMount& camera : cfg.cameras)
+    check_unique(context, "camera", camera.name, cameras);
   if (cfg.policy_dt_ms % cfg.ctrl_dt_ms != 0 || cfg.ctrl_dt_ms % cfg.sim_dt_ms != 0) {
     throw ValueError(
         fmt::format("{}: policy_dt_ms = {} must be a multiple of ctrl_dt_ms = {}, and that of "
                     "sim_dt_ms = {}",
-                    place, cfg.policy_dt_ms, cfg.ctrl_dt_ms, cfg.sim_dt_ms));
+                    context, cfg.policy_dt_ms, cfg.ctrl_dt_ms, cfg.sim_dt_ms));
   }
   if (!cfg.env_state_name.empty() && cfg.env_state_name == cfg.name) {
-    throw ValueError(
-        fmt::format("{}: env_state_name '{}' must differ from the robot's name", place, cfg.name));
+    throw ValueError(fmt::format("{}: env_state_name '{}' must differ from the robot's name",
+                                 context, cfg.name));
   }
 }
 
@@ -111,15 +112,16 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
   take_robot_sensors(table, path, cfg);
   read_toml_table(table, path, struct_of<RobotCfg>(), &cfg, "");
   if (cfg.name.empty()) throw ValueError(fmt::format("{}: 'name' is empty", path));
-  cfg.model.path = beside(path, cfg.mjcf);
-  const std::string place = fmt::format("robot '{}'", cfg.name);
+  cfg.model.path = resolve_relative(path, cfg.mjcf);
+  const std::string context = fmt::format("robot '{}'", cfg.name);
   if (cfg.parts.empty()) {
-    check_references(cfg, parse_model(cfg.model, place).get(), path);
+    check_references(cfg, parse_model(cfg.model, context).get(), path);
   } else {
     std::vector<ModelPart> parts;
     for (const PartCfg& part : cfg.parts)
-      parts.push_back({beside(path, part.model), part.to, part.prefix, part.pos, part.quat});
-    const std::shared_ptr<mjSpec> spec = compose_model(cfg.model, parts, place);
+      parts.push_back(
+          {resolve_relative(path, part.model), part.to, part.prefix, part.pos, part.quat});
+    const std::shared_ptr<mjSpec> spec = compose_model(cfg.model, parts, context);
     check_references(cfg, spec.get(), path);
     cfg.model = {.spec = spec.get(), .owner = spec};
   }
@@ -128,12 +130,12 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
 }
 
 std::string robot_xml(const RobotCfg& cfg) {
-  const std::string place = fmt::format("robot '{}'", cfg.name);
-  const SpecPtr spec = parse_model(cfg.model, place);
+  const std::string context = fmt::format("robot '{}'", cfg.name);
+  const SpecPtr spec = parse_model(cfg.model, context);
   if (cfg.edit_spec) cfg.edit_spec(spec.get(), "");
   const Vfs vfs;
   if (!compile(spec.get(), vfs))
-    throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(spec.get()))));
+    throw ValueError(fmt::format("{}: {}", context, one_line(mjs_getError(spec.get()))));
   return save_xml(spec.get());
 }
 

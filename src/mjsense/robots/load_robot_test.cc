@@ -139,17 +139,17 @@ TEST_F(RobotFile, ErrorsNameFileLineAndKey) {
 
 // Also required references whose key is missing.
 TEST_F(RobotFile, EveryReferenceIsResolvedWhenItIsLoaded) {
-  const std::string place = path() + ": move group 'arm': ";
+  const std::string context = path() + ": move group 'arm': ";
   EXPECT_EQ(fault(with("base = \"base\"", "base = \"bas\"")),
             path() + ": base: no body named 'bas'; did you mean 'base'?");
   EXPECT_EQ(fault(with("joints = [\"lift\"]", "joints = [\"left\"]")),
-            place + "joints: no joint named 'left'; did you mean 'lift'?");
+            context + "joints: no joint named 'left'; did you mean 'lift'?");
   EXPECT_EQ(fault(with("actuators = [\"lift\"]", "actuators = [\"lit\"]")),
-            place + "actuators: no actuator named 'lit'; did you mean 'lift'?");
+            context + "actuators: no actuator named 'lit'; did you mean 'lift'?");
   EXPECT_EQ(fault(with("tool/tip", "tool/tp")),
-            place + "leaf_site: no site named 'tool/tp'; did you mean 'tool/tip'?");
+            context + "leaf_site: no site named 'tool/tp'; did you mean 'tool/tip'?");
   EXPECT_EQ(fault(std::string(kToml) + "root_body = \"link2\"\n"),
-            place + "root_body: no body named 'link2'; did you mean 'link'?");
+            context + "root_body: no body named 'link2'; did you mean 'link'?");
   EXPECT_THAT(fault(with("{ kind = \"joint_position_relative\", threshold = 0.001 }",
                          "{ kind = \"free_base\", target = \"goal\" }")),
               HasSubstr("controller.target: no body named 'goal'"));

@@ -19,20 +19,20 @@ int dof_width(int joint_type) {
   return joint_type == mjJNT_FREE ? 6 : joint_type == mjJNT_BALL ? 3 : 1;
 }
 
-void check_size(const std::string& place, const char* what, std::size_t found) {
+void check_size(const std::string& context, const char* what, std::size_t found) {
   if (found > GroupValues::kMaxSize) {
     throw ValueError(
-        fmt::format("{}: {} {}: the maximum is {}", place, found, what, GroupValues::kMaxSize));
+        fmt::format("{}: {} {}: the maximum is {}", context, found, what, GroupValues::kMaxSize));
   }
 }
 
 }  // namespace
 
 MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std::string& prefix,
-                        const std::string& place) {
-  validate(cfg, place);
+                        const std::string& context) {
+  validate(cfg, context);
   const auto find = [&](mjtObj type, const std::string& name) {
-    return resolve(model, type, prefix + name, place);
+    return resolve(model, type, prefix + name, context);
   };
   MoveGroup group;
   group.name = cfg.name;
@@ -50,11 +50,11 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
     group.ctrl_low.push_back(limited ? model->actuator_ctrlrange[2 * id] : -mjMAXVAL);
     group.ctrl_high.push_back(limited ? model->actuator_ctrlrange[2 * id + 1] : mjMAXVAL);
   }
-  check_size(place, "joint positions", group.qpos.size());
-  check_size(place, "actuators", group.actuators.size());
+  check_size(context, "joint positions", group.qpos.size());
+  check_size(context, "actuators", group.actuators.size());
   if (!cfg.init.empty() && cfg.init.size() != group.qpos.size()) {
     throw ValueError(fmt::format("{}: {} start positions (init) for {} joints with {} positions",
-                                 place, cfg.init.size(), cfg.joints.size(), group.qpos.size()));
+                                 context, cfg.init.size(), cfg.joints.size(), group.qpos.size()));
   }
   if (!cfg.leaf_site.empty()) group.leaf_site = find(mjOBJ_SITE, cfg.leaf_site);
   if (!cfg.root_body.empty()) group.root_body = find(mjOBJ_BODY, cfg.root_body);

@@ -40,9 +40,9 @@ struct MoveGroup {
 };
 
 // Resolves the names of `cfg` in `model`, each with `prefix` before it. Throws KeyError for an
-// unknown name and ValueError for an invalid configuration; both messages begin with `place`.
+// unknown name and ValueError for an invalid configuration; both messages begin with `context`.
 MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std::string& prefix,
-                        const std::string& place);
+                        const std::string& context);
 
 // Distance between the pads of a gripper, m; and whether it is more than half of max_opening.
 double gripper_opening(const MoveGroup& gripper, const World& world);

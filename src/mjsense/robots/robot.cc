@@ -8,15 +8,15 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/noise.h"
+#include "mjsense/robots/action_noise.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
 
-void check_groups(const std::string& place, std::size_t found) {
+void check_groups(const std::string& context, std::size_t found) {
   if (found > RobotValues::kMaxGroups) {
-    throw ValueError(fmt::format("{}: {} move groups: the maximum is {}", place, found,
+    throw ValueError(fmt::format("{}: {} move groups: the maximum is {}", context, found,
                                  RobotValues::kMaxGroups));
   }
 }
@@ -26,20 +26,20 @@ void check_groups(const std::string& place, std::size_t found) {
 Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix,
              std::optional<ControlPeriods> periods)
     : cfg_(std::move(cfg)), model_(model), prefix_(prefix) {
-  const std::string place = "robot '" + cfg_.name + "'";
-  base_body_ = resolve(model, mjOBJ_BODY, prefix_ + cfg_.base_body, place);
-  check_groups(place, cfg_.groups.size());
+  const std::string context = "robot '" + cfg_.name + "'";
+  base_body_ = resolve(model, mjOBJ_BODY, prefix_ + cfg_.base_body, context);
+  check_groups(context, cfg_.groups.size());
   ControllerInit init{
       model,
       num_worlds,
       base_body_,
       periods.value_or(ControlPeriods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms}),
       prefix_,
-      place};
+      context};
   std::vector<int> base_joints;
   for (const MoveGroupCfg& g : cfg_.groups) {
-    init.place = place + ", move group '" + g.name + "'";
-    MoveGroup group = resolve_group(g, model, prefix_, init.place);
+    init.context = context + ", move group '" + g.name + "'";
+    MoveGroup group = resolve_group(g, model, prefix_, init.context);
     controllers_.push_back(make_controller(g.controller, group, init));
     controllers_.back()->describe(group);
     every_step_ |= controllers_.back()->every_step();
@@ -50,7 +50,7 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
       base_joints.insert(base_joints.end(), group.joints.begin(), group.joints.end());
     groups_.push_back(std::move(group));
   }
-  placement_ = BasePlacement(model, base_body_, base_joints, place);
+  placement_ = BasePlacement(model, base_body_, base_joints, context);
 
   std::vector<int> moving;
   for (const MoveGroup& g : groups_) moving.insert(moving.end(), g.joints.begin(), g.joints.end());
@@ -190,11 +190,11 @@ void Robot::write_joints(const StateRow& state, Rng& rng) const {
   }
 }
 
-bool Robot::stoop() {
+bool Robot::lower_torso() {
   bool any = false;
   for (MoveGroupCfg& group : cfg_.groups) {
-    if (group.stooped.empty()) continue;
-    group.init = group.stooped;
+    if (group.low_init.empty()) continue;
+    group.init = group.low_init;
     any = true;
   }
   return any;

@@ -78,9 +78,9 @@ class Robot {
   // The two parts of write_start(): the joint positions; and the base placement with the controls.
   void write_joints(const StateRow& state, Rng& rng) const;
   void stand(const StateRow& state, const std::optional<Pose>& base) const;
-  // Replaces the start positions of every group that has `stooped` positions by these, for all
+  // Replaces the start positions of every group that has `low_init` positions by these, for all
   // later starts. Returns whether there is such a group.
-  bool stoop();
+  bool lower_torso();
   // Starts an episode: the targets become what the controllers hold now (arm: its qpos; gripper:
   // its open or closed command, whichever is nearer).
   void reset(const World& world);

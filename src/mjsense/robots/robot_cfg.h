@@ -23,19 +23,19 @@ namespace mjsense {
 // kActuators: a group defined by its actuators; without a command their controls do not change.
 enum class GroupKind { kBase, kTorso, kArm, kGripper, kHead, kActuators };
 template <>
-inline constexpr std::array<std::string_view, 6> kWords<GroupKind>{"base",    "torso", "arm",
-                                                                   "gripper", "head",  "actuators"};
+inline constexpr std::array<std::string_view, 6> kEnumNames<GroupKind>{
+    "base", "torso", "arm", "gripper", "head", "actuators"};
 
 // Names are local to the robot's model, without the "robot_0/" prefix.
 struct MoveGroupCfg {
   std::string name;  // "arm"
-  Word<GroupKind> kind = GroupKind::kArm;
+  NamedEnum<GroupKind> kind = GroupKind::kArm;
   std::vector<std::string> joints, actuators;
   ControllerCfg controller;
   std::string leaf_site;
   std::string root_body;
   std::vector<double> init;
-  std::vector<double> stooped;
+  std::vector<double> low_init;
   std::vector<double> spread;
   // Grippers only.
   double open_command = 0, closed_command = 0;
@@ -56,7 +56,7 @@ void visit_fields(V& v, MoveGroupCfg& c) {
   v("root_body", c.root_body,
     "Body whose subtree forms the group; it contains the geoms of a gripper.");
   v("init", c.init, "Start positions (qpos) of its joints, rad or m.");
-  v("stooped", c.stooped,
+  v("stooped", c.low_init,
     "Start positions used if the target is too low for ``init``; empty: always ``init``.");
   v("spread", c.spread, "Half widths of the uniform noise of the start positions; empty: no noise.")
       .at_least(0);
@@ -73,7 +73,7 @@ void visit_fields(V& v, MoveGroupCfg& c) {
       .unit("m")
       .at_least(0);
 }
-void validate(const MoveGroupCfg& cfg, std::string_view place);
+void validate(const MoveGroupCfg& cfg, std::string_view context);
 
 // A camera of the robot's model that an episode records.
 struct CameraMount {
@@ -225,6 +225,6 @@ void visit_fields(V& v, RobotCfg& c) {
       .at_least(0);
 }
 // Checks that the periods divide each other and that names are unique.
-void validate(const RobotCfg& cfg, std::string_view place);
+void validate(const RobotCfg& cfg, std::string_view context);
 
 }  // namespace mjsense

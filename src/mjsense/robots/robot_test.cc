@@ -116,19 +116,19 @@ TEST_F(Franka, StartsAreClippedToTheLimits) {
 TEST_F(Franka, StartNoiseHasItsWidth) {
   const double init[] = {0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
   const double spread[] = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175};
-  double least[7] = {}, most[7] = {};
+  double minimum[7] = {}, maximum[7] = {};
   for (int k = 0; k < 400; ++k) {
     Rng rng(9, 0, 0, k);
     robot.write_start(state_row(data[0].get()), {}, rng);
     const auto q = arm_qpos(0);
     for (int i = 0; i < 7; ++i) {
-      least[i] = std::min(least[i], (q[i] - init[i]) / spread[i]);
-      most[i] = std::max(most[i], (q[i] - init[i]) / spread[i]);
+      minimum[i] = std::min(minimum[i], (q[i] - init[i]) / spread[i]);
+      maximum[i] = std::max(maximum[i], (q[i] - init[i]) / spread[i]);
     }
   }
   for (int i = 0; i < 7; ++i) {
-    EXPECT_NEAR(least[i], -1, 0.03) << i;
-    EXPECT_NEAR(most[i], 1, 0.03) << i;
+    EXPECT_NEAR(minimum[i], -1, 0.03) << i;
+    EXPECT_NEAR(maximum[i], 1, 0.03) << i;
   }
 }
 

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
+#include "mjsense/core/name_matching.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -67,7 +67,7 @@ MoveGroupCfg group_of(const std::string& name, const std::string& body) {
 }  // namespace
 
 RobotCfg scene_robot(const mjModel* m, const std::string& entity, const ActuatorGroups& groups,
-                     std::string_view place) {
+                     std::string_view context) {
   const std::string prefix = entity.empty() ? "" : entity + "/";
   const Named bodies = named(m, mjOBJ_BODY, prefix), joints = named(m, mjOBJ_JOINT, prefix),
               actuators = named(m, mjOBJ_ACTUATOR, prefix);
@@ -76,7 +76,7 @@ RobotCfg scene_robot(const mjModel* m, const std::string& entity, const Actuator
     for (const std::string& name : model_names(m, mjOBJ_BODY)) {
       if (name.find('/') != std::string::npos) entities.insert(name.substr(0, name.find('/')));
     }
-    throw_unknown(place, "robot entity", entity,
+    throw_unknown(context, "robot entity", entity,
                   std::vector<std::string>(entities.begin(), entities.end()));
   }
 
@@ -99,7 +99,7 @@ RobotCfg scene_robot(const mjModel* m, const std::string& entity, const Actuator
   }
   std::vector<std::string> owner(actuators.ids.size());
   for (const auto& [name, patterns] : groups) {
-    const std::string of_group = fmt::format("{}, move group '{}'", place, name);
+    const std::string of_group = fmt::format("{}, move group '{}'", context, name);
     MoveGroupCfg group = group_of(name, robot.base_body);
     std::set<int> driven;
     for (int i : match_names(patterns, actuators.names, of_group)) {

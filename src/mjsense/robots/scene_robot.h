@@ -23,8 +23,8 @@ using ActuatorGroups = std::vector<std::pair<std::string, std::vector<std::strin
 // `groups`; without `groups`, one group "joints" of all actuators and all hinges and slides. A
 // group in `groups` has the hinges and slides that its actuators drive. Throws KeyError for an
 // unknown entity, and ValueError for patterns that match no actuator or one of another group;
-// `place` starts the message.
+// `context` starts the message.
 RobotCfg scene_robot(const mjModel* model, const std::string& entity, const ActuatorGroups& groups,
-                     std::string_view place);
+                     std::string_view context);
 
 }  // namespace mjsense

@@ -76,7 +76,7 @@ std::string text_of(const toml::table& table, std::string_view key, const std::s
   const auto text = node ? node->value_exact<std::string>() : std::nullopt;
   if (!text || text->empty()) {
     throw ValueError(fmt::format("{}: '{}': '{}' must be a non-empty string",
-                                 toml_place(path, node ? *node : table), inside, key));
+                                 toml_context(path, node ? *node : table), inside, key));
   }
   return *text;
 }
@@ -88,19 +88,20 @@ PythonSensorRef python_sensor(const toml::table& table, const std::string& path,
   for (const auto& [key, node] : table) {
     const std::string name(key.str());
     if (name != "kind" && std::ranges::find(kPythonKeys, name) == kPythonKeys.end())
-      throw_unknown(toml_place(path, node), fmt::format("key of '{}'", inside), name, kPythonKeys);
+      throw_unknown(toml_context(path, node), fmt::format("key of '{}'", inside), name,
+                    kPythonKeys);
   }
   PythonSensorRef out{.name = text_of(table, "name", path, inside),
                       .class_name = text_of(table, "class", path, inside),
                       .args = "{}"};
   if (std::ranges::count(out.class_name, ':') != 1) {
     throw ValueError(fmt::format("{}: '{}': class is '{}': must be 'package.module:Class'",
-                                 toml_place(path, table), inside, out.class_name));
+                                 toml_context(path, table), inside, out.class_name));
   }
   if (const toml::node* args = table.get("args")) {
     if (!args->is_table()) {
       throw ValueError(fmt::format("{}: the value of '{}.args' has the wrong type: must be a table",
-                                   toml_place(path, *args), inside));
+                                   toml_context(path, *args), inside));
     }
     std::ostringstream text;
     text << toml::json_formatter(*args->as_table());
@@ -124,7 +125,7 @@ std::shared_ptr<SensorCfg> built_in_sensor(const toml::table& table, const std::
     kinds.emplace_back(known.cfg->kind);
   }
   kinds.emplace_back(kPython);
-  throw_unknown(toml_place(path, table), fmt::format("kind of '{}'", inside), kind, kinds);
+  throw_unknown(toml_context(path, table), fmt::format("kind of '{}'", inside), kind, kinds);
 }
 
 }  // namespace
@@ -136,7 +137,7 @@ void take_robot_sensors(toml::table& file, const std::string& path, RobotCfg& cf
   if (!list || !list->is_homogeneous<toml::table>()) {
     throw ValueError(
         fmt::format("{}: the value of 'sensors' has the wrong type: must be tables, [[sensors]]",
-                    toml_place(path, *node)));
+                    toml_context(path, *node)));
   }
   for (std::size_t i = 0; i < list->size(); ++i) {
     const toml::table& table = *list->get(i)->as_table();

@@ -69,38 +69,40 @@ class TopDownPlanner final : public PlannerPolicy {
                       "has none: policy 'planner' picks with any gripper",
                       name(), task.robot().name()));
     }
-    above_.initialize(task);
-    anywhere_.initialize(task);
-    anywhere_plays_.assign(task.num_worlds(), 0);
+    top_down_.initialize(task);
+    any_direction_.initialize(task);
+    uses_any_direction_.assign(task.num_worlds(), 0);
   }
   void reset(const World& world) override {
-    above_.reset(world);
-    anywhere_plays_[world.id] = above_.last_failure(world.id) == PlanFailure::kUnplanned;
-    if (anywhere_plays_[world.id]) anywhere_.reset(world);
+    top_down_.reset(world);
+    uses_any_direction_[world.id] = top_down_.last_failure(world.id) == PlanFailure::kUnplanned;
+    if (uses_any_direction_[world.id]) any_direction_.reset(world);
   }
-  void act(const World& world, Action& action) override { player(world.id).act(world, action); }
-  std::span<const Phase> phases() const override { return above_.phases(); }
-  int phase(int world) const override { return player(world).phase(world); }
-  int num_retries(int world) const override { return player(world).num_retries(world); }
-  Pose grasp_pose(int world) const override { return player(world).grasp_pose(world); }
-  std::string failure(int world) const override { return player(world).failure(world); }
+  void act(const World& world, Action& action) override {
+    active_planner(world.id).act(world, action);
+  }
+  std::span<const Phase> phases() const override { return top_down_.phases(); }
+  int phase(int world) const override { return active_planner(world).phase(world); }
+  int num_retries(int world) const override { return active_planner(world).num_retries(world); }
+  Pose grasp_pose(int world) const override { return active_planner(world).grasp_pose(world); }
+  std::string failure(int world) const override { return active_planner(world).failure(world); }
 
  private:
-  TaskPlanner& player(int world) {
-    return anywhere_plays_[world] ? static_cast<TaskPlanner&>(anywhere_) : above_;
+  TaskPlanner& active_planner(int world) {
+    return uses_any_direction_[world] ? static_cast<TaskPlanner&>(any_direction_) : top_down_;
   }
-  const TaskPlanner& player(int world) const {
-    return const_cast<TopDownPlanner*>(this)->player(world);
+  const TaskPlanner& active_planner(int world) const {
+    return const_cast<TopDownPlanner*>(this)->active_planner(world);
   }
 
-  PickPlanner above_;
-  ManipulationPlanner anywhere_;
-  std::vector<char> anywhere_plays_;  // [B], 1: the episode uses anywhere_
+  PickPlanner top_down_;
+  ManipulationPlanner any_direction_;
+  std::vector<char> uses_any_direction_;  // [B], 1: the episode uses any_direction_
 };
 
 // The first child of a MultiTask that a planner exists for; any child counts as success. Other
 // tasks are returned unchanged.
-Task& first_doable(Task& task) {
+Task& first_plannable(Task& task) {
   auto* several = dynamic_cast<MultiTask*>(&task);
   if (!several) return task;
   for (int i = 0; i < several->size(); ++i) {
@@ -114,7 +116,7 @@ class AnyPlanner final : public PlannerPolicy {
   std::string_view name() const override { return "planner"; }
   void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
   void initialize(Task& task) override {
-    Task& doable = first_doable(task);
+    Task& doable = first_plannable(task);
     planner_ = make_planner(doable);
     if (simulation_) planner_->bind(simulation_);
     simulation_.reset();

@@ -10,8 +10,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/episode_outcome.h"
 #include "mjsense/record/model_fields.h"
-#include "mjsense/record/outcome.h"
 #include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/model_archive.h"
@@ -83,7 +83,7 @@ class RecordJob {
         reported = progress_.seconds;
       }
     }
-    summary_.interrupted = stop && stop->load() > 0 && !recorder_.enough();
+    summary_.interrupted = stop && stop->load() > 0 && !recorder_.has_all_episodes();
     timed([&] { summary_.interrupted ? recorder_.flush() : recorder_.complete(); });
     progress_.seconds = since(begun);
     update_progress();
@@ -171,7 +171,7 @@ class RecordJob {
                        : now.terminal ? "no success"
                                       : "horizon reached";
     const Policy* policy = rollout_.policy();
-    const std::string why = gave_up && policy ? policy->failure(w) : std::string(now.lacks);
+    const std::string why = gave_up && policy ? policy->failure(w) : std::string(now.missing);
     return why.empty() ? what : fmt::format("{}: {}", what, why);
   }
 

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/json.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/scenes/load_scene.h"
 
@@ -52,7 +52,7 @@ void add_value(Checksum& sum, const FieldType& type, const void* value) {
     case Kind::kBool:
     case Kind::kInt:
     case Kind::kUnsigned:
-    case Kind::kWord: {
+    case Kind::kEnum: {
       const std::int64_t x =
           type.kind == Kind::kBool ? *static_cast<const bool*>(value) : get_integer(type, value);
       return sum.add(&x, sizeof x);

@@ -89,7 +89,7 @@ Registry<TaskFactory>& tasks() {
 
 // Combines several tasks in the scene of the first one.
 std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
-  const std::vector<std::string> parts = parts_of_task(name);
+  const std::vector<std::string> parts = task_components(name);
   for (const std::string& part : parts) tasks().at(part);  // throws for unknown names
   if (cfg.scene.empty()) cfg.scene = default_scene(parts[0]);
   if (cfg.scene.empty() && !cfg.make_scene) {

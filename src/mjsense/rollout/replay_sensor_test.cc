@@ -15,8 +15,8 @@
 #include "mjsense/record/model_checksums.h"
 #include "mjsense/record/model_fields.h"
 #include "mjsense/rollout/rollout.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_archive.h"
-#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {

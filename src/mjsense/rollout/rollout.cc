@@ -82,14 +82,14 @@ RolloutCfg resolved(RolloutCfg cfg) {
   // A user-defined task may have its robot in its scene.
   if (cfg.robot == kTaskRobot) cfg.robot = cfg.make_task ? "" : default_robot(cfg.task);
   if (cfg.scene.empty() && !cfg.make_scene && !cfg.make_task)
-    cfg.scene = default_scene(parts_of_task(cfg.task)[0]);
+    cfg.scene = default_scene(task_components(cfg.task)[0]);
   return cfg;
 }
 
 // Runs a function on the fresh data of some worlds, in parallel.
-class Rollout::EachActive final : public WorldHooks {
+class Rollout::ForEachHook final : public WorldHooks {
  public:
-  explicit EachActive(std::function<void(const World&)> body) : body_(std::move(body)) {}
+  explicit ForEachHook(std::function<void(const World&)> body) : body_(std::move(body)) {}
   void substep(const World& /*world*/) override {}
   void reset(const World& /*world*/) override {}
   void refreshed(const World& world) override { body_(world); }
@@ -99,9 +99,9 @@ class Rollout::EachActive final : public WorldHooks {
 };
 
 // A subset of the worlds, as seen by tasks and policies.
-class Rollout::Some final : public ActiveWorlds {
+class Rollout::WorldSubset final : public ActiveWorlds {
  public:
-  Some(Rollout& rollout, std::span<const int> ids) : rollout_(rollout), ids_(ids) {}
+  WorldSubset(Rollout& rollout, std::span<const int> ids) : rollout_(rollout), ids_(ids) {}
   std::span<const int> ids() const override { return ids_; }
   void for_each(std::function<void(const World&)> body) override {
     rollout_.for_each(ids_, std::move(body));
@@ -140,10 +140,10 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
 }
 
 void Rollout::make() {
-  if (cfg_.making) cfg_.making(*this);
+  if (cfg_.on_construct_begin) cfg_.on_construct_begin(*this);
   camera_system_ = std::make_unique<CameraSystem>(choose_cameras(*task_, cfg_));
   cameras_ = recorded_cameras(*camera_system_);
-  SceneCfg scene_cfg = task_->whole_scene_cfg();
+  SceneCfg scene_cfg = task_->scene_cfg_with_robot();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(
         camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));
@@ -195,7 +195,7 @@ void Rollout::make() {
   for (int w = 0; w < cfg_.num_worlds; ++w) rows_.push_back(state_row(simulation_->worlds(), w));
   ids_.reserve(cfg_.num_worlds);
   moving_.reserve(cfg_.num_worlds);
-  if (cfg_.made) cfg_.made(*this);
+  if (cfg_.on_constructed) cfg_.on_constructed(*this);
 }
 
 // The sensors of the robot's file, then those created in Python.
@@ -224,7 +224,7 @@ std::span<const int> Rollout::active_worlds() {
 }
 
 void Rollout::for_each(std::span<const int> worlds, std::function<void(const World&)> body) {
-  EachActive hooks(std::move(body));
+  ForEachHook hooks(std::move(body));
   simulation_->worlds().visit(worlds, hooks);
 }
 
@@ -281,7 +281,7 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
   }
   sample(worlds, episodes);
   place_cameras(sorted);
-  Some begins(*this, sorted);
+  WorldSubset begins(*this, sorted);
   task_->begin_all(begins);
   if (policy_) policy_->reset_all(begins);
   times_.reset += since(begun);
@@ -305,7 +305,7 @@ void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> 
     for (int w : left) task_->sample(w, of[w], rows_[w], draw);
     simulation_->forward(left);
     take_failures();
-    for_each(left, [&](const World& world) { why[world.id] = task_->start_fault(world); });
+    for_each(left, [&](const World& world) { why[world.id] = task_->start_error(world); });
     std::erase_if(left, [&](int w) { return why[w].empty() || !faults_[w].empty(); });
   }
   for (int w : left) set_fault(w, std::move(why[w]));
@@ -321,9 +321,9 @@ void Rollout::place_cameras(std::span<const int> worlds) {
     for (const TaskObject& object : task_->objects(world.id)) {
       if (object.body >= 0) objects.push_back(object.body);
     }
-    why[world.id] =
-        camera_system_->place(world, cfg_.seed, static_cast<std::uint64_t>(episode(world.id)),
-                              middle_of(*task_, world), objects);
+    why[world.id] = camera_system_->place_cameras(world, cfg_.seed,
+                                                  static_cast<std::uint64_t>(episode(world.id)),
+                                                  middle_of(*task_, world), objects);
   });
   for (int w : worlds) {
     if (!why[w].empty()) set_fault(w, std::move(why[w]));
@@ -345,7 +345,7 @@ void Rollout::act() {
   const auto begun = Clock::now();
   for (int w : active_worlds()) actions_[w] = Action{};
   if (!ids_.empty()) {
-    Some worlds(*this, ids_);
+    WorldSubset worlds(*this, ids_);
     policy_->act_all(worlds, actions_);
   }
   times_.policy += since(begun);
@@ -454,7 +454,7 @@ void Rollout::sense() {
 void Rollout::evaluate(std::span<const int> worlds) {
   if (worlds.empty()) return;
   const auto begun = Clock::now();
-  Some some(*this, worlds);
+  WorldSubset some(*this, worlds);
   task_->evaluate_all(some, evaluations_);
   for (int w : worlds) {
     const double reward = evaluations_[w].reward;

@@ -93,8 +93,9 @@ struct RolloutCfg {
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> robot_sensors;
   // Edits the suite after everything else.
   std::function<void(SensorSuite&)> edit_suite;
-  // `making` is called when only task and policy exist, `made` at the end of the construction.
-  std::function<void(Rollout&)> making, made;
+  // `on_construct_begin` is called when only task and policy exist, `on_constructed` at the end of
+  // the construction.
+  std::function<void(Rollout&)> on_construct_begin, on_constructed;
 };
 template <class V>
 void visit_fields(V& v, RolloutCfg& c) {
@@ -230,8 +231,8 @@ class Rollout {
   const RolloutTimes& times() const { return times_; }
 
  private:
-  class EachActive;
-  class Some;
+  class ForEachHook;
+  class WorldSubset;
   void make();
   std::vector<std::shared_ptr<Sensor>> robot_sensors();
   std::span<const int> active_worlds();

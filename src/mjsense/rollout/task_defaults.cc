@@ -27,14 +27,14 @@ constexpr int kSeldomMs = 100, kSeldomHorizon = 400;
 constexpr std::string_view kAnyOf = "nav_to_obj+pick";
 
 const Defaults* defaults_of(std::string_view task) {
-  const std::string first = parts_of_task(task)[0];
+  const std::string first = task_components(task)[0];
   const auto* found = std::ranges::find(kDefaults, first, &Defaults::task);
   return found == std::end(kDefaults) ? nullptr : found;
 }
 
 }  // namespace
 
-std::vector<std::string> parts_of_task(std::string_view name) {
+std::vector<std::string> task_components(std::string_view name) {
   if (name == "multi_task") name = kAnyOf;
   std::vector<std::string> parts;
   for (;;) {
@@ -68,7 +68,7 @@ std::string_view default_robot(std::string_view task) {
 void set_task_defaults(std::string_view task, TaskCfg& cfg) {
   const Defaults* d = defaults_of(task);
   if (!d) {
-    const bool ours = !default_scene(parts_of_task(task)[0]).empty();
+    const bool ours = !default_scene(task_components(task)[0]).empty();
     if (ours && cfg.policy_dt_ms >= kSeldomMs) cfg.horizon = kSeldomHorizon;
     return;
   }

@@ -12,7 +12,7 @@ namespace mjsense {
 
 // Names of the tasks that a name denotes: itself, or the parts of "nav_to_obj+pick". "multi_task"
 // denotes "nav_to_obj+pick".
-std::vector<std::string> parts_of_task(std::string_view name);
+std::vector<std::string> task_components(std::string_view name);
 // Default scene of a built-in task; "" for other tasks.
 std::string_view default_scene(std::string_view task);
 

@@ -43,7 +43,7 @@ int random_mutants() {
 void use(TaskCfg cfg, bool plan) {
   set_task_defaults("pick", cfg);
   const std::unique_ptr<Task> task = make_task("pick", cfg);
-  const Scene scene(task->whole_scene_cfg());
+  const Scene scene(task->scene_cfg_with_robot());
   task->initialize(scene.model(), 1);
   const std::unique_ptr<Policy> policy = make_policy("planner");
   task->register_policy(*policy);

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
 #include "mjsense/core/mujoco_call.h"
-#include "mjsense/scene/assets.h"
+#include "mjsense/core/name_matching.h"
 #include "mjsense/scene/compiler_settings.h"
-#include "mjsense/scene/options.h"
+#include "mjsense/scene/model_assets.h"
+#include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -22,7 +22,7 @@ namespace {
 
 constexpr const char* kFreeJoint = "floating_base_joint";
 
-std::string place_of(const std::string& name) { return fmt::format("entity '{}'", name); }
+std::string context_of(const std::string& name) { return fmt::format("entity '{}'", name); }
 
 // Names unnamed elements by type and index: "geom_3". If the name exists already, "_" is appended.
 void name_unnamed(mjSpec* spec) {
@@ -41,13 +41,13 @@ void name_unnamed(mjSpec* spec) {
   }
 }
 
-void drop_options(mjSpec* spec, const std::string& place, std::vector<std::string>& warnings) {
+void drop_options(mjSpec* spec, const std::string& context, std::vector<std::string>& warnings) {
   mjOption standard;
   mj_defaultOption(&standard);
   const std::vector<std::string> changed = differing_options(spec->option, standard);
   if (!changed.empty()) {
     warnings.push_back(
-        fmt::format("{}: its <option> is not carried over ({}); set the scene's options", place,
+        fmt::format("{}: its <option> is not carried over ({}); set the scene's options", context,
                     fmt::join(changed, ", ")));
   }
   spec->option = standard;
@@ -87,13 +87,13 @@ bool is_identity(const EntityCfg& cfg) {
 }
 
 // Elements that refer to others. MuJoCo silently drops those whose target is unknown.
-struct Census {
+struct ElementNames {
   mjtObj type;
   std::vector<std::string> names;
 };
 
-std::vector<Census> census(const mjSpec* spec) {
-  std::vector<Census> counts;
+std::vector<ElementNames> element_names_of(const mjSpec* spec) {
+  std::vector<ElementNames> counts;
   for (mjtObj type :
        {mjOBJ_ACTUATOR, mjOBJ_SENSOR, mjOBJ_TENDON, mjOBJ_EQUALITY, mjOBJ_PAIR, mjOBJ_EXCLUDE}) {
     counts.push_back({type, spec_names(spec, type)});
@@ -101,19 +101,20 @@ std::vector<Census> census(const mjSpec* spec) {
   return counts;
 }
 
-void check_nothing_lost(const std::vector<Census>& child, const std::vector<Census>& before,
-                        const std::vector<Census>& after, const ModelSource& source,
-                        const std::string& place) {
+void check_nothing_lost(const std::vector<ElementNames>& child,
+                        const std::vector<ElementNames>& before,
+                        const std::vector<ElementNames>& after, const ModelSource& source,
+                        const std::string& context) {
   for (std::size_t i = 0; i < child.size(); ++i) {
     const std::vector<std::string>& now = after[i].names;
     if (now.size() - before[i].names.size() == child[i].names.size()) continue;
-    std::string why = explain_fault(source, place);  // MuJoCo's error for the model alone
-    if (!why.empty()) throw ValueError(fmt::format("{}: {}", place, why));
+    std::string why = explain_fault(source, context);  // MuJoCo's error for the model alone
+    if (!why.empty()) throw ValueError(fmt::format("{}: {}", context, why));
     const auto lost = std::find_if(child[i].names.begin(), child[i].names.end(), [&](auto& name) {
       return std::none_of(now.begin(), now.end(), [&](auto& n) { return n.ends_with("/" + name); });
     });
     throw ValueError(fmt::format(
-        "{}: its {} '{}' cannot be attached: it refers to an element outside its model", place,
+        "{}: its {} '{}' cannot be attached: it refers to an element outside its model", context,
         obj_type_name(child[i].type), lost == child[i].names.end() ? "" : *lost));
   }
 }
@@ -124,8 +125,8 @@ double squared_norm(const std::array<double, 4>& quat) {
   return norm;
 }
 
-std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& place) {
-  check_fields(cfg, place);
+std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& context) {
+  check_fields(cfg, context);
   const double norm = squared_norm(cfg.quat);
   std::array<double, 4> unit;
   for (int i = 0; i < 4; ++i) unit[i] = cfg.quat[i] / std::sqrt(norm);
@@ -134,26 +135,26 @@ std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& place) 
 
 // The pose of a body or frame in what surrounds it.
 template <class Element>
-Pose pose_of(const Element* element, const mjSpec* spec, const std::string& place) {
+Pose pose_of(const Element* element, const mjSpec* spec, const std::string& context) {
   double q[4];
   std::copy(element->quat, element->quat + 4, q);
   if (element->alt.type != mjORIENTATION_QUAT) {
     const char* fault =
         mjs_resolveOrientation(q, spec->compiler.degree, spec->compiler.eulerseq, &element->alt);
-    if (fault) throw ValueError(fmt::format("{}: {}", place, fault));
+    if (fault) throw ValueError(fmt::format("{}: {}", context, fault));
   }
   return {vec3(element->pos), normalized(quat(q))};
 }
 
 // Sets the configured pose of a root body. Returns the displacement from its previous pose, world
 // frame.
-Pose set_pose(mjsBody* body, const EntityCfg& cfg, const mjSpec* spec, const std::string& place) {
-  const std::array<double, 4> q = unit_quat(cfg, place);
+Pose set_pose(mjsBody* body, const EntityCfg& cfg, const mjSpec* spec, const std::string& context) {
+  const std::array<double, 4> q = unit_quat(cfg, context);
   if (is_identity(cfg)) return {};
   Pose frames;  // product of the frames that contain the body
   for (mjsFrame* f = mjs_getFrame(body->element); f; f = mjs_getFrame(f->element))
-    frames = pose_of(f, spec, place) * frames;
-  const Pose before = frames * pose_of(body, spec, place);
+    frames = pose_of(f, spec, context) * frames;
+  const Pose before = frames * pose_of(body, spec, context);
   const Pose wanted{vec3(cfg.pos.data()), quat(q.data())};
   const Pose local = mjs_getFrame(body->element) ? inverse(frames) * wanted : wanted;
   write_vec(local.p, body->pos);
@@ -164,19 +165,19 @@ Pose set_pose(mjsBody* body, const EntityCfg& cfg, const mjSpec* spec, const std
 
 }  // namespace
 
-void validate(const EntityCfg& cfg, std::string_view place) {
+void validate(const EntityCfg& cfg, std::string_view context) {
   if (!(squared_norm(cfg.quat) > 1e-12)) {
-    throw ValueError(fmt::format("{}: quat ({}) is not a rotation; expected w, x, y, z", place,
+    throw ValueError(fmt::format("{}: quat ({}) is not a rotation; expected w, x, y, z", context,
                                  fmt::join(cfg.quat, ", ")));
   }
   for (const auto& [pattern, value] : cfg.joint_pos)
-    Regex(pattern, fmt::format("{}: joint_pos", place));
+    Regex(pattern, fmt::format("{}: joint_pos", context));
 }
 
 Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,
                        std::vector<std::string>& warnings) {
-  const std::string place = place_of(name);
-  SpecPtr child = parse_model(cfg.model, place);
+  const std::string context = context_of(name);
+  SpecPtr child = parse_model(cfg.model, context);
   adopt_assets(child.get(), cfg.model, name, vfs);
   name_unnamed(child.get());
 
@@ -184,11 +185,11 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   attached.keys = take_keyframes(child.get());
   if (attached.keys.size() > 1) {
     warnings.push_back(fmt::format("{}: {} keyframes; only the first, '{}', goes into init_state",
-                                   place, attached.keys.size(), attached.keys.front().name));
+                                   context, attached.keys.size(), attached.keys.front().name));
     attached.keys.resize(1);
   }
   if (!whole_model_settings(child.get()).empty()) {
-    child = apply_whole_model_settings(std::move(child), vfs, place);
+    child = apply_whole_model_settings(std::move(child), vfs, context);
   }
   std::vector<mjsElement*> free_joints;
   for (mjsElement* joint : spec_elements(child.get(), mjOBJ_JOINT)) {
@@ -198,44 +199,45 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
     throw ValueError(fmt::format(
         "{}: its model has {} freejoints ('{}', '{}', ...); an entity has at most one; make each "
         "floating part an entity, or the whole model the scene's base",
-        place, free_joints.size(), element_name(free_joints[0]), element_name(free_joints[1])));
+        context, free_joints.size(), element_name(free_joints[0]), element_name(free_joints[1])));
   }
   attached.fixed_base = free_joints.empty();
-  drop_options(child.get(), place, warnings);
+  drop_options(child.get(), context, warnings);
   move_visual(child.get(), scene);
 
   mjsBody* world = mjs_findBody(scene, "world");
   mjsElement* root = mjs_firstChild(mjs_findBody(child.get(), "world"), mjOBJ_BODY, 0);
   const bool is_mocap = root && mjs_asBody(root)->mocap;
   const bool has_mocap = any_mocap(child.get());
-  attached.wrapped = attached.fixed_base && !has_mocap && cfg.mocap_base;
+  attached.has_mocap_base = attached.fixed_base && !has_mocap && cfg.mocap_base;
   if (attached.fixed_base && has_mocap && !is_mocap && cfg.mocap_base) {
     warnings.push_back(fmt::format(
-        "{}: stays on the world body, because MuJoCo does not nest its mocap bodies", place));
+        "{}: stays on the world body, because MuJoCo does not nest its mocap bodies", context));
   }
   mjsBody* parent = world;
-  if (attached.wrapped) {
+  if (attached.has_mocap_base) {
     parent = mjs_addBody(world, nullptr);
     mjs_setName(parent->element, (name + "/mocap_base").c_str());
     parent->mocap = 1;
-    set_pose(parent, cfg, scene, place);
+    set_pose(parent, cfg, scene, context);
   } else if (!attached.fixed_base) {
-    attached.moved = set_pose(mjs_getParent(free_joints[0]), cfg, child.get(), place);
+    attached.moved = set_pose(mjs_getParent(free_joints[0]), cfg, child.get(), context);
   } else if (is_mocap) {
-    attached.moved = set_pose(mjs_asBody(root), cfg, child.get(), place);
+    attached.moved = set_pose(mjs_asBody(root), cfg, child.get(), context);
   }
   mjsFrame* frame = mjs_addFrame(parent, nullptr);
-  if (attached.fixed_base && !attached.wrapped && !is_mocap) {
-    const std::array<double, 4> quat = unit_quat(cfg, place);
+  if (attached.fixed_base && !attached.has_mocap_base && !is_mocap) {
+    const std::array<double, 4> quat = unit_quat(cfg, context);
     std::copy(cfg.pos.begin(), cfg.pos.end(), frame->pos);
     std::copy(quat.begin(), quat.end(), frame->quat);
   }
-  const std::vector<Census> before = census(child.get()), scene_before = census(scene);
+  const std::vector<ElementNames> before = element_names_of(child.get()),
+                                  scene_before = element_names_of(scene);
   // The attached model is referenced, so the scene keeps the child spec alive.
   if (!call_mujoco(mjs_attach, frame->element, child->element, (name + "/").c_str(), "")) {
-    throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(scene))));
+    throw ValueError(fmt::format("{}: {}", context, one_line(mjs_getError(scene))));
   }
-  check_nothing_lost(before, scene_before, census(scene), cfg.model, place);
+  check_nothing_lost(before, scene_before, element_names_of(scene), cfg.model, context);
   return attached;
 }
 

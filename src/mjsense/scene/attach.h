@@ -9,7 +9,7 @@
 
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/initial_state.h"
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
 
 namespace mjsense {
 

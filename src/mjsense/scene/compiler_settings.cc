@@ -39,7 +39,7 @@ bool changes_length_ranges(const mjSpec* spec) {
 }
 
 // If a muscle has no length range, the scene would compute one.
-void check_muscles_have_ranges(const mjSpec* spec, const mjModel* model, std::string_view place) {
+void check_muscles_have_ranges(const mjSpec* spec, const mjModel* model, std::string_view context) {
   if (spec->compiler.LRopt.mode != mjLRMODE_NONE) return;
   for (mjsElement* element : spec_elements(spec, mjOBJ_ACTUATOR)) {
     const std::string name = element_name(element);
@@ -50,7 +50,7 @@ void check_muscles_have_ranges(const mjSpec* spec, const mjModel* model, std::st
         fmt::format("{}: <lengthrange mode='none'> leaves muscle '{}' without a range, which "
                     "cannot be kept for "
                     "one entity; give it a lengthrange, or leave out the mode",
-                    place, name));
+                    context, name));
   }
 }
 
@@ -67,15 +67,15 @@ std::vector<std::string> whole_model_settings(const mjSpec* spec) {
   return names;
 }
 
-SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view place) {
+SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view context) {
   const std::string apart = fmt::format("{}: compiled by itself, because its <compiler> sets {}",
-                                        place, fmt::join(whole_model_settings(spec.get()), ", "));
+                                        context, fmt::join(whole_model_settings(spec.get()), ", "));
   const auto fail = [&](std::string_view why) {
     throw ValueError(fmt::format("{}: {}", apart, one_line(why)));
   };
   const ModelPtr model = compile(spec.get(), vfs);
   if (!model) fail(mjs_getError(spec.get()));
-  check_muscles_have_ranges(spec.get(), model.get(), place);
+  check_muscles_have_ranges(spec.get(), model.get(), context);
   if (!mj_copyBack(spec.get(), model.get())) fail(mjs_getError(spec.get()));
 
   const std::string xml = save_compiled_xml(spec.get(), apart);

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
 
 namespace mjsense {
 
@@ -20,7 +20,7 @@ std::vector<std::string> whole_model_settings(const mjSpec* spec);
 
 // Returns the model with the numbers that its own compilation computes and without such settings,
 // so that it is the same whether attached or alone. Named elements keep their names. Throws
-// ValueError, or RuntimeError for what MJCF cannot express; both start with `place`.
-SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view place);
+// ValueError, or RuntimeError for what MJCF cannot express; both start with `context`.
+SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view context);
 
 }  // namespace mjsense

@@ -61,7 +61,7 @@ void visit_fields(V& v, EntityCfg& c) {
 }
 
 // Checks the rotation and the regular expressions.
-void validate(const EntityCfg& cfg, std::string_view place);
+void validate(const EntityCfg& cfg, std::string_view context);
 
 // A reference to one MuJoCo element. The full name is "entity/name", or "name" if `entity` is
 // empty.

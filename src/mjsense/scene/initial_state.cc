@@ -6,9 +6,9 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
+#include "mjsense/core/name_matching.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {
@@ -35,14 +35,14 @@ class Merger {
       : all_(all),
         entity_(entity),
         m_(model),
-        place_(fmt::format("entity '{}'", entity.name)),
+        context_(fmt::format("entity '{}'", entity.name)),
         qpos_(m_->key_qpos + key * m_->nq),
         qvel_(m_->key_qvel + key * m_->nv),
         act_(m_->key_act + key * m_->na),
         ctrl_(m_->key_ctrl + key * m_->nu),
         mpos_(m_->key_mpos + 3 * key * m_->nmocap),
         mquat_(m_->key_mquat + 4 * key * m_->nmocap) {
-    if (entity.name.empty()) place_ = "scene base";
+    if (entity.name.empty()) context_ = "scene base";
   }
 
   // Null: the entity has no keyframe.
@@ -64,7 +64,7 @@ class Merger {
     }
     for (int b = 0; b < m_->nbody; ++b) {
       const std::string name = name_of(m_, mjOBJ_BODY, b);
-      const bool ours = entity_.wrapped && name == entity_.name + "/mocap_base";
+      const bool ours = entity_.has_mocap_base && name == entity_.name + "/mocap_base";
       if (m_->body_mocapid[b] < 0 || !owns(name) || ours) continue;
       if (mocap_root < 0) mocap_root = m_->body_mocapid[b];
       mocap.add(m_->body_mocapid[b], 1);
@@ -108,7 +108,7 @@ class Merger {
            const char* field) const {
     if (static_cast<int>(values.size()) > run.size * width) {
       throw ValueError(fmt::format("{}: its keyframe has {} values of {}, but its model has {}",
-                                   place_, values.size(), field, run.size * width));
+                                   context_, values.size(), field, run.size * width));
     }
     if (run.size > 0) std::copy(values.begin(), values.end(), target + run.start * width);
   }
@@ -119,7 +119,7 @@ class Merger {
     const EntityCfg& cfg = entity_.cfg;
     std::vector<Regex> patterns;
     for (const auto& [pattern, value] : cfg.joint_pos) {
-      patterns.emplace_back(pattern, place_ + ": joint_pos");
+      patterns.emplace_back(pattern, context_ + ": joint_pos");
     }
     std::vector<bool> used(patterns.size());
     for (int j = 0; j < m_->njnt; ++j) {
@@ -144,8 +144,8 @@ class Merger {
     if (unused != used.end()) {
       const std::string& pattern = patterns[unused - used.begin()].pattern();
       std::vector<std::string> names =
-          entity_elements(m_, nullptr, entity_.name, mjOBJ_JOINT, place_).names;
-      throw ValueError(fmt::format("{}: joint_pos: '{}' matches no hinge or slide{}", place_,
+          entity_elements(m_, nullptr, entity_.name, mjOBJ_JOINT, context_).names;
+      throw ValueError(fmt::format("{}: joint_pos: '{}' matches no hinge or slide{}", context_,
                                    pattern, suggest(pattern, names)));
     }
   }
@@ -153,7 +153,7 @@ class Merger {
   const std::vector<Attached>& all_;
   const Attached& entity_;
   mjModel* m_;
-  std::string place_;
+  std::string context_;
   mjtNum *qpos_, *qvel_, *act_, *ctrl_, *mpos_, *mquat_;
 };
 

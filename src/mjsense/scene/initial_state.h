@@ -26,8 +26,8 @@ struct Attached {
   std::string name;  // "" for the scene's base, whose elements have no prefix
   EntityCfg cfg;
   bool fixed_base = false;
-  bool wrapped = false;        // attached below "<name>/mocap_base"
-  std::vector<Keyframe> keys;  // at most one of an entity
+  bool has_mocap_base = false;  // attached below "<name>/mocap_base"
+  std::vector<Keyframe> keys;   // at most one of an entity
   // Transform from the root's pose in the entity's own model to its pose in the scene, also applied
   // to the root's pose in keyframes.
   Pose moved{};

@@ -38,7 +38,7 @@ mjfLogHandler install() {
 
 }  // namespace
 
-void leave_no_log_file() {
+void disable_mujoco_log_file() {
   mjLogConfig config = mju_getLogConfig();
   if (std::string_view(config.logfile) != "MUJOCO_LOG.TXT") return;
   config.logto_file = 0;

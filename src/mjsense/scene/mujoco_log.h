@@ -12,7 +12,7 @@ namespace mjsense {
 // Stops MuJoCo from also writing its warnings to MUJOCO_LOG.TXT in the user's current folder. A log
 // file chosen by mju_setLogConfig() is kept. For programs only, because it changes a setting of the
 // process.
-void leave_no_log_file();
+void disable_mujoco_log_file();
 
 // While one exists, MuJoCo's warnings on this thread are appended to `messages` instead of printed.
 // One at a time in the process; the messages of other threads are unaffected.

@@ -11,25 +11,25 @@
 namespace mjsense {
 namespace {
 
-void check_entity(const Scene* scene, std::string_view entity, std::string_view place) {
+void check_entity(const Scene* scene, std::string_view entity, std::string_view context) {
   if (!scene || entity.empty()) return;
   std::vector<std::string> names;
   for (const Entity& e : scene->entities()) {
     if (e.name == entity) return;
     names.push_back(e.name);
   }
-  throw_unknown(place, "entity", entity, names);
+  throw_unknown(context, "entity", entity, names);
 }
 
 }  // namespace
 
-mjtObj obj_type(std::string_view name, std::string_view place) {
+mjtObj obj_type(std::string_view name, std::string_view context) {
   if (const int type = mju_str2Type(std::string(name).c_str()); type > 0)
     return static_cast<mjtObj>(type);
   throw ValueError(fmt::format(
       "{}: unknown object type '{}'; known: body, xbody, joint, geom, site, camera, light, tendon, "
       "actuator, sensor, mesh, hfield, ...",
-      place, name));
+      context, name));
 }
 
 std::string obj_type_name(mjtObj type) {
@@ -104,24 +104,25 @@ int count_of(const mjModel* m, mjtObj type) {
   }
 }
 
-int resolve(const mjModel* model, mjtObj type, std::string_view full_name, std::string_view place) {
+int resolve(const mjModel* model, mjtObj type, std::string_view full_name,
+            std::string_view context) {
   const std::string name(full_name);
   const int id =
       name.empty() ? -1 : mj_name2id(model, type == mjOBJ_XBODY ? mjOBJ_BODY : type, name.c_str());
-  if (id < 0) throw_unknown(place, obj_type_name(type), name, model_names(model, type));
+  if (id < 0) throw_unknown(context, obj_type_name(type), name, model_names(model, type));
   return id;
 }
 
 ResolvedObj resolve(const mjModel* model, const Scene* scene, const ObjRef& ref,
-                    std::string_view place) {
-  check_entity(scene, ref.entity, place);
-  const mjtObj type = obj_type(ref.type, place);
-  return {type, resolve(model, type, ref.full_name(), place)};
+                    std::string_view context) {
+  check_entity(scene, ref.entity, context);
+  const mjtObj type = obj_type(ref.type, context);
+  return {type, resolve(model, type, ref.full_name(), context)};
 }
 
 Elements entity_elements(const mjModel* model, const Scene* scene, std::string_view entity,
-                         mjtObj type, std::string_view place) {
-  check_entity(scene, entity, place);
+                         mjtObj type, std::string_view context) {
+  check_entity(scene, entity, context);
   // The terrain is attached without a prefix; its elements are named "terrain..." without a slash.
   const std::string prefix = entity.empty() ? "" : fmt::format("{}/", entity);
   Elements found;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Resolves names of MuJoCo elements to ids, for sensors. `place` is the prefix of error messages:
+// Resolves names of MuJoCo elements to ids, for sensors. `context` is the prefix of error messages:
 // "sensor 'imu'".
 
 #include <mujoco/mujoco.h>
@@ -16,7 +16,7 @@ namespace mjsense {
 class Scene;
 
 // "body" -> mjOBJ_BODY ...; throws ValueError with the known types.
-mjtObj obj_type(std::string_view name, std::string_view place);
+mjtObj obj_type(std::string_view name, std::string_view context);
 std::string obj_type_name(mjtObj type);
 
 // Names of all elements of a type in model order; "" for unnamed ones. XBODY is treated as BODY.
@@ -26,7 +26,8 @@ int count_of(const mjModel* model, mjtObj type);
 
 // Returns the id of the element with this full name. Throws KeyError with the place and the nearest
 // names.
-int resolve(const mjModel* model, mjtObj type, std::string_view full_name, std::string_view place);
+int resolve(const mjModel* model, mjtObj type, std::string_view full_name,
+            std::string_view context);
 
 struct ResolvedObj {
   mjtObj type = mjOBJ_UNKNOWN;
@@ -36,7 +37,7 @@ struct ResolvedObj {
 // Also throws KeyError for an unknown entity, with the names of the entities (not checked if
 // `scene` is null).
 ResolvedObj resolve(const mjModel* model, const Scene* scene, const ObjRef& ref,
-                    std::string_view place);
+                    std::string_view context);
 
 // Local names and ids of an entity's elements, in model order. With "" as the entity: all elements,
 // with full names. The world body belongs to no entity. Throws KeyError for an unknown entity.
@@ -45,6 +46,6 @@ struct Elements {
   std::vector<int> ids;
 };
 Elements entity_elements(const mjModel* model, const Scene* scene, std::string_view entity,
-                         mjtObj type, std::string_view place);
+                         mjtObj type, std::string_view context);
 
 }  // namespace mjsense

@@ -15,8 +15,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {

@@ -11,12 +11,12 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
-#include "mjsense/scene/daylight.h"
+#include "mjsense/scene/default_lighting.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_check.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {

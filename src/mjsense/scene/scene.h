@@ -16,7 +16,7 @@
 
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/entity.h"
-#include "mjsense/scene/options.h"
+#include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/terrain.h"
 
 namespace mjsense {

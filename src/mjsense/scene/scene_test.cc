@@ -11,7 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/pose.h"
-#include "mjsense/scene/options.h"
+#include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain_tile.h"
@@ -17,9 +17,10 @@ namespace {
 // The configured sub-terrains, or one of each kind.
 auto sub_terrains(const TerrainCfg& cfg) {
   auto all = cfg.sub_terrains;
-  for (std::size_t kind = 0; cfg.sub_terrains.empty() && kind < kWords<SubTerrain>.size(); ++kind) {
+  for (std::size_t kind = 0; cfg.sub_terrains.empty() && kind < kEnumNames<SubTerrain>.size();
+       ++kind) {
     all.emplace_back(
-        kWords<SubTerrain>[kind], SubTerrainCfg { .kind = static_cast<SubTerrain>(kind) });
+        kEnumNames<SubTerrain>[kind], SubTerrainCfg { .kind = static_cast<SubTerrain>(kind) });
   }
   return all;
 }
@@ -43,26 +44,26 @@ std::vector<int> share_columns(const TerrainCfg& cfg, int types) {
 
 }  // namespace
 
-void validate(const SubTerrainCfg& s, std::string_view place) {
+void validate(const SubTerrainCfg& s, std::string_view context) {
   for (double height : s.stone_height)
-    require(std::abs(height) < s.pit_depth, place, "stone_height", height, "less than pit_depth");
+    require(std::abs(height) < s.pit_depth, context, "stone_height", height, "less than pit_depth");
 }
 
-void validate(const TerrainCfg& cfg, std::string_view place) {
+void validate(const TerrainCfg& cfg, std::string_view context) {
   const double side = std::min(cfg.tile_size[0], cfg.tile_size[1]);
-  require(cfg.resolution <= side / 2, place, "resolution", cfg.resolution,
+  require(cfg.resolution <= side / 2, context, "resolution", cfg.resolution,
           "positive and at most half a tile (m)");
-  require(cfg.max_init_level < cfg.levels, place, "max_init_level", cfg.max_init_level,
+  require(cfg.max_init_level < cfg.levels, context, "max_init_level", cfg.max_init_level,
           fmt::format("less than the {} levels", cfg.levels));
   double total = 0;
   for (const auto& [name, sub] : sub_terrains(cfg)) {
     require(sub.platform_width < side || cfg.terrain_type == TerrainType::kPlane,
-            fmt::format("{}: sub_terrains['{}']", place, name), "platform_width",
+            fmt::format("{}: sub_terrains['{}']", context, name), "platform_width",
             sub.platform_width, fmt::format("less than the tile's {} m", side));
     total += sub.proportion;
   }
   if (total <= 0)
-    throw ValueError(fmt::format("{}: the proportions of the sub-terrains add up to 0", place));
+    throw ValueError(fmt::format("{}: the proportions of the sub-terrains add up to 0", context));
 }
 
 Terrain::Terrain(TerrainCfg cfg) : cfg_(std::move(cfg)) {

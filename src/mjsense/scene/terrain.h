@@ -26,11 +26,11 @@ namespace mjsense {
 // clang-format on
 enum class SubTerrain { kFlat, kRough, kWaves, kSlope, kStairs, kSteppingStones };
 template <>
-inline constexpr std::array<std::string_view, 6> kWords<SubTerrain>{
+inline constexpr std::array<std::string_view, 6> kEnumNames<SubTerrain>{
     "flat", "rough", "waves", "slope", "stairs", "stepping_stones"};
 
 struct SubTerrainCfg {
-  Word<SubTerrain> kind;
+  NamedEnum<SubTerrain> kind;
   double proportion = 1.0;
   bool inverted = false;
   double platform_width = 2.0;
@@ -71,16 +71,16 @@ void visit_fields(V& v, SubTerrainCfg& c) {
 }
 
 // Checks relations between the fields.
-void validate(const SubTerrainCfg& cfg, std::string_view place);
+void validate(const SubTerrainCfg& cfg, std::string_view context);
 
 enum class TerrainType { kPlane, kGenerator };
 template <>
-inline constexpr std::array<std::string_view, 2> kWords<TerrainType>{"plane", "generator"};
+inline constexpr std::array<std::string_view, 2> kEnumNames<TerrainType>{"plane", "generator"};
 
 // Generated tiles: levels along +x with increasing difficulty, types along +y. The grid is centred
 // on the world origin, and tiles meet at z = 0.
 struct TerrainCfg {
-  Word<TerrainType> terrain_type;
+  NamedEnum<TerrainType> terrain_type;
   std::vector<std::pair<std::string, SubTerrainCfg>> sub_terrains;
   int levels = 5;
   int types = 0;
@@ -115,7 +115,7 @@ void visit_fields(V& v, TerrainCfg& c) {
     "MuJoCo's headlight is the only light.");
 }
 
-void validate(const TerrainCfg& cfg, std::string_view place);
+void validate(const TerrainCfg& cfg, std::string_view context);
 
 class Terrain {
  public:

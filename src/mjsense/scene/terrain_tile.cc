@@ -196,7 +196,7 @@ void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centr
 double build_tile(const SubTerrainCfg& cfg, Tile& tile) {
   using Build = double (*)(const SubTerrainCfg&, Tile&);
   constexpr Build kBuild[] = {flat, rough, waves, slope, stairs, stepping_stones};
-  static_assert(std::size(kBuild) == kWords<SubTerrain>.size());
+  static_assert(std::size(kBuild) == kEnumNames<SubTerrain>.size());
   return kBuild[static_cast<std::size_t>(static_cast<SubTerrain>(cfg.kind))](cfg, tile);
 }
 

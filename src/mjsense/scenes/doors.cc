@@ -12,8 +12,8 @@
 namespace mjsense {
 namespace {
 
-constexpr double kLeastWidth = 0.4;  // m
-constexpr double kBothWays = 0.2;    // rad, minimum range in both directions of a swing door
+constexpr double kMinWidth = 0.4;        // m
+constexpr double kBothDirections = 0.2;  // rad, minimum range in both directions of a swing door
 
 struct Extent {
   std::array<double, 3> low{1e10, 1e10, 1e10}, high{-1e10, -1e10, -1e10};
@@ -62,7 +62,7 @@ bool is_leaf(const mjModel* m, int body, int joint) {
     if (std::abs(axis[i]) > std::abs(axis[up])) up = i;
   }
   const double width = std::max(size[(up + 1) % 3], size[(up + 2) % 3]);
-  return size[up] >= Door::kLeastHeight && width >= kLeastWidth;
+  return size[up] >= Door::kMinHeight && width >= kMinWidth;
 }
 
 bool called_handle(std::string name) {
@@ -83,7 +83,7 @@ void find_handle(const mjModel* m, Door& door) {
   door.handle = door.body;
   for (const bool by_name : {true, false}) {
     for (int body = door.body + 1; body < m->nbody; ++body) {
-      if (!is_below(m, body, door.body)) continue;
+      if (!is_descendant_or_self(m, body, door.body)) continue;
       const int hinge = hinge_of(m, body);
       if (by_name ? !called_handle(name_of(m, mjOBJ_BODY, body)) : hinge < 0) continue;
       door.handle = body;
@@ -113,7 +113,7 @@ std::vector<Door> find_doors(const mjModel* m, std::string_view robot_prefix) {
     // Shut is the model's reference position: 0, or the nearest end of the range.
     door.shut = std::clamp(0.0, low, high);
     door.open = high - door.shut >= door.shut - low ? high : low;
-    door.swings = low < -kBothWays && high > kBothWays;
+    door.swings = low < -kBothDirections && high > kBothDirections;
     find_handle(m, door);
     doors.push_back(door);
   }
@@ -129,10 +129,10 @@ Vec3 leaf_middle(const mjModel* m, const mjData* d, const Door& door) {
 
 Vec3 opening_direction(const mjModel* m, const mjData* d, const Door& door) {
   const Vec3 axis = vec3(d->xaxis + 3 * door.joint), anchor = vec3(d->xanchor + 3 * door.joint);
-  Vec3 way = cross(axis, leaf_middle(m, d, door) - anchor);
-  if (door.open < door.shut) way = -way;
-  way.z = 0;
-  return normalized(way);
+  Vec3 direction = cross(axis, leaf_middle(m, d, door) - anchor);
+  if (door.open < door.shut) direction = -direction;
+  direction.z = 0;
+  return normalized(direction);
 }
 
 }  // namespace mjsense

@@ -12,9 +12,9 @@
 
 namespace mjsense {
 
-// A leaf on a hinge with a vertical axis, higher than kLeastHeight.
+// A leaf on a hinge with a vertical axis, higher than kMinHeight.
 struct Door {
-  static constexpr double kLeastHeight = 1.4;  // m
+  static constexpr double kMinHeight = 1.4;  // m
 
   int joint = -1, body = -1;
   int handle = -1;        // body: the handle, or the leaf itself if it has none

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scene/parts.h"
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
+#include "mjsense/scene/model_parts.h"
 
 namespace mjsense {
 namespace {
@@ -82,7 +82,7 @@ void set_free(mjSpec* spec, const SceneEntityCfg& entity, const std::string& who
 
 }  // namespace
 
-std::string model_path(const std::string& name, std::string_view place) {
+std::string model_path(const std::string& name, std::string_view context) {
   if (!name.starts_with(kPackage)) return name;
   const std::string inside = name.substr(kPackage.size());
   const std::string package = inside.substr(0, inside.find('/'));
@@ -92,17 +92,17 @@ std::string model_path(const std::string& name, std::string_view place) {
     if (fs::is_regular_file(folder / inside, ignored)) return (folder / inside).string();
     there = there || fs::is_directory(folder / package, ignored);
   }
-  throw ValueError(
-      fmt::format("{}: {} '{}': pip install {} (outside of Python, the environment variable "
-                  "MJSENSE_PACKAGES lists the site-packages folders to look in)",
-                  place, there ? "the installed package does not have" : "no installed package has",
-                  inside, distribution(package)));
+  throw ValueError(fmt::format(
+      "{}: {} '{}': pip install {} (outside of Python, the environment variable "
+      "MJSENSE_PACKAGES lists the site-packages folders to look in)",
+      context, there ? "the installed package does not have" : "no installed package has", inside,
+      distribution(package)));
 }
 
-std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view place) {
+std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view context) {
   if (!entity.free && entity.without.empty() && !entity.inertia_groups && entity.hidden_group < 0)
     return nullptr;
-  const std::string who = fmt::format("{}, entity '{}'", place, entity.name);
+  const std::string who = fmt::format("{}, entity '{}'", context, entity.name);
   std::shared_ptr<mjSpec> spec = compose_model({.path = model_path(entity.model, who)}, {}, who);
   for (const std::string& body : entity.without) leave_out(spec.get(), body, who);
   if (entity.inertia_groups) {

@@ -16,9 +16,9 @@ namespace mjsense {
 // package. It is searched in the folders listed in the environment variable MJSENSE_PACKAGES (set
 // by the Python package), then in the active virtual environment. Any other name is returned
 // unchanged. Throws ValueError that says what to install.
-std::string model_path(const std::string& name, std::string_view place);
+std::string model_path(const std::string& name, std::string_view context);
 
 // Returns the model with the scene's changes; null if there are none. Throws ValueError, KeyError.
-std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view place);
+std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view context);
 
 }  // namespace mjsense

@@ -9,12 +9,12 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
+#include "mjsense/core/name_matching.h"
 #include "mjsense/observe/frame.h"
-#include "mjsense/scene/parts.h"
+#include "mjsense/scene/model_parts.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/entity_model.h"
-#include "mjsense/scenes/finish_spec.h"
+#include "mjsense/scenes/final_spec_edits.h"
 #include "mjsense/scenes/generators/generator.h"
 
 namespace mjsense {
@@ -45,13 +45,13 @@ bool is_free(const mjModel* m, int body) {
 bool touches(const mjModel* m, int body) {
   for (int g = 0; g < m->ngeom; ++g) {
     const bool solid = m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
-    if (solid && is_below(m, m->geom_bodyid[g], body)) return true;
+    if (solid && is_descendant_or_self(m, m->geom_bodyid[g], body)) return true;
   }
   return false;
 }
 
 // Smallest horizontal or vertical extent of a shape, m.
-double least_extent(const ObjectShape& shape) {
+double min_extent(const ObjectShape& shape) {
   double low[3] = {1e10, 1e10, 1e10}, high[3] = {-1e10, -1e10, -1e10};
   for (Vec3 p : shape.points) {
     for (int i = 0; i < 3; ++i) {
@@ -59,14 +59,14 @@ double least_extent(const ObjectShape& shape) {
       high[i] = std::max(high[i], p[i]);
     }
   }
-  double least = 1e10;
-  for (int i = 0; i < 3; ++i) least = std::min(least, high[i] - low[i]);
-  return least;
+  double minimum = 1e10;
+  for (int i = 0; i < 3; ++i) minimum = std::min(minimum, high[i] - low[i]);
+  return minimum;
 }
 
 // A gripper grasps an object at its smallest extent.
 bool can_be_held(const ObjectShape& shape) {
-  return least_extent(shape) <= kHand && shape.reach <= kReach;
+  return min_extent(shape) <= kHand && shape.reach <= kReach;
 }
 
 // A static box with horizontal top; any of its axes may be vertical.
@@ -132,7 +132,7 @@ EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
   check_fields(cfg_, "");
   if (!cfg_.generator.empty()) generated_ = generate(cfg_);
   for (const SceneEntityCfg& entity : cfg_.entities)
-    edited_.push_back(edited_model(entity, place()));
+    edited_.push_back(edited_model(entity, context()));
   make_meshes();
 }
 
@@ -163,7 +163,7 @@ void EpisodeScene::make_meshes() {
   meshes_ = std::make_shared<ObjectMeshes>(std::move(things), objects);
 }
 
-std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.name); }
+std::string EpisodeScene::context() const { return fmt::format("scene '{}'", cfg_.name); }
 
 SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   SceneCfg scene;
@@ -182,7 +182,7 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
     if (edited_[i]) {
       entity.model.spec = edited_[i].get();
     } else {
-      entity.model.path = model_path(one.model, place());
+      entity.model.path = model_path(one.model, context());
     }
     entity.pos = one.pos;
     entity.quat = one.quat;
@@ -219,7 +219,7 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
 void EpisodeScene::bind(Simulation& simulation) {
   simulation_ = &simulation;
   if (!cfg_.vary.empty())
-    variation_ = std::make_unique<SceneVariation>(cfg_.vary, simulation, place());
+    variation_ = std::make_unique<SceneVariation>(cfg_.vary, simulation, context());
   make_sizes();
 }
 
@@ -232,7 +232,7 @@ void EpisodeScene::make_sizes() {
     bodies.push_back(object.body);
     sizes.push_back(object.sizes);
   }
-  sizes_ = std::make_unique<ObjectSizes>(*simulation_, bodies, std::move(sizes), place());
+  sizes_ = std::make_unique<ObjectSizes>(*simulation_, bodies, std::move(sizes), context());
 }
 
 const ObjectShape& EpisodeScene::shape(int world, int object) const {
@@ -257,8 +257,9 @@ void EpisodeScene::find_objects(std::string_view robot_prefix) {
     };
     if (is_placed(entity) && std::ranges::none_of(objects_, of_entity)) {
       throw ValueError(fmt::format(
-          "{}: entity '{}' is {}, so its position is undefined: set its pos, or remove it", place(),
-          entity.name, cfg_.objects.empty() ? "not graspable" : "not among the objects"));
+          "{}: entity '{}' is {}, so its position is undefined: set its pos, or remove it",
+          context(), entity.name,
+          cfg_.objects.empty() ? "not graspable" : "not among the objects"));
     }
   }
 }
@@ -277,9 +278,9 @@ void EpisodeScene::collect_objects(std::string_view robot_prefix) {
     return object;
   };
   for (const SceneObjectCfg& one : cfg_.objects) {
-    const int body = resolve(model_, mjOBJ_BODY, one.body, place());
+    const int body = resolve(model_, mjOBJ_BODY, one.body, context());
     if (!is_free(model_, body))
-      throw ValueError(fmt::format("{}: object '{}' has no free joint", place(), one.body));
+      throw ValueError(fmt::format("{}: object '{}' has no free joint", context(), one.body));
     SceneObject object = found(body, last_part(one.body), one.sizes.value_or(cfg_.sizes));
     object.text = one.text;
     object.others = one.other_texts;
@@ -308,7 +309,7 @@ void EpisodeScene::find_regions() {
   region_bodies_.clear();
   for (const SceneRegionCfg& one : cfg_.regions) {
     const LevelBox on =
-        surface_named(model_, one.on, fmt::format("{}, region '{}'", place(), one.name));
+        surface_named(model_, one.on, fmt::format("{}, region '{}'", context(), one.name));
     const auto area = [](const std::array<double, 4>& a) { return Area{a[0], a[1], a[2], a[3]}; };
     Region region{};
     region.height = on.top;
@@ -350,7 +351,7 @@ void EpisodeScene::find_furniture() {
   furniture_.clear();
   for (const SceneVaryCfg& one : cfg_.vary) {
     if (one.what != VaryKind::kBody) continue;
-    const Regex pattern(one.pattern, place());
+    const Regex pattern(one.pattern, context());
     for (int body = 1; body < model_->nbody; ++body) {
       if (pattern.fullmatch(name_of(model_, mjOBJ_BODY, body)))
         furniture_.insert_or_assign(body, one);
@@ -389,7 +390,7 @@ std::vector<Pose> EpisodeScene::elsewhere(int geom) const {
 int EpisodeScene::draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const {
   double opening = 0;
   for (const MoveGroup& group : robot.groups()) opening = std::max(opening, group.max_opening);
-  const auto fits = [&](int i) { return least_extent(shape(world, i)) <= opening - kBeside; };
+  const auto fits = [&](int i) { return min_extent(shape(world, i)) <= opening - kBeside; };
   const bool some = std::ranges::any_of(of, fits);
   for (;;) {
     const int drawn = of[rng.below(static_cast<std::uint32_t>(of.size()))];
@@ -435,8 +436,9 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
   std::fill(present, present + n, 1);
   if (counts_objects()) {
     Rng draw(seed, 0, stream_of("scene/count"), episode);
-    const int most = std::min(cfg_.count[1], n), least = std::min(cfg_.count[0], n);
-    int many = least + static_cast<int>(draw.below(static_cast<std::uint32_t>(most - least + 1)));
+    const int maximum = std::min(cfg_.count[1], n), minimum = std::min(cfg_.count[0], n);
+    int many =
+        minimum + static_cast<int>(draw.below(static_cast<std::uint32_t>(maximum - minimum + 1)));
     std::fill(present, present + n, 0);
     for (int i : wanted) present[i] = 1;
     many -= static_cast<int>(wanted.size());
@@ -450,15 +452,15 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
   }
   if (!regions_.empty() && n > 0) {
     const std::vector<Region> regions = regions_of(world);
-    std::vector<Resting> resting;
+    std::vector<PlacedObject> resting;
     std::vector<Pose> poses(n);
     std::vector<int> region_of(n);
     for (int i = 0; i < n; ++i) {
       resting.push_back({&shape(world, i), objects_[i].rests});
       poses[i] = away(i);
     }
-    lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions,
-            {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
+    place_objects(resting, wanted, {present, static_cast<std::size_t>(n)}, regions,
+                  {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
     std::vector<int> absent;
     for (int i = 0; i < n; ++i) {
       put(i, poses[i], state);
@@ -545,7 +547,7 @@ std::string EpisodeScene::fault(const World& world) const {
       const int body = objects_[k].body;
       if (m->body_rootid[a] != body && m->body_rootid[b] != body) continue;
       const int other = m->body_rootid[a] == body ? b : a;
-      return fmt::format("{}: '{}' starts {:.1f} mm inside '{}'", place(), objects_[k].kind,
+      return fmt::format("{}: '{}' starts {:.1f} mm inside '{}'", context(), objects_[k].kind,
                          -1000 * contact.dist, name_of(m, mjOBJ_BODY, other));
     }
   }

@@ -14,8 +14,8 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/robots/state_row.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/scenes/layout.h"
 #include "mjsense/scenes/object_meshes.h"
+#include "mjsense/scenes/object_placement.h"
 #include "mjsense/scenes/object_sizes.h"
 #include "mjsense/scenes/scene_file.h"
 #include "mjsense/scenes/scene_variation.h"
@@ -96,7 +96,7 @@ class EpisodeScene {
   // Makes an object the target of the episode, at its position in `state`.
   void set_target(int world, int target, const StateRow& state);
   // Indices of the objects to pick up, and of the receptacles.
-  std::vector<int> things() const { return where(false); }
+  std::vector<int> pickup_objects() const { return where(false); }
   std::vector<int> receptacles() const { return where(true); }
   // Varies lights, colours, furniture and object sizes; call it before sample(). Returns false if
   // nothing varies.
@@ -123,7 +123,7 @@ class EpisodeScene {
   void make_sizes();
   void draw_sizes(int world, std::uint64_t seed, std::uint64_t episode);
   std::vector<int> where(bool receptacle) const;
-  std::string place() const;
+  std::string context() const;
 
   SceneFileCfg cfg_;
   const mjModel* model_ = nullptr;

@@ -15,23 +15,25 @@ namespace mjsense {
 namespace {
 
 constexpr DataFolder kScenes{"scene", "scenes/", "/scene.toml", true};
-constexpr int kMostBases = 8;
+constexpr int kMaxBases = 8;
 
 void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
   SceneFileCfg own;
   read_toml_fields(file.text, file.path, own);
   if (!own.extends.empty()) {
-    if (depth == kMostBases)
+    if (depth == kMaxBases)
       throw ValueError(fmt::format("{}: the scenes extend each other in a cycle", file.path));
     const bool is_path = own.extends.ends_with(".toml");
-    read(kScenes.find(is_path ? beside(file.path, own.extends) : own.extends), cfg, depth + 1);
+    read(kScenes.find(is_path ? resolve_relative(file.path, own.extends) : own.extends), cfg,
+         depth + 1);
   }
   read_toml_fields(file.text, file.path, cfg);
   // Paths in the file are relative to its folder.
   if (!own.entities.empty()) {
-    for (SceneEntityCfg& entity : cfg.entities) entity.model = beside(file.path, entity.model);
+    for (SceneEntityCfg& entity : cfg.entities)
+      entity.model = resolve_relative(file.path, entity.model);
   }
-  if (!own.base.empty()) cfg.base = beside(file.path, own.base);
+  if (!own.base.empty()) cfg.base = resolve_relative(file.path, own.base);
 }
 
 // Removes the suffix ":7" and returns the number; empty if there is no such suffix.

@@ -7,8 +7,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {
@@ -32,7 +32,8 @@ ObjectMeshes::ObjectMeshes(SceneCfg things, std::span<const Object> objects) {
   for (const Object& object : objects) {
     const int body = resolve(m, mjOBJ_BODY, object.body, "sizes of objects");
     for (int g = 0; g < m->ngeom; ++g) {
-      if (m->geom_type[g] != mjGEOM_MESH || !is_below(m, m->geom_bodyid[g], body)) continue;
+      if (m->geom_type[g] != mjGEOM_MESH || !is_descendant_or_self(m, m->geom_bodyid[g], body))
+        continue;
       const int id = m->geom_dataid[g];
       const std::string name = name_of(m, mjOBJ_MESH, id);
       if (std::ranges::count(meshes_, name, &Mesh::name) > 0) continue;

@@ -38,7 +38,7 @@ ObjectSizes::Own<T> ObjectSizes::own(mjBatch* batch, const char* field, const T*
 }
 
 ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
-                         std::vector<std::vector<double>> sizes, std::string_view place)
+                         std::vector<std::vector<double>> sizes, std::string_view context)
     : m_(simulation.scene().model()), sizes_(std::move(sizes)) {
   mjBatch* batch = simulation.worlds().batch();
   geom_size_ = own(batch, "geom_size", m_->geom_size);
@@ -64,18 +64,18 @@ ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
     object.body = bodies[i];
     object.dof = m_->body_dofadr[bodies[i]];
     for (int b = bodies[i]; b < m_->nbody; ++b) {
-      if (!is_below(m_, b, bodies[i])) continue;
+      if (!is_descendant_or_self(m_, b, bodies[i])) continue;
       if (b != bodies[i] && m_->body_jntnum[b] > 0)
         throw ValueError(fmt::format(
             "{}: object '{}' has a moving part, '{}', so it cannot be scaled: sizes must be [1, 1]",
-            place, name_of(m_, mjOBJ_BODY, bodies[i]), name_of(m_, mjOBJ_BODY, b)));
+            context, name_of(m_, mjOBJ_BODY, bodies[i]), name_of(m_, mjOBJ_BODY, b)));
       object.bodies.push_back(b);
     }
     for (int s = 0; s < m_->nsite; ++s) {
-      if (is_below(m_, m_->site_bodyid[s], bodies[i])) object.sites.push_back(s);
+      if (is_descendant_or_self(m_, m_->site_bodyid[s], bodies[i])) object.sites.push_back(s);
     }
     for (int g = 0; g < m_->ngeom; ++g) {
-      if (!is_below(m_, m_->geom_bodyid[g], bodies[i])) continue;
+      if (!is_descendant_or_self(m_, m_->geom_bodyid[g], bodies[i])) continue;
       object.geoms.push_back(g);
       if (m_->geom_type[g] != mjGEOM_MESH || sizes_[i].size() < 2) continue;
       MeshGeom& mesh = object.meshes.emplace_back();
@@ -94,12 +94,13 @@ ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
 void ObjectSizes::widen(mjBatch* batch, int body, const std::vector<double>& sizes) const {
   // The batch's own copy of the model, which is not shared yet.
   double* boxes = const_cast<double*>(mjb_model(batch)->bvh_aabb);
-  const double *from = m_->bvh_aabb, least = sizes.front(), most = sizes.back();
+  const double *from = m_->bvh_aabb, minimum = sizes.front(), maximum = sizes.back();
   for (int n = m_->body_bvhadr[body]; n < m_->body_bvhadr[body] + m_->body_bvhnum[body]; ++n) {
     for (int i = 0; i < 3; ++i) {
       const double a = from[6 * n + i] - from[6 * n + 3 + i];
       const double b = from[6 * n + i] + from[6 * n + 3 + i];
-      const double low = std::min(least * a, most * a), high = std::max(least * b, most * b);
+      const double low = std::min(minimum * a, maximum * a),
+                   high = std::max(minimum * b, maximum * b);
       boxes[6 * n + i] = 0.5 * (low + high);
       boxes[6 * n + 3 + i] = 0.5 * (high - low);
     }

@@ -25,7 +25,7 @@ class ObjectSizes {
   // `bodies` have a free joint, `sizes` are the sizes of each, and their meshes were added by
   // ObjectMeshes. Throws ValueError for an object with moving parts.
   ObjectSizes(Simulation& simulation, std::span<const int> bodies,
-              std::vector<std::vector<double>> sizes, std::string_view place);
+              std::vector<std::vector<double>> sizes, std::string_view context);
 
   double size(int object, int step) const { return sizes_[object][step]; }
   // Sets the index of the size of each object in this world. Writes the world's rows of the model;

@@ -12,7 +12,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
-#include "mjsense/scene/spec.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scenes/episode_scene.h"
 
 namespace mjsense {
@@ -117,14 +117,14 @@ void expect_same(const mjModel* found, const mjModel* wanted) {
   const auto near = [](const char* what, const double* a, const double* b, int n, double scale) {
     for (int i = 0; i < n; ++i) EXPECT_NEAR(a[i], b[i], 2e-6 * scale) << what << " " << i;
   };
-  const auto most = [](const double* x, int n) {
+  const auto maximum = [](const double* x, int n) {
     double greatest = 0;
     for (int i = 0; i < n; ++i) greatest = std::max(greatest, std::abs(x[i]));
     return greatest;
   };
 #define SAME(field, first, count, width)                                            \
   near(#field, found->field + (width) * (first), wanted->field + (width) * (first), \
-       (count) * (width), most(wanted->field + (width) * (first), (count) * (width)))
+       (count) * (width), maximum(wanted->field + (width) * (first), (count) * (width)))
   const int body = mj_name2id(wanted, mjOBJ_BODY, "a/thing");
   const int geom = wanted->body_geomadr[body], geoms = wanted->body_geomnum[body] + 1;
   ASSERT_EQ(geoms, 5);
@@ -261,15 +261,15 @@ TEST(ObjectSizes, ObjectsMoveWithFurniture) {
   Played played(files.cfg);
   const mjModel* m = played.sim->model();
   const int body = mj_name2id(m, mjOBJ_BODY, "room/table");
-  double least = 1e9, most = -1e9;
+  double minimum = 1e9, maximum = -1e9;
   for (std::uint64_t episode = 0; episode < 20; ++episode) {
     played.start(episode);
     const ModelPtr here = played.model(0);
     const double* at = here->body_pos + 3 * body;
     EXPECT_LE(std::abs(at[0] - 1), .3);
     EXPECT_LE(std::abs(at[2]), .1);
-    least = std::min(least, at[2]);
-    most = std::max(most, at[2]);
+    minimum = std::min(minimum, at[2]);
+    maximum = std::max(maximum, at[2]);
     EXPECT_NEAR(played.scene.support_height(0), .51 + at[2], 1e-12);
     const double* qpos = state_row(played.sim->worlds(), 0).qpos;
     for (const SceneObject& object : played.scene.objects()) {
@@ -280,7 +280,7 @@ TEST(ObjectSizes, ObjectsMoveWithFurniture) {
       EXPECT_LT(p[2], .51 + at[2] + .1);
     }
   }
-  EXPECT_GT(most - least, .08);
+  EXPECT_GT(maximum - minimum, .08);
 }
 
 TEST(ObjectSizes, FaultsNameTheSetting) {

@@ -49,7 +49,7 @@ bool RestingRobot::of_robot(int geom) const {
   const int body = model_->geom_bodyid[geom];
   if (!robot_.prefix().empty() && name_of(model_, mjOBJ_BODY, body).starts_with(robot_.prefix()))
     return true;
-  return robot_.base_body() > 0 && is_below(model_, body, robot_.base_body());
+  return robot_.base_body() > 0 && is_descendant_or_self(model_, body, robot_.base_body());
 }
 
 Footprint RestingRobot::footprint() const {
@@ -65,16 +65,16 @@ Footprint RestingRobot::trunk() const {
             const auto holds = [&](const MoveGroup& group) {
               const bool limb = group.kind == GroupKind::kArm || group.kind == GroupKind::kGripper;
               return limb && group.root_body > 0 &&
-                     is_below(model_, model_->geom_bodyid[g], group.root_body);
+                     is_descendant_or_self(model_, model_->geom_bodyid[g], group.root_body);
             };
             return of_robot(g) && std::ranges::none_of(robot_.groups(), holds);
           },
           pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
 }
 
-Occupancy RestingRobot::occupancy(double height,
-                                  const std::function<std::vector<Pose>(int)>& elsewhere,
-                                  const std::function<bool(int)>& without) const {
+OccupancyGrid RestingRobot::occupancy(double height,
+                                      const std::function<std::vector<Pose>(int)>& elsewhere,
+                                      const std::function<bool(int)>& without) const {
   OccupancyCfg cfg;
   cfg.high = height + kHeadroom;
   cfg.elsewhere = elsewhere;

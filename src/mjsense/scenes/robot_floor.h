@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "mjsense/robots/robot.h"
-#include "mjsense/scenes/occupancy.h"
+#include "mjsense/scenes/occupancy_grid.h"
 
 namespace mjsense {
 
@@ -30,9 +30,9 @@ class RestingRobot {
   // Obstacles for a robot of this height (m): all colliding geoms except the robot, loose objects
   // and geoms for which `without` is true. Doors are at their model positions; furniture occupies
   // all positions that `elsewhere` returns (OccupancyCfg).
-  Occupancy occupancy(double height,
-                      const std::function<std::vector<Pose>(int geom)>& elsewhere = {},
-                      const std::function<bool(int geom)>& without = {}) const;
+  OccupancyGrid occupancy(double height,
+                          const std::function<std::vector<Pose>(int geom)>& elsewhere = {},
+                          const std::function<bool(int geom)>& without = {}) const;
 
  private:
   struct Delete {

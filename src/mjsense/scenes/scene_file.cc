@@ -23,8 +23,9 @@ void check_sizes(const std::array<double, 2>& sizes, const std::string& who) {
 
 }  // namespace
 
-void validate(const SceneFileCfg& cfg, std::string_view place) {
-  const std::string who = fmt::format("{}{}scene '{}'", place, place.empty() ? "" : ", ", cfg.name);
+void validate(const SceneFileCfg& cfg, std::string_view context) {
+  const std::string who =
+      fmt::format("{}{}scene '{}'", context, context.empty() ? "" : ", ", cfg.name);
   if (cfg.name.empty()) throw ValueError(who + ": it has no name");
   if (!cfg.generator.empty() && !cfg.base.empty())
     throw ValueError(

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "mjsense/core/fields.h"
-#include "mjsense/scene/daylight.h"
-#include "mjsense/scene/options.h"
+#include "mjsense/scene/default_lighting.h"
+#include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense {
@@ -118,11 +118,11 @@ void visit_fields(V& v, SceneRobotCfg& c) {
 
 enum class VaryKind { kLight, kMaterial, kGeom, kBody };
 template <>
-inline constexpr std::array<std::string_view, 4> kWords<VaryKind>{"light", "material", "geom",
-                                                                  "body"};
+inline constexpr std::array<std::string_view, 4> kEnumNames<VaryKind>{"light", "material", "geom",
+                                                                      "body"};
 
 struct SceneVaryCfg {
-  Word<VaryKind> what;
+  NamedEnum<VaryKind> what;
   std::string pattern;
   std::array<double, 2> brightness{1, 1};
   double hue = 0;
@@ -246,6 +246,6 @@ void visit_fields(V& v, SceneFileCfg& c) {
 }
 
 // Checks relations between the fields. Throws ValueError.
-void validate(const SceneFileCfg& cfg, std::string_view place);
+void validate(const SceneFileCfg& cfg, std::string_view context);
 
 }  // namespace mjsense

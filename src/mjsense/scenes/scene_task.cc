@@ -39,7 +39,7 @@ std::vector<int> SceneTask::adopt_scene(int world, const StateRow& state) {
   return scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), state);
 }
 
-std::string SceneTask::place() const {
+std::string SceneTask::context() const {
   return fmt::format("task '{}': scene '{}'", name(), scene_.cfg().name);
 }
 

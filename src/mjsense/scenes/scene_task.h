@@ -17,7 +17,7 @@ class SceneTask : public Task {
   SceneTask(TaskCfg cfg, std::string_view own_scene);
   SceneCfg scene_cfg() const override { return scene_.scene_cfg(robot_entity()); }
   void bind(const std::shared_ptr<Simulation>& simulation) override;
-  std::string start_fault(const World& world) const override { return scene_.fault(world); }
+  std::string start_error(const World& world) const override { return scene_.fault(world); }
   std::vector<int> absentees() const override { return scene_.absentees(); }
   bool present(int world, int body) const override { return scene_.body_present(world, body); }
 
@@ -33,7 +33,7 @@ class SceneTask : public Task {
   // Calls EpisodeScene::adopt() for this world's episode.
   std::vector<int> adopt_scene(int world, const StateRow& state);
   // Prefix of error messages: "task 'pick': scene 'table'".
-  std::string place() const;
+  std::string context() const;
 
  private:
   EpisodeScene scene_;

@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
+#include "mjsense/core/name_matching.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/scene/resolve.h"
 
@@ -39,9 +39,9 @@ T* expand(mjBatch* batch, const char* field, T* before) {
 
 double around(Rng& rng, double half) { return half > 0 ? rng.uniform(-half, half) : 0.0; }
 
-// Rotates a direction by at most `most` rad; uniform within the cone.
-Vec3 turned(Vec3 axis, double most, Rng& rng) {
-  const double cosine = rng.uniform(std::cos(most), 1.0),
+// Rotates a direction by at most `maximum` rad; uniform within the cone.
+Vec3 turned(Vec3 axis, double maximum, Rng& rng) {
+  const double cosine = rng.uniform(std::cos(maximum), 1.0),
                angle = rng.uniform(0, 2 * std::numbers::pi);
   const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
   axis = normalized(axis);
@@ -72,14 +72,14 @@ void shift_colour(double hue, double saturation, double brightness, float rgb[3]
 }
 
 SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation,
-                               std::string_view place)
+                               std::string_view context)
     : model_(simulation.model()) {
   mjBatch* batch = simulation.worlds().batch();
   for (SceneVaryCfg& one : cfg) {
     Part part;
     const mjtObj type = object_type(one.what);
     const std::vector<std::string> names = model_names(model_, type);
-    const std::string who = fmt::format("{}, vary {}", place, one.what.text());
+    const std::string who = fmt::format("{}, vary {}", context, one.what.text());
     const Regex pattern(one.pattern, who);
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (!names[i].empty() && pattern.fullmatch(names[i])) part.ids.push_back(static_cast<int>(i));

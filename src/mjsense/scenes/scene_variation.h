@@ -15,8 +15,8 @@ namespace mjsense {
 class SceneVariation {
  public:
   // Throws KeyError for a pattern that matches nothing or an unknown texture, and ValueError for a
-  // body that moves. `place` is the prefix of messages.
-  SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place);
+  // body that moves. `context` is the prefix of messages.
+  SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view context);
 
   bool varies() const { return !parts_.empty(); }
   // body_pos of this world; the model's own array if body positions do not vary.

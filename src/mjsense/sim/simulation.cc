@@ -246,7 +246,7 @@ void Simulation::initialize_scene() {
       throw ValueError(fmt::format("sensor '{}': reads itself", sensor.name()));
     }
     open.push_back(&sensor);
-    for (const std::string& key : sensor.reads()) {
+    for (const std::string& key : sensor.initialization_dependencies()) {
       guarded(sensor, [&] { visit(scene_->sensor(key)); });
     }
     open.pop_back();
@@ -387,7 +387,7 @@ void Simulation::step(int control_steps, WorldIds ids) {
     const bool last = k + 1 == control_steps;
     Borrowed due(*this);
     collect(due->slots, [last](Slot& s) {
-      const bool wanted = s.sensor->eager() || (last && s.read);
+      const bool wanted = s.sensor->needs_every_step() || (last && s.read);
       if (last) s.read = false;
       return wanted;
     });
@@ -407,7 +407,7 @@ void Simulation::set_control(int every, Control control) {
 void Simulation::reset(WorldIds ids, int key) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
-  collect(due->slots, [](Slot& s) { return s.sensor->eager(); });
+  collect(due->slots, [](Slot& s) { return s.sensor->needs_every_step(); });
   mark_stale(sorted);
   compute(due->slots, sorted, Change::kReset, key);
 }
@@ -415,7 +415,7 @@ void Simulation::reset(WorldIds ids, int key) {
 void Simulation::forward(WorldIds ids) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
-  collect(due->slots, [](Slot& s) { return s.sensor->eager(); });
+  collect(due->slots, [](Slot& s) { return s.sensor->needs_every_step(); });
   mark_stale(sorted);
   compute(due->slots, sorted, Change::kForward);
 }

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "mjsense/core/debug_shapes.h"
-#include "mjsense/core/parallel.h"
 #include "mjsense/core/sensor.h"
-#include "mjsense/core/shared.h"
+#include "mjsense/core/shared_cache.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/worlds/worlds.h"
 
@@ -126,7 +126,7 @@ class Simulation {
   std::vector<std::unique_ptr<Scratch>> scratch_;
 
   SimulationCfg cfg_;
-  Shared shared_;
+  SharedCache shared_;
   std::shared_ptr<Scene> scene_;
   std::shared_ptr<void> claim_;  // reserves the scene
   std::unique_ptr<Worlds> worlds_;

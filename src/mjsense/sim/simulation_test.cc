@@ -70,7 +70,7 @@ struct Height : Sensor {
     if (on_cast) on_cast();
   }
   bool wants_substep() const override { return with_substeps; }
-  bool eager() const override { return is_eager; }
+  bool needs_every_step() const override { return is_eager; }
   mjtStage needs() const override { return reads_up_to; }
   Stage stage() const override { return stage_; }
   std::span<Sensor* const> inputs() const override { return input_list; }
@@ -398,7 +398,7 @@ struct Throwing : Sensor {
     for (int w : context.ids) call("cast", w);
   }
   bool wants_substep() const override { return true; }
-  bool eager() const override { return true; }
+  bool needs_every_step() const override { return true; }
   Stage stage() const override { return stage_; }
 
   Stage stage_;

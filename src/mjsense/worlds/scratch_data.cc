@@ -15,13 +15,13 @@ ScratchData::Loan ScratchData::borrow() {
     if (!unused_.empty()) {
       mjData* data = unused_.back();
       unused_.pop_back();
-      return {data, GiveBack{this}};
+      return {data, Release{this}};
     }
   }
-  return {call_mujoco(mj_makeData, model_), GiveBack{this}};
+  return {call_mujoco(mj_makeData, model_), Release{this}};
 }
 
-void ScratchData::give_back(mjData* data) {
+void ScratchData::release(mjData* data) {
   const std::lock_guard lock(mutex_);
   unused_.push_back(data);
 }

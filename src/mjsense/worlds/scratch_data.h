@@ -15,11 +15,11 @@ namespace mjsense {
 // loans.
 class ScratchData {
  public:
-  struct GiveBack {
+  struct Release {
     ScratchData* to;
-    void operator()(mjData* data) const { to->give_back(data); }
+    void operator()(mjData* data) const { to->release(data); }
   };
-  using Loan = std::unique_ptr<mjData, GiveBack>;
+  using Loan = std::unique_ptr<mjData, Release>;
 
   explicit ScratchData(const mjModel* model) : model_(model) {}
   ~ScratchData();
@@ -29,7 +29,7 @@ class ScratchData {
   Loan borrow();
 
  private:
-  void give_back(mjData* data);
+  void release(mjData* data);
 
   const mjModel* model_;
   std::mutex mutex_;

@@ -12,8 +12,8 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/core/os.h"
-#include "mjsense/core/parallel.h"
 #include "mjsense/core/process_state.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/scene/mujoco_log.h"
 
 #ifdef __SANITIZE_THREAD__
@@ -191,8 +191,8 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   num_worlds_ = num_worlds;
   if (num_worlds < 1)
     throw ValueError(fmt::format("num_worlds is {}: must be at least 1", num_worlds));
-  if (threads < 0 || threads > kMostThreads)
-    throw ValueError(fmt::format("threads is {}: must be 0 (all) to {}", threads, kMostThreads));
+  if (threads < 0 || threads > kMaxThreads)
+    throw ValueError(fmt::format("threads is {}: must be 0 (all) to {}", threads, kMaxThreads));
   check_memory(model, num_worlds);
   install_warning_filter();
   mjBatchConfig config;
@@ -209,8 +209,9 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   if (batch_) add_owner(this);
   if (!batch_) throw RuntimeError(fmt::format("cannot create {} worlds: {}", num_worlds, error));
   num_state_ = static_cast<std::size_t>(mjb_nstate(batch_));
-  workbenches_ = std::vector<Workbench>(mjb_nthread(batch_));
-  for (Workbench& bench : workbenches_) bench.data = call_mujoco(mj_makeData, mjb_model(batch_));
+  scratch_slots_ = std::vector<ScratchSlot>(mjb_nthread(batch_));
+  for (ScratchSlot& bench : scratch_slots_)
+    bench.data = call_mujoco(mj_makeData, mjb_model(batch_));
   clocks_.resize(num_worlds);
   seed(0);
   held_.resize(num_worlds);
@@ -234,7 +235,7 @@ Worlds::~Worlds() {
   // MuJoCo's pool would wait for threads that do not exist after a fork.
   if (forget_owner(this)) return;
   mjb_deleteBatch(batch_);
-  for (Workbench& bench : workbenches_) mj_deleteData(bench.data);
+  for (ScratchSlot& bench : scratch_slots_) mj_deleteData(bench.data);
 }
 
 int Worlds::threads() const { return mjb_nthread(batch_); }
@@ -380,7 +381,7 @@ void Worlds::remember(const mjModel* m, const mjData* d, int w) {
 }
 
 // Computes derived fields, MuJoCo's sensors included, up to `stage`.
-void Worlds::bring(const mjModel* m, mjData* d, int w, mjtStage stage) {
+void Worlds::compute_stage(const mjModel* m, mjData* d, int w, mjtStage stage) {
   mjtStage& now = derived_[w].stage;
   if (stage == mjSTAGE_POS) stage = mjSTAGE_VEL;  // the next step needs both
   if (now < mjSTAGE_VEL && now < stage) {
@@ -395,14 +396,14 @@ void Worlds::bring(const mjModel* m, mjData* d, int w, mjtStage stage) {
 
 // The same, later than the step that reached the state. Controls written in the meantime take
 // effect at the next step, so forces are still computed with the old controls.
-void Worlds::bring_late(const mjModel* m, mjData* d, int w, mjtStage stage) {
+void Worlds::compute_late_stage(const mjModel* m, mjData* d, int w, mjtStage stage) {
   if (derived_[w].stage >= stage) return;
   constexpr int kControls =
       mjSTATE_WARMSTART | mjSTATE_CTRL | mjSTATE_QFRC_APPLIED | mjSTATE_XFRC_APPLIED;
   const std::size_t controls = w * num_state_ + ctrl_begin_;
   const bool swap = stage == mjSTAGE_ACC && !same_controls(w);
   if (swap) mj_setState(m, d, remembered_.data() + controls, kControls);
-  bring(m, d, w, stage);
+  compute_stage(m, d, w, stage);
   if (swap) mj_setState(m, d, mjb_state(batch_) + controls, kControls);
 }
 
@@ -452,12 +453,12 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   const bool seen = stage != mjSTAGE_NONE || call.hooks->wants_substep() ||
                     call.hooks->control_every() > 0 || call.hooks->stage() != mjSTAGE_NONE ||
                     !can_split_step(m);
-  if (!(seen ? step_whole(m, d, w, call) : step_unseen(m, d, w, call))) return false;
+  if (!(seen ? step_in_place(m, d, w, call) : step_in_scratch(m, d, w, call))) return false;
   remember(m, d, w);
   return true;
 }
 
-bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
+bool Worlds::step_in_place(const mjModel* m, mjData* d, int w, const Call& call) {
   const bool split = can_split_step(m);
   const bool every = call.hooks->wants_substep();
   const int control_every = call.hooks->control_every();
@@ -484,11 +485,11 @@ bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
     ++clocks_[w].tick;
     ++clocks_[w].moment;
     if (every) {
-      bring(m, d, w, call.hooks->substep_stage());
+      compute_stage(m, d, w, call.hooks->substep_stage());
       call.hooks->substep(view(m, d, w));
     }
   }
-  bring(m, d, w, call.hooks->stage());
+  compute_stage(m, d, w, call.hooks->stage());
   return healthy(w, warnings);
 }
 
@@ -496,16 +497,16 @@ bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
 // that is shared by the thread's worlds and stays in its cache. The mjData of many worlds, a
 // hundred kilobytes each, would not, which costs a tenth of a step of a Go1 (bench/physics.py:
 // MuJoCo's batch with and without `persistent`).
-bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, const Call& call) {
+bool Worlds::step_in_scratch(const mjModel* m, mjData* d, int w, const Call& call) {
   const int substeps = call.substeps;
-  Workbench* bench = nullptr;
-  for (Workbench& each : workbenches_) {
+  ScratchSlot* bench = nullptr;
+  for (ScratchSlot& each : scratch_slots_) {
     if (each.taken.exchange(true)) continue;
     bench = &each;
     break;
   }
   // A MuJoCo error in this call left one marked as taken.
-  if (!bench) return step_whole(m, d, w, call);
+  if (!bench) return step_in_place(m, d, w, call);
   mjData* s = bench->data;
   carry(m, d, s);
   const Warnings warnings(s);
@@ -537,7 +538,7 @@ void Worlds::restart(const mjModel* m, mjData* d, int w, int key, WorldHooks& ho
   }
   held_[w].clear();
   derived_[w].stage = mjSTAGE_NONE;
-  bring(m, d, w, mjSTAGE_ACC);
+  compute_stage(m, d, w, mjSTAGE_ACC);
   remember(m, d, w);
   reset_key_[w] = key;
   clocks_[w].substep = 0;
@@ -566,7 +567,7 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
         return;
       }
       derived.stage = mjSTAGE_NONE;
-      bring(m, d, w, mjSTAGE_ACC);
+      compute_stage(m, d, w, mjSTAGE_ACC);
       remember(m, d, w);
       ++clocks_[w].moment;
       break;
@@ -587,12 +588,12 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       if (broken_[w]) return;
       if (derived.behind) break;
       if (same_state(w)) {
-        bring_late(m, d, w, call.hooks->stage());
+        compute_late_stage(m, d, w, call.hooks->stage());
       } else {
         derived.stage = mjSTAGE_NONE;
         remember(m, d, w);
         ++clocks_[w].moment;
-        bring(m, d, w, call.hooks->stage());
+        compute_stage(m, d, w, call.hooks->stage());
       }
       break;
   }
@@ -653,7 +654,7 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
   apply_ordered(batch_, ids_.data(), static_cast<int>(ids_.size()), run, &call, save ? 1 : 0);
   drop_warnings(false);  // an error leaves the flag set
   report_warnings();
-  for (Workbench& bench : workbenches_) {  // left as taken by an error
+  for (ScratchSlot& bench : scratch_slots_) {  // left as taken by an error
     if (bench.taken.exchange(false)) mj_resetData(model(), bench.data);
   }
 
@@ -714,7 +715,8 @@ std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
     for (; first != last; ++first) {
       if (!broken_[*first]) continue;
       Failure& failure = *std::ranges::find(failures_, *first, &Failure::world);
-      failure.message = fmt::format("fails even after a reset: MuJoCo: {}", mjb_error(batch_, *first));
+      failure.message =
+          fmt::format("fails even after a reset: MuJoCo: {}", mjb_error(batch_, *first));
     }
   }
   for (int w : ids_) {

@@ -160,8 +160,8 @@ class Worlds {
   static void run(const mjModel* m, mjData* d, int w, void* arg);
   void run_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
-  bool step_unseen(const mjModel* m, mjData* d, int w, const Call& call);
-  bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
+  bool step_in_scratch(const mjModel* m, mjData* d, int w, const Call& call);
+  bool step_in_place(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);
   void keep_held(mjData* d, int w) const;
   void apply(WorldIds ids, Call call, bool save);
@@ -175,8 +175,8 @@ class Worlds {
   bool same_controls(int w) const;
   bool same_columns(int w, std::size_t begin, std::size_t end) const;
   void remember(const mjModel* m, const mjData* d, int w);
-  void bring(const mjModel* m, mjData* d, int w, mjtStage stage);
-  void bring_late(const mjModel* m, mjData* d, int w, mjtStage stage);
+  void compute_stage(const mjModel* m, mjData* d, int w, mjtStage stage);
+  void compute_late_stage(const mjModel* m, mjData* d, int w, mjtStage stage);
 
   mjBatch* batch_ = nullptr;
   int num_worlds_ = 0;
@@ -197,11 +197,11 @@ class Worlds {
   std::atomic<bool> warned_ = false;           // a count has risen in this call
   std::vector<int> ids_;                       // scratch: the sorted selection
   // One mjData per thread, used to step worlds whose derived fields are not read.
-  struct Workbench {
+  struct ScratchSlot {
     mjData* data = nullptr;
     std::atomic<bool> taken = false;
   };
-  std::vector<Workbench> workbenches_;
+  std::vector<ScratchSlot> scratch_slots_;
   // Columns of a state row that do not affect the position and velocity stages: warm start,
   // controls and applied forces.
   std::size_t ctrl_begin_ = 0, ctrl_end_ = 0;

@@ -25,7 +25,7 @@ inline TaskCfg task_cfg(const std::string& robot, const std::string& scene = "")
 template <class SomeTask>
 struct PlayedTask {
   explicit PlayedTask(TaskCfg cfg, int num_worlds = 1)
-      : task(std::move(cfg)), scene(task.whole_scene_cfg()) {
+      : task(std::move(cfg)), scene(task.scene_cfg_with_robot()) {
     task.initialize(model, num_worlds);
   }
   // Starts the episode in world 0.

@@ -21,8 +21,8 @@ constexpr double kMove = 1.0, kPosture = 0.12, kLimit = 6.0, kDrive = 6.0, kTurn
                  kNear = 25.0;
 constexpr double kNearLimit = 0.25, kComfort = 0.12;  // rad, m
 constexpr double kReachCost = 0.15;                   // joint motion on the path to the handle
-constexpr double kGood = 6;  // the search stops at a motion with a lower cost
-constexpr double kSwivel = 0.8, kMostSwivel = 0.9;  // cost per rad^2; limit, rad
+constexpr double kGood = 6;                        // the search stops at a motion with a lower cost
+constexpr double kSwivel = 0.8, kMaxSwivel = 0.9;  // cost per rad^2; limit, rad
 
 Pose pose_of(const BasePose& base, double z) {
   return {{base.x, base.y, z}, axis_angle({0, 0, 1}, base.yaw)};
@@ -80,8 +80,8 @@ class DoorMotions::Attempt {
     if (!solve(before, base, values, kReachIterations)) return false;
     reference_ = values;
     for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
-      const double way = values[hand_.tool].values[i] - start_[hand_.tool].values[i];
-      out.cost += kReachCost * way * way;
+      const double travel = values[hand_.tool].values[i] - start_[hand_.tool].values[i];
+      out.cost += kReachCost * travel * travel;
     }
     if (!follow_line(before, grasp, base, 0, 0, values, out.approach)) return false;
     if (limit_cost(values) > 0.6) return false;
@@ -210,7 +210,7 @@ class DoorMotions::Attempt {
           const double here = kDrive * drive * drive + kTurn * spun * spun + kNear * tight * tight;
           for (const double by : {0.0, 1.0, -1.0}) {
             const double swivel = swivel_ + by * std::abs(leaf - last);
-            if (std::abs(swivel) > kMostSwivel) continue;
+            if (std::abs(swivel) > kMaxSwivel) continue;
             Choice choice{here + kSwivel * (swivel * swivel - swivel_ * swivel_), swivel, b,
                           values};
             if (!solve(swivelled(straight, swivel), b, choice.values, Chain::kTracking / 4))
@@ -264,7 +264,8 @@ class DoorMotions::Attempt {
       const bool first = m->body_rootid[a] == root;
       if (first == (m->body_rootid[b] == root)) continue;
       const int mine = first ? a : b, other = first ? b : a;
-      if (is_below(m, mine, palm) && is_below(m, other, door_.handle)) continue;
+      if (is_descendant_or_self(m, mine, palm) && is_descendant_or_self(m, other, door_.handle))
+        continue;
       return true;
     }
     return false;
@@ -310,15 +311,15 @@ std::vector<double> DoorMotions::tucked(const Hand& hand) const {
 
 double DoorMotions::clearance(const DoorGeometry& geometry, const BasePose& base,
                               double leaf) const {
-  double least = floor_.footprint->clearance(*floor_.floor, base.x, base.y, base.yaw);
+  double minimum = floor_.footprint->clearance(*floor_.floor, base.x, base.y, base.yaw);
   const Vec3 edge = geometry.edge_at(leaf);
   const double c = std::cos(base.yaw), s = std::sin(base.yaw);
   for (const Disc& disc : floor_.footprint->discs()) {
     const double x = base.x + c * disc.x - s * disc.y, y = base.y + s * disc.x + c * disc.y;
-    least =
-        std::min(least, distance_to_segment(x, y, geometry.hinge, edge) - kLeafHalf - disc.radius);
+    minimum = std::min(minimum,
+                       distance_to_segment(x, y, geometry.hinge, edge) - kLeafHalf - disc.radius);
   }
-  return least;
+  return minimum;
 }
 
 std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) const {

@@ -9,9 +9,9 @@
 #include <optional>
 #include <vector>
 
-#include "mjsense/policies/door/handle_grasp.h"
-#include "mjsense/policies/planner/follower.h"
-#include "mjsense/scenes/base_route.h"
+#include "mjsense/policies/door/door_handle_grasp.h"
+#include "mjsense/policies/planner/plan_follower.h"
+#include "mjsense/scenes/base_planner.h"
 #include "mjsense/worlds/scratch_data.h"
 
 namespace mjsense {
@@ -41,7 +41,7 @@ struct DoorMotion {
 
 // The floor without the door leaf, and the footprint of the base.
 struct DoorFloor {
-  const Occupancy* floor;
+  const OccupancyGrid* floor;
   const Footprint* footprint;
 };
 

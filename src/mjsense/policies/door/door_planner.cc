@@ -60,7 +60,7 @@ BasePose DoorPlanner::base(const World& world) const {
   return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
 }
 
-double DoorPlanner::leaf_to_go(const World& world, double goal) const {
+double DoorPlanner::remaining_leaf_angle(const World& world, double goal) const {
   const Door& door = door_->door(world.id);
   return door.shut + goal * (door.open - door.shut) -
          world.data->qpos[world.model->jnt_qposadr[door.joint]];
@@ -76,13 +76,14 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
   if (request.attempt > 0 && request.stage == 0) return recover(world, plan);
   const int first = request.attempt > 0 ? 1 : 0;  // stage that drives to the door
   if (request.stage > first) {
-    const std::optional<DoorMotion> motion =
-        motions_->plan(world, door_->door(world.id), base(world),
-                       leaf_to_go(world, goal_[world.id]), margin_[world.id], tool_[world.id]);
+    const std::optional<DoorMotion> motion = motions_->plan(
+        world, door_->door(world.id), base(world), remaining_leaf_angle(world, goal_[world.id]),
+        margin_[world.id], tool_[world.id]);
     if (motion) return open_door(world, *motion, plan);
     // The base has missed the planned pose, and no plan works from here: try another pose.
     if (request.stage > first + kPlaces) {
-      plan.refusal = "no collision-free motion of an arm opens the door from the current base pose";
+      plan.rejection =
+          "no collision-free motion of an arm opens the door from the current base pose";
       return;
     }
   }
@@ -90,7 +91,7 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
       !approach(world, cfg_.enough, cfg_.margin, plan) &&
       !approach(world, cfg_.enough, cfg_.tight, plan)) {
     plan.clear();
-    plan.refusal = "no reachable base pose allows a collision-free opening of the door";
+    plan.rejection = "no reachable base pose allows a collision-free opening of the door";
   }
 }
 
@@ -116,8 +117,8 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
   for (const double back : {0.25, 0.12}) {
     const BasePose off{here.x + back * geometry.away.x, here.y + back * geometry.away.y, here.yaw};
     if (motions_->clearance(geometry, off, 0) < 0) continue;
-    const BasePose way[] = {here, off};
-    plan.move_groups(kRecovery, {base_path(group_, way, cfg_.speeds)});
+    const BasePose path[] = {here, off};
+    plan.move_groups(kRecovery, {base_path(group_, path, cfg_.speeds)});
     break;
   }
   plan.move_groups(kRecovery, std::move(paths), 0.2);
@@ -131,21 +132,22 @@ bool DoorPlanner::approach(const World& world, double goal, double margin, Plan&
   for (const BasePose& place : motions_->places(world, door)) {
     if (tried++ >= cfg_.max_places) break;
     const std::optional<DoorMotion> motion =
-        motions_->plan(world, door, place, leaf_to_go(world, goal), margin);
+        motions_->plan(world, door, place, remaining_leaf_angle(world, goal), margin);
     if (!motion) continue;
-    std::vector<BasePose> way;
+    std::vector<BasePose> path;
     if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
         std::abs(wrapped(place.yaw - here.yaw)) > kThereYaw) {
-      way = door_->routes()->find(here, place);
+      path = door_->routes()->find(here, place);
       // The start or the goal is outside the free floor (in the doorway, next to the open leaf):
       // drive straight.
-      if (way.empty() && std::hypot(place.x - here.x, place.y - here.y) < 0.8) way = {here, place};
-      if (way.empty()) continue;
+      if (path.empty() && std::hypot(place.x - here.x, place.y - here.y) < 0.8)
+        path = {here, place};
+      if (path.empty()) continue;
     }
-    if (way.empty()) {
+    if (path.empty()) {
       plan.wait(kNavigate, 0.1);
     } else {
-      plan.move_groups(kNavigate, {base_path(group_, way, cfg_.speeds)}, 0.4);
+      plan.move_groups(kNavigate, {base_path(group_, path, cfg_.speeds)}, 0.4);
     }
     plan.more = true;
     goal_[world.id] = goal;

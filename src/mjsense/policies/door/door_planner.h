@@ -47,7 +47,7 @@ class DoorPlanner final : public TaskPlanner {
     double fraction;
   };
   BasePose base(const World& world) const;
-  double leaf_to_go(const World& world, double goal) const;
+  double remaining_leaf_angle(const World& world, double goal) const;
   void recover(const World& world, Plan& plan) const;
   bool approach(const World& world, double goal, double margin, Plan& plan);
   void tuck(const World& world, const Hand& hand, Segment& segment) const;

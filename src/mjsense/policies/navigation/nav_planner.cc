@@ -21,10 +21,10 @@ constexpr int kLooks = 2;
 
 }  // namespace
 
-CommandPath base_path(int group, std::span<const BasePose> way, const BaseSpeeds& speeds) {
+CommandPath base_path(int group, std::span<const BasePose> poses, const BaseSpeeds& speeds) {
   CommandPath path;
   path.group = group;
-  for (const TimedBasePose& one : timed(way, speeds)) {
+  for (const TimedBasePose& one : timed(poses, speeds)) {
     path.times.push_back(one.time);
     path.points.insert(path.points.end(), {one.pose.x, one.pose.y, one.pose.yaw});
   }
@@ -53,8 +53,8 @@ BasePose NavPlanner::base(const World& world) const {
   return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
 }
 
-bool NavPlanner::would_do(const World& world, const BasePose& there, const Pose& camera_in_base,
-                          double arrive, double facing) const {
+bool NavPlanner::is_goal_pose(const World& world, const BasePose& there, const Pose& camera_in_base,
+                              double arrive, double facing) const {
   if (nav_->distance(world, there.x, there.y) > arrive) return false;
   const double* at = world.data->xpos + 3 * nav_->objects(world.id)[0].body;
   if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > facing)
@@ -80,13 +80,13 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   if (request.stage > 0 && request.stage % (kLooks + 1) != 0) {
     const BasePose aside{here.x, here.y, here.yaw + (request.stage % 2 == 1 ? kLook : -2 * kLook)};
     if (nav_->routes()->free_between(here, aside)) {
-      const BasePose way[] = {here, aside};
-      plan.move_groups(0, {base_path(group_, way, cfg_.speeds)}, 0.2);
+      const BasePose path[] = {here, aside};
+      plan.move_groups(0, {base_path(group_, path, cfg_.speeds)}, 0.2);
       return;
     }
   }
   if (request.stage > 0) tried.push_back(here);
-  std::vector<BasePose> way;
+  std::vector<BasePose> path;
   // The last resort is any pose that counts as success: farther away, or with the object near the
   // image border.
   struct Wanted {
@@ -94,22 +94,22 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   };
   for (const Wanted& wanted : {Wanted{cfg_.arrive, cfg_.facing}, Wanted{cfg_.reach, cfg_.facing},
                                Wanted{NavToObjTask::kNearby, std::numbers::pi}}) {
-    if (way.size() > 1) break;
-    way = nav_->routes()->find(
+    if (path.size() > 1) break;
+    path = nav_->routes()->find(
         here,
         [&](const BasePose& p) {
-          return would_do(world, p, camera_in_base, wanted.arrive, wanted.facing);
+          return is_goal_pose(world, p, camera_in_base, wanted.arrive, wanted.facing);
         },
         [&](double x, double y) {
           return std::max(0.0, nav_->distance(world, x, y) - wanted.arrive);
         });
   }
-  if (way.size() < 2) {
+  if (path.size() < 2) {
     plan.more = false;
-    plan.refusal = "no reachable base pose is left from which the camera sees the object";
+    plan.rejection = "no reachable base pose is left from which the camera sees the object";
     return;
   }
-  plan.move_groups(0, {base_path(group_, way, cfg_.speeds)}, 0.4);
+  plan.move_groups(0, {base_path(group_, path, cfg_.speeds)}, 0.4);
 }
 
 bool NavPlanner::gone_wrong(const World& world) const {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mjsense/policies/planner/task_planner.h"
-#include "mjsense/scenes/base_route.h"
+#include "mjsense/scenes/base_planner.h"
 
 namespace mjsense {
 
@@ -36,8 +36,8 @@ class NavPlanner final : public TaskPlanner {
 
  private:
   BasePose base(const World& world) const;
-  bool would_do(const World& world, const BasePose& there, const Pose& camera_in_base,
-                double arrive, double facing) const;
+  bool is_goal_pose(const World& world, const BasePose& there, const Pose& camera_in_base,
+                    double arrive, double facing) const;
 
   NavPlannerCfg cfg_;
   const NavToObjTask* nav_ = nullptr;
@@ -45,7 +45,7 @@ class NavPlanner final : public TaskPlanner {
   std::vector<std::vector<BasePose>> tried_;  // [B] poses from which the object was not visible
 };
 
-// Timed path of the base group's commands (x, y, yaw) through the poses `way`.
-CommandPath base_path(int group, std::span<const BasePose> way, const BaseSpeeds& speeds);
+// Timed path of the base group's commands (x, y, yaw) through the poses `poses`.
+CommandPath base_path(int group, std::span<const BasePose> poses, const BaseSpeeds& speeds);
 
 }  // namespace mjsense

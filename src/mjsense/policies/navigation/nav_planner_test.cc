@@ -66,12 +66,12 @@ TEST(NavPlanner, PlansAgainIfTheBaseIsFarFromItsCommand) {
 
 TEST(NavPlanner, RejectsUnsupportedTasksAndRobots) {
   PickTask pick(of("mobile_franka"));
-  Scene scene(pick.whole_scene_cfg());
+  Scene scene(pick.scene_cfg_with_robot());
   pick.initialize(scene.model(), 1);
   NavPlanner planner;
   EXPECT_THROW(pick.register_policy(planner), ValueError);
   NavToObjTask task(of("franka"));
-  Scene floor(task.whole_scene_cfg());
+  Scene floor(task.scene_cfg_with_robot());
   task.initialize(floor.model(), 1);
   NavPlanner other;
   EXPECT_THROW(task.register_policy(other), ValueError) << "the base is not mobile";

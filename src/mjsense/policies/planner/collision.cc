@@ -31,8 +31,8 @@ bool is_neighbour(const mjModel* m, int a, int b) {
 
 // mj_geomDistance without the segment. No object with a destructor may live in this frame: a MuJoCo
 // error leaves it by longjmp.
-double distance(const mjModel* m, mjData* d, int a, int b, double most) {
-  return mj_geomDistance(m, d, a, b, most, nullptr);
+double distance(const mjModel* m, mjData* d, int a, int b, double maximum) {
+  return mj_geomDistance(m, d, a, b, maximum, nullptr);
 }
 
 }  // namespace
@@ -86,7 +86,7 @@ CollisionQuery::CollisionQuery(CollisionModel& model, const World& world)
 }
 
 void CollisionQuery::ignore(int body) {
-  std::erase_if(scene_, [&](int g) { return is_below(m_, m_->geom_bodyid[g], body); });
+  std::erase_if(scene_, [&](int g) { return is_descendant_or_self(m_, m_->geom_bodyid[g], body); });
 }
 
 void CollisionQuery::ignore_below(double height) {
@@ -115,7 +115,7 @@ void CollisionQuery::hold(int tool, int gripper, int body, const Pose& tool_obje
   held.tool_object = tool_object;
   const Pose object{vec3(d_->xpos + 3 * body), quat(d_->xquat + 4 * body)};
   for (int g = 0; g < m_->ngeom; ++g) {
-    if (!is_solid(m_, g) || !is_below(m_, m_->geom_bodyid[g], body)) continue;
+    if (!is_solid(m_, g) || !is_descendant_or_self(m_, m_->geom_bodyid[g], body)) continue;
     held.geoms.push_back(g);
     held.object_geom.push_back(inverse(object) *
                                pose_from_mat(d_->geom_xpos + 3 * g, d_->geom_xmat + 9 * g));
@@ -128,7 +128,7 @@ void CollisionQuery::open(int gripper) {
   for (int j = 0; j < m_->njnt; ++j) {
     const int type = m_->jnt_type[j];
     if ((type != mjJNT_HINGE && type != mjJNT_SLIDE) ||
-        !is_below(m_, m_->jnt_bodyid[j], group.root_body))
+        !is_descendant_or_self(m_, m_->jnt_bodyid[j], group.root_body))
       continue;
     const int qpos = m_->jnt_qposadr[j];
     d_->qpos[qpos] = m_->qpos0[qpos];
@@ -185,8 +185,8 @@ bool CollisionQuery::hit(int a, int b) {
 
 bool CollisionQuery::is_robot_allowed(int geom, int other) const {
   for (std::size_t i = 0; i < allowed_body_.size(); ++i) {
-    if (is_below(m_, m_->geom_bodyid[other], allowed_body_[i]) &&
-        is_below(m_, m_->geom_bodyid[geom], allowed_gripper_[i]))
+    if (is_descendant_or_self(m_, m_->geom_bodyid[other], allowed_body_[i]) &&
+        is_descendant_or_self(m_, m_->geom_bodyid[geom], allowed_gripper_[i]))
       return true;
   }
   return false;
@@ -209,7 +209,8 @@ bool CollisionQuery::free_here() {
         if (may_touch(m_, g, other) && hit(g, other)) return false;
       }
       for (int other : cm_.moving_) {
-        if (!is_below(m_, m_->geom_bodyid[other], held.gripper_body) && hit(g, other)) return false;
+        if (!is_descendant_or_self(m_, m_->geom_bodyid[other], held.gripper_body) && hit(g, other))
+          return false;
       }
     }
   }

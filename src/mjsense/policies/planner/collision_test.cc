@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "mjsense/observe/frame.h"
-#include "mjsense/policies/planner/testing/stage.h"
+#include "mjsense/policies/planner/testing/table_scene.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
-#include "mjsense/policies/planner/squeeze.h"
+#include "mjsense/policies/planner/finger_contact.h"
 
 namespace mjsense {
 namespace {
@@ -52,7 +52,7 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   Vec3 low{1, 1, 1}, high{-1, -1, -1};
   for (int g = 0; g < model->ngeom; ++g) {
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    if (!is_below(model, model->geom_bodyid[g], group.root_body)) continue;
+    if (!is_descendant_or_self(model, model->geom_bodyid[g], group.root_body)) continue;
     const double* aabb = model->geom_aabb + 6 * g;
     const Pose pose = inverse(world_tool) *
                       pose_from_mat(data->geom_xpos + 3 * g, data->geom_xmat + 9 * g) *
@@ -128,10 +128,11 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
       const Vec3 close{std::cos(yaw), std::sin(yaw), 0}, across{-close.y, close.x, 0};
       for (double slide : kSlides) {
         const Vec3 center = Vec3{object.p.x, object.p.y, z} + slide * across;
-        const Squeeze s = squeeze(points, center - Vec3{0, 0, gripper.pad_middle}, close, across,
-                                  {0, 0, 1}, half_width, half_length);
+        const FingerContact s =
+            measure_finger_contact(points, center - Vec3{0, 0, gripper.pad_middle}, close, across,
+                                   {0, 0, 1}, half_width, half_length);
         const double width = s.high - s.low;
-        if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kSideGap) ||
+        if (!(width > kMinWidth && width < gripper.max_opening - 2 * kSideGap) ||
             s.face < kFaceWidth)
           continue;
         const Vec3 position = center + (0.5 * (s.low + s.high)) * close;

@@ -34,10 +34,10 @@ HandPlanner::HandPlanner(const mjModel* model, const Robot& robot, Hand hand, Ha
   for (int joint : robot.groups()[hand.tool].joints) {
     const bool slide = model->jnt_type[joint] == mjJNT_SLIDE;
     const bool limited = model->jnt_limited[joint];
-    const double most = slide ? 10.0 : std::numbers::pi;
+    const double maximum = slide ? 10.0 : std::numbers::pi;
     const double* range = model->jnt_range + 2 * joint;
-    space_.low.push_back(limited ? std::max(range[0], -2 * most) : -most);
-    space_.high.push_back(limited ? std::min(range[1], 2 * most) : most);
+    space_.low.push_back(limited ? std::max(range[0], -2 * maximum) : -maximum);
+    space_.high.push_back(limited ? std::min(range[1], 2 * maximum) : maximum);
     space_.speed.push_back(slide ? cfg.slide_speed : cfg.joint_speed);
     space_.acceleration.push_back(slide ? cfg.slide_acceleration : cfg.joint_acceleration);
   }
@@ -106,8 +106,8 @@ Segment& HandPlanner::add_line(const World& world, Plan& plan, int phase, const 
                         cfg_.turn_speed, false);
 }
 
-bool HandPlanner::add_way(const World& world, CollisionQuery& query, Plan& plan, int phase,
-                          const HandPose& from, const HandPose& to, Rng& rng) const {
+bool HandPlanner::add_path(const World& world, CollisionQuery& query, Plan& plan, int phase,
+                           const HandPose& from, const HandPose& to, Rng& rng) const {
   if (floats()) {
     HandPose end;
     if (line_is_free(world, query, from, to.tool, end)) {

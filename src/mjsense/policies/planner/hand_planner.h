@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "mjsense/policies/planner/collision.h"
-#include "mjsense/policies/planner/follower.h"
-#include "mjsense/policies/planner/motion.h"
+#include "mjsense/policies/planner/joint_path.h"
+#include "mjsense/policies/planner/plan_follower.h"
 
 namespace mjsense {
 
@@ -54,8 +54,8 @@ class HandPlanner {
                     double speed, double settle = 0) const;
   // Adds segments of a collision-free path between two poses. Returns false and leaves the plan
   // unchanged if none is found.
-  bool add_way(const World& world, CollisionQuery& query, Plan& plan, int phase,
-               const HandPose& from, const HandPose& to, Rng& rng) const;
+  bool add_path(const World& world, CollisionQuery& query, Plan& plan, int phase,
+                const HandPose& from, const HandPose& to, Rng& rng) const;
 
  private:
   std::span<const double> joints(const HandPose& at) const { return at.joints[hand_.tool].view(); }

@@ -27,11 +27,11 @@ struct ManipulationPlannerCfg {
   double retreat = 0.05;                        // m, opposite to the approach
   double rest = 0.5;                            // s, at the end
   // degrees from vertical; maximum tilt of the preferred approach, which is drawn at random
-  double most_tilt = 90;
+  double max_tilt = 90;
   int max_ik_candidates = 256;  // grasps tried before giving up
   // How many of them get a search far from the current joints, if there is no near solution.
   int max_far_candidates = 60;
-  int max_ways = 6;  // how many of them get a path search
+  int max_paths = 6;  // how many of them get a path search
 };
 
 inline constexpr double kMargin = 0.004;       // m, clearance along paths

@@ -55,7 +55,7 @@ void ManipulationPlanner::make_plan(const World& world, const PlanRequest& reque
     state.holding = false;
     if (state.grip) state.failed.add(inverse(state.grip->tool_object));
     state.grip.reset();
-    let_go(plan);
+    plan_open_grippers(plan);
   } else if (stage == 0) {
     plan.more = plan_pick(world, request, plan);
   } else if (stage == 1 && placing_) {
@@ -65,7 +65,7 @@ void ManipulationPlanner::make_plan(const World& world, const PlanRequest& reque
   }
 }
 
-void ManipulationPlanner::let_go(Plan& plan) const {
+void ManipulationPlanner::plan_open_grippers(Plan& plan) const {
   Segment& open = plan.wait(kOpenGripper, cfg_.close_time);
   for (int h = 0; h < shared_->num_hands(); ++h)
     open.grip(shared_->hand(h).hand().gripper,
@@ -88,7 +88,7 @@ bool ManipulationPlanner::plan_pick(const World& world, const PlanRequest& reque
   }
   if (request.attempt > 0 && !state.went_home) {
     state.went_home = true;
-    picking_->go_home(world, request, follower(), state.home.joints, plan);
+    picking_->plan_return_home(world, request, follower(), state.home.joints, plan);
     if (!plan.segments.empty()) return insert(state);
   }
   if (!shift_ || state.drove_to_pick) return false;
@@ -105,7 +105,7 @@ bool ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
   const Pose tool_object =
       inverse(robot().leaf_pose(world, hand.hand().tool)) * shared_->object_pose(world);
   if (norm(tool_object.p - state.grip->tool_object.p) > kSlipped) {
-    plan.refusal = "the object moved in the hand while it was lifted";
+    plan.rejection = "the object moved in the hand while it was lifted";
     return false;
   }
   state.grip->tool_object = tool_object;
@@ -118,7 +118,7 @@ bool ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
       return placing_->reaches(there, hand, hand.now(there, follower())) &&
              placing_->plan(there, request, follower(), hand, tool_object, state.home, unused);
     };
-    const BaseShift::Held held{hand.hand(), shared_->target_body(world.id), tool_object};
+    const BaseReposition::Held held{hand.hand(), shared_->target_body(world.id), tool_object};
     if (shift_->plan(world, kPreplace, held, places, plan)) return insert(state);
   }
   return placing_->put_back(world, follower(), hand, tool_object, plan);

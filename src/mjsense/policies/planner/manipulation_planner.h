@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "mjsense/policies/planner/base_shift.h"
+#include "mjsense/policies/planner/base_reposition.h"
 #include "mjsense/policies/planner/picking.h"
 
 namespace mjsense {
@@ -37,7 +37,7 @@ class ManipulationPlanner final : public TaskPlanner {
     int inserted = 0;  // stages that only prepare the next one
     bool went_home = false, drove_to_pick = false, drove_to_place = false;
   };
-  void let_go(Plan& plan) const;
+  void plan_open_grippers(Plan& plan) const;
   static bool insert(State& state);
   bool plan_pick(const World& world, const PlanRequest& request, Plan& plan);
   bool plan_place(const World& world, const PlanRequest& request, Plan& plan);
@@ -46,8 +46,8 @@ class ManipulationPlanner final : public TaskPlanner {
   std::optional<Manipulation> shared_;
   std::optional<Placing> placing_;  // if the task has a PlaceScene
   std::optional<Picking> picking_;
-  std::optional<BaseShift> shift_;  // if the robot has a mobile base
-  std::vector<State> states_;       // [B]
+  std::optional<BaseReposition> shift_;  // if the robot has a mobile base
+  std::vector<State> states_;            // [B]
 };
 
 }  // namespace mjsense

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <set>
 
-#include "mjsense/core/parallel.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_loop.h"
@@ -30,7 +30,7 @@ struct Play {
     cfg.action_noise = noise;
     cfg.perturb = perturb;
     task = make_task(task_name, cfg);
-    scene = std::make_unique<Scene>(task->whole_scene_cfg());
+    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), num_worlds);
     if (task_name == "open")
       planner = std::make_unique<OpeningPlanner>();
@@ -82,7 +82,7 @@ TEST(ManipulationPlanner, PicksFromManyDirections) {
     retries[e] = play.planner->num_retries(w);
     text[e] = play.task->description(w) + ", retries " +
               std::to_string(play.planner->num_retries(w)) + ", last " +
-              std::string(word(play.planner->last_failure(w))) + ", phase " +
+              std::string(enum_name(play.planner->last_failure(w))) + ", phase " +
               std::to_string(play.planner->phase(w));
   });
   int successes = 0, slanting = 0, mishaps = 0, retried = 0, mended = 0;

@@ -25,7 +25,7 @@ void OpeningPlanner::initialize_planner() {
     throw ValueError(fmt::format(
         "policy 'planner' needs a gripper on an arm or a floating gripper; robot '{}' has none",
         robot().name()));
-  ways_.assign(task().num_worlds(), {});
+  paths_.assign(task().num_worlds(), {});
 }
 
 // Opens the grippers and retracts the hands before the next attempt.
@@ -38,7 +38,7 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
     const Pose to = from * Pose{{0, 0, -cfg_.back}, {}};
     if (hand.floats()) {
       const Pose base = robot().base_pose(world);
-      go(plan, kRetreat, hand, base * from, base * to, cfg_.fast);
+      add_move(plan, kRetreat, hand, base * from, base * to, cfg_.fast);
     } else {
       plan.move_tool(kRetreat, hand.arm, from, to, cfg_.fast, cfg_.settle);
     }
@@ -46,29 +46,29 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   plan.more = true;
 }
 
-Segment& OpeningPlanner::go(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from,
-                            const Pose& to, double speed, double settle) const {
+Segment& OpeningPlanner::add_move(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from,
+                                  const Pose& to, double speed, double settle) const {
   return plan.ease_tool(phase, hand.arm, from, to, speed, std::max(settle, cfg_.settle), cfg_.turn,
                         true);
 }
 
-void OpeningPlanner::float_along(const World& world, const HandleWay& way, bool there,
-                                 Plan& plan) const {
-  const MoveGroup& gripper = robot().groups()[way.hand.gripper];
-  Pose at = robot().base_pose(world) * tool_target(world, way.hand.arm);
-  if (there) {
-    plan.wait(kOpenGripper, 0).grip(way.hand.gripper, gripper.open_command);
-    for (const Pose& next : std::span(way.there).subspan(1)) {
-      go(plan, kPregrasp, way.hand, at, next, cfg_.there);
+void OpeningPlanner::plan_floating(const World& world, const HandlePath& path, bool with_approach,
+                                   Plan& plan) const {
+  const MoveGroup& gripper = robot().groups()[path.hand.gripper];
+  Pose at = robot().base_pose(world) * tool_target(world, path.hand.arm);
+  if (with_approach) {
+    plan.wait(kOpenGripper, 0).grip(path.hand.gripper, gripper.open_command);
+    for (const Pose& next : std::span(path.approach).subspan(1)) {
+      add_move(plan, kPregrasp, path.hand, at, next, cfg_.approach_speed);
       at = next;
     }
     return;
   }
-  go(plan, kGrasp, way.hand, at, way.grasp, cfg_.slow);
-  go(plan, kCloseGripper, way.hand, way.grasp, way.grasp, cfg_.slow, cfg_.close_time)
-      .grip(way.hand.gripper, gripper.closed_command);
+  add_move(plan, kGrasp, path.hand, at, path.grasp, cfg_.slow);
+  add_move(plan, kCloseGripper, path.hand, path.grasp, path.grasp, cfg_.slow, cfg_.close_time)
+      .grip(path.hand.gripper, gripper.closed_command);
   // A rotation about a hinge and a translation along a slide are both screws.
-  go(plan, kLift, way.hand, way.grasp, way.end, cfg_.fast).holds(way.hand.gripper);
+  add_move(plan, kLift, path.hand, path.grasp, path.end, cfg_.fast).holds(path.hand.gripper);
 }
 
 // Timed joint positions and, with `driving`, poses of the mobile base; the tool moves at `speed`.
@@ -83,17 +83,18 @@ std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const RobotVal
   std::vector<double> seconds{0};
   for (std::size_t k = 1; k < points.size(); ++k) {
     Pose a = robot().fk(arm, points[k - 1]), b = robot().fk(arm, points[k]);
-    double most = 0, least = 1e-3;
+    double maximum = 0, minimum = 1e-3;
     for (std::size_t i = 0; i < n; ++i)
-      most = std::max(most, std::abs(points[k][arm].values[i] - points[k - 1][arm].values[i]));
+      maximum =
+          std::max(maximum, std::abs(points[k][arm].values[i] - points[k - 1][arm].values[i]));
     if (driving) {
       const Pose from = pose(points[k - 1]), to = pose(points[k]);
-      least = std::max(norm(to.p - from.p) / cfg_.base_speed,
-                       angle_between(from.q, to.q) / cfg_.base_turn);
+      minimum = std::max(norm(to.p - from.p) / cfg_.base_speed,
+                         angle_between(from.q, to.q) / cfg_.base_turn);
       a = from * a;
       b = to * b;
     }
-    seconds.push_back(std::max({norm(b.p - a.p) / speed, most / cfg_.fastest_joint, least}));
+    seconds.push_back(std::max({norm(b.p - a.p) / speed, maximum / cfg_.fastest_joint, minimum}));
   }
   if (driving) ease(std::span(seconds).subspan(1));
   std::vector<CommandPath> out(driving ? 2 : 1);
@@ -122,11 +123,11 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   const HandleReach& reach = opening_->reach();
   const Articulation& one = opening_->target(world.id);
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
-  HandleWay& way = ways_[world.id];
+  HandlePath& path = paths_[world.id];
   const auto start = reach.start_of(world);
-  std::optional<HandleWay> found;
+  std::optional<HandlePath> found;
   if (request.stage > first) {
-    found = reach.again(start, one, from, to, way);
+    found = reach.again(start, one, from, to, path);
   } else {
     const bool driving = opening_->driving(world.id);
     for (const bool drive : {driving, !driving}) {
@@ -134,31 +135,33 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
     }
   }
   if (!found) {
-    plan.refusal = "no grasp of the handle allows a collision-free motion along its whole path";
+    plan.rejection = "no grasp of the handle allows a collision-free motion along its whole path";
     return;
   }
-  way = *std::move(found);
-  plan.grasp = way.grasp;
-  if (way.hand.floats()) {
-    float_along(world, way, request.stage == first, plan);
+  path = *std::move(found);
+  plan.grasp = path.grasp;
+  if (path.hand.floats()) {
+    plan_floating(world, path, request.stage == first, plan);
     plan.more = true;
     return;
   }
-  const int arm = way.hand.arm, hand = way.hand.gripper;
+  const int arm = path.hand.arm, hand = path.hand.gripper;
   const MoveGroup& gripper = robot().groups()[hand];
   if (request.stage == first) {
     plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);
-    plan.move_groups(kPregrasp, paths(arm, way.go, cfg_.there, false), cfg_.settle);
+    plan.move_groups(kPregrasp, paths(arm, path.approach_joints, cfg_.approach_speed, false),
+                     cfg_.settle);
     plan.more = true;
     return;
   }
-  const Pose at = inverse(robot().base_pose(world)) * way.grasp;
+  const Pose at = inverse(robot().base_pose(world)) * path.grasp;
   plan.move_tool(kGrasp, arm, tool_target(world, arm), at, cfg_.slow, cfg_.settle);
   plan.move_tool(kCloseGripper, arm, at, at, cfg_.slow, cfg_.close_time)
       .grip(hand, gripper.closed_command);
-  plan.move_groups(
-          kLift, paths(arm, way.along, way.drive ? cfg_.driving : cfg_.fast, way.drive.has_value()),
-          cfg_.settle)
+  plan.move_groups(kLift,
+                   paths(arm, path.motion_joints, path.drive ? cfg_.driving : cfg_.fast,
+                         path.drive.has_value()),
+                   cfg_.settle)
       .holds(hand);
   plan.more = true;
 }

@@ -11,7 +11,7 @@ namespace mjsense {
 struct OpeningPlannerCfg {
   // m/s, speed of the tool: to the pregrasp, with the handle, with the handle while the base
   // drives, to the handle
-  double there = 0.20, fast = 0.08, driving = 0.12, slow = 0.04;
+  double approach_speed = 0.20, fast = 0.08, driving = 0.12, slow = 0.04;
   double fastest_joint = 0.8;                  // rad/s
   double base_speed = 0.20, base_turn = 0.35;  // m/s, rad/s, with the handle
   double turn = 1.0;                           // rad/s, of a floating hand
@@ -35,14 +35,15 @@ class OpeningPlanner final : public TaskPlanner {
   std::vector<CommandPath> paths(int arm, std::span<const RobotValues> points, double speed,
                                  bool driving) const;
   // Adds a screw of a floating hand, X_WT.
-  Segment& go(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from, const Pose& to,
-              double speed, double settle = 0) const;
-  void float_along(const World& world, const HandleWay& way, bool there, Plan& plan) const;
+  Segment& add_move(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from, const Pose& to,
+                    double speed, double settle = 0) const;
+  void plan_floating(const World& world, const HandlePath& path, bool with_approach,
+                     Plan& plan) const;
   void back_off(const World& world, Plan& plan) const;
 
   OpeningPlannerCfg cfg_;
   const OpeningTask* opening_ = nullptr;
-  std::vector<HandleWay> ways_;  // [B] the path that is followed
+  std::vector<HandlePath> paths_;  // [B] the path that is followed
 };
 
 }  // namespace mjsense

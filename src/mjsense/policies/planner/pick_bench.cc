@@ -21,7 +21,7 @@ struct Stage {
     cfg.scene = "table";
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->whole_scene_cfg());
+    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), 1);
     policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <vector>
 
-#include "mjsense/core/parallel.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -28,7 +28,7 @@ struct Stage {
     cfg.scene = "table";
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->whole_scene_cfg());
+    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), num_worlds);
     policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);
@@ -161,20 +161,20 @@ TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
   auto& planner = static_cast<PlannerPolicy&>(*stage.policy);
   World& world = moved.world;
   std::vector<int> phases;
-  int most_retries = 0;
+  int max_retries = 0;
   double side = 1;
   for (int step = 0; step < 400; ++step) {
     Action action;
     planner.act(world, action);
     if (phases.empty() || phases.back() != planner.phase(0)) phases.push_back(planner.phase(0));
-    if (planner.num_retries(0) > most_retries) {
-      most_retries = planner.num_retries(0);
+    if (planner.num_retries(0) > max_retries) {
+      max_retries = planner.num_retries(0);
       for (int g = 0; g < 3; ++g)
         EXPECT_EQ(action.commands[g].given, g == stage.task->robot().arm()) << "the arm stops";
     }
     if (action.done) {
       EXPECT_EQ(action.success, std::optional<bool>(false));
-      EXPECT_EQ(most_retries, 3);
+      EXPECT_EQ(max_retries, 3);
       EXPECT_EQ(planner.failure(0), "the hand held nothing");
       const std::vector<int> one{2, 3, 4, 5};
       EXPECT_EQ(std::vector<int>(phases.begin(), phases.begin() + 4), one);
@@ -191,7 +191,7 @@ TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
     mj_forward(world.model, world.data);
     world.substep += stage.task->decimation();
   }
-  FAIL() << "never gave up; retries " << most_retries;
+  FAIL() << "never gave up; retries " << max_retries;
 }
 
 TEST(Grasp, ClosesOnOppositeFacesOfABox) {

@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "mjsense/policies/planner/phases.h"
-#include "mjsense/policies/planner/refusals.h"
+#include "mjsense/policies/planner/rejections.h"
 
 namespace mjsense {
 namespace {
@@ -23,7 +23,7 @@ constexpr double kBelow = 0.004;
 constexpr double kSide = 100;
 constexpr int kFewGrasps = 64;
 // A hand is given up after this many grasps from which it does not reach the place.
-constexpr int kMostMisplaced = 24;
+constexpr int kMaxMisplaced = 24;
 constexpr double kAtHome = 0.1;  // rad
 // Distances for moving a tool away from an obstacle it touches.
 constexpr double kBack = 0.06, kUp = 0.10;  // m
@@ -35,7 +35,7 @@ struct Picking::Search {
   const PlanRequest& request;
   const Follower& follower;
   const FailedGrasps& failed;
-  int most_near, most_far;  // maximum number of grasps that are tried
+  int max_near, max_far;  // maximum number of grasps that are tried
 };
 
 Picking::Picking(const Manipulation& shared, const Placing* placing)
@@ -63,19 +63,19 @@ std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest
   });
   const Search search{
       world, request, follower, failed, m_.cfg().max_ik_candidates, m_.cfg().max_far_candidates};
-  std::vector<std::string> refusals;  // of the hands, from their last search
+  std::vector<std::string> rejections;  // of the hands, from their last search
   for (const bool to_place : {true, false}) {
     if (to_place && (order.size() < 2 || !placing_)) continue;
-    refusals.clear();
+    rejections.clear();
     for (int hand : order) {
-      if (const auto grip = pick_with(search, hand, to_place, plan)) return grip;
+      if (const auto grip = plan_pick_with(search, hand, to_place, plan)) return grip;
       plan.segments.clear();
       const std::string of_hand =
           order.size() < 2 ? "" : m_.gripper_group(m_.hand(hand)).name + ", ";
-      refusals.push_back(of_hand + plan.refusal);
+      rejections.push_back(of_hand + plan.rejection);
     }
   }
-  plan.refusal = fmt::format("{}", fmt::join(refusals, "; "));
+  plan.rejection = fmt::format("{}", fmt::join(rejections, "; "));
   return {};
 }
 
@@ -84,7 +84,7 @@ bool Picking::can(const World& world, const PlanRequest& request, const Follower
   const Search search{world, request, follower, failed, kFewGrasps, 0};
   for (int hand = 0; hand < m_.num_hands(); ++hand) {
     Plan unused;
-    if (pick_with(search, hand, false, unused)) return true;
+    if (plan_pick_with(search, hand, false, unused)) return true;
   }
   return false;
 }
@@ -92,7 +92,7 @@ bool Picking::can(const World& world, const PlanRequest& request, const Follower
 Vec3 Picking::wanted_approach(const World& world, const PlanRequest& request,
                               const Pose& object) const {
   Rng draw = m_.rng(world, request, "planner/approach");
-  const double tilt = m_.cfg().most_tilt * std::sqrt(draw.uniform()) * pi / 180;
+  const double tilt = m_.cfg().max_tilt * std::sqrt(draw.uniform()) * pi / 180;
   const Vec3 out = object.p - m_.robot().base_pose(world).p;
   const double turn = std::atan2(out.y, out.x) + draw.uniform(-kSide, kSide) * pi / 180;
   return {std::sin(tilt) * std::cos(turn), std::sin(tilt) * std::sin(turn), -std::cos(tilt)};
@@ -111,8 +111,8 @@ HandPose Picking::draw_back(const World& world, HandPlanner& hand, CollisionQuer
   return start;
 }
 
-std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, bool to_place,
-                                                Plan& plan) {
+std::optional<Picking::Grip> Picking::plan_pick_with(const Search& search, int h, bool to_place,
+                                                     Plan& plan) {
   const World& world = search.world;
   const ManipulationPlannerCfg& cfg = m_.cfg();
   HandPlanner& hand = m_.hand(h);
@@ -127,64 +127,64 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
   const bool is_open = m_.robot().is_open(world, gripper);
   plan.wait(kOpenGripper, is_open ? 0 : cfg.close_time).grip(gripper, group.open_command);
   const HandPose start = draw_back(world, hand, query, now, plan);
-  Rng way = m_.rng(world, search.request, "planner/way");
+  Rng path_rng = m_.rng(world, search.request, "planner/way");
   // The tool frame is turned so that its y axis is the closing direction. First pass: solutions
   // near the current joints; second pass: farther away.
   const GripperShape& shape = m_.gripper(h);
   const std::vector<Grasp> ranked =
       rank_grasps(grasps(m_.target_shape(world.id), h), object, start.tool * Pose{{}, shape.turn},
                   wanted_approach(world, search.request, object));
-  int ways = 0, misplaced = 0;
-  std::vector<Refusal> refusals(ranked.size());
-  const auto say_why = [&] { plan.refusal = text_of("grasps", refusals, world.model); };
-  for (const auto& [iterations, most] :
-       {std::pair(Chain::kTracking, search.most_near), std::pair(400, search.most_far)}) {
+  int num_paths = 0, misplaced = 0;
+  std::vector<Rejection> rejections(ranked.size());
+  const auto say_why = [&] { plan.rejection = text_of("grasps", rejections, world.model); };
+  for (const auto& [iterations, maximum] :
+       {std::pair(Chain::kTracking, search.max_near), std::pair(400, search.max_far)}) {
     int tried = 0;
     for (std::size_t i = 0; i < ranked.size(); ++i) {
       const Grasp& grasp = ranked[i];
-      Refusal& refusal = refusals[i];
+      Rejection& rejection = rejections[i];
       if (shape.lowest(grasp.pose) < m_.scene().support_height(world.id) - kBelow) {
-        refusal = {"in the support"};
+        rejection = {"in the support"};
         continue;
       }
-      if (++tried > most || ways == cfg.max_ways) break;
+      if (++tried > maximum || num_paths == cfg.max_paths) break;
       const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
       if (iterations == Chain::kTracking && search.failed.has(inverse(object) * tool)) {
-        refusal = {"failed before"};
+        rejection = {"failed before"};
         continue;
       }
       HandPose before, at;
       const Pose pregrasp = backed(tool, cfg.pregrasp);
-      refusal = {"out of reach"};
+      rejection = {"out of reach"};
       if (!(iterations == Chain::kTracking && hand.reach_along(world, pregrasp, start, before)) &&
           !hand.reach(world, pregrasp, start, before, iterations))
         continue;
       query.set_margin(kMargin);
       query.forget_touching();
       if (!hand.is_free(query, before)) {
-        refusal = Refusal::collision(query.touching());
+        rejection = Rejection::collision(query.touching());
         continue;
       }
       query.set_margin(kGraspMargin);
       if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) {
-        if (query.touching().first >= 0) refusal = Refusal::collision(query.touching());
+        if (query.touching().first >= 0) rejection = Rejection::collision(query.touching());
         continue;
       }
       if (to_place && !placing_->reaches(world, hand, at)) {
-        refusal = {"with the goal out of reach"};
-        if (++misplaced == kMostMisplaced) return say_why(), std::nullopt;
+        rejection = {"with the goal out of reach"};
+        if (++misplaced == kMaxMisplaced) return say_why(), std::nullopt;
         continue;
       }
       Plan rest;
       hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg.slow, cfg.settle);
       hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg.slow, cfg.close_time)
           .grip(gripper, group.closed_command);
-      refusal = {"without space to lift the object"};
+      rejection = {"without space to lift the object"};
       if (!lift(world, hand, at, rest)) continue;
-      ++ways;
-      refusal = {"without a collision-free path to them"};
+      ++num_paths;
+      rejection = {"without a collision-free path to them"};
       query.set_margin(kMargin);
-      if (!hand.add_way(world, query, plan, kPregrasp, start, before, way)) continue;
+      if (!hand.add_path(world, query, plan, kPregrasp, start, before, path_rng)) continue;
       std::ranges::move(rest.segments, std::back_inserter(plan.segments));
       plan.grasp = tool;
       return Grip{h, inverse(tool) * object, now.tool};
@@ -194,9 +194,10 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
   return {};
 }
 
-void Picking::go_home(const World& world, const PlanRequest& request, const Follower& follower,
-                      const RobotValues& home, Plan& plan) const {
-  Rng way = m_.rng(world, request, "planner/home");
+void Picking::plan_return_home(const World& world, const PlanRequest& request,
+                               const Follower& follower, const RobotValues& home,
+                               Plan& plan) const {
+  Rng path_rng = m_.rng(world, request, "planner/home");
   for (int h = 0; h < m_.num_hands(); ++h) {
     HandPlanner& hand = m_.hand(h);
     if (hand.floats()) continue;
@@ -214,7 +215,7 @@ void Picking::go_home(const World& world, const PlanRequest& request, const Foll
     HandPose there = now;
     there.joints[arm] = home[arm];
     if (!hand.is_free(query, there) ||
-        !hand.add_way(world, query, plan, kOpenGripper, start, there, way))
+        !hand.add_path(world, query, plan, kOpenGripper, start, there, path_rng))
       plan.segments.resize(before);
   }
 }

@@ -35,13 +35,13 @@ class Picking {
   // Adds segments that move the arms to the joint positions of `home` as far as collision-free
   // paths exist. From other positions the arms may be unable to reach the object or may block each
   // other.
-  void go_home(const World& world, const PlanRequest& request, const Follower& follower,
-               const RobotValues& home, Plan& plan) const;
+  void plan_return_home(const World& world, const PlanRequest& request, const Follower& follower,
+                        const RobotValues& home, Plan& plan) const;
 
  private:
   struct Search;
   // With `to_place`, accepts only grasps from which the place is reachable.
-  std::optional<Grip> pick_with(const Search& search, int hand, bool to_place, Plan& plan);
+  std::optional<Grip> plan_pick_with(const Search& search, int hand, bool to_place, Plan& plan);
   // The preferred approach of an episode, drawn at random: from vertical to nearly horizontal,
   // pointing away from the robot.
   Vec3 wanted_approach(const World& world, const PlanRequest& request, const Pose& object) const;

@@ -15,8 +15,8 @@ using std::numbers::pi;
 
 constexpr int kTurns = 16;  // turns about the vertical that are tried
 // maximum number of places and turns that are tried
-constexpr std::size_t kMostGoals = 25 * kTurns;
-constexpr double kMostLowered = 0.3;  // m, maximum height from which the object is put back
+constexpr std::size_t kMaxGoals = 25 * kTurns;
+constexpr double kMaxLowered = 0.3;  // m, maximum height from which the object is put back
 
 // The k-th turn: first none, then alternating to both sides, then the angles in between.
 Quat turned(int k) {
@@ -36,23 +36,23 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   std::array<std::vector<Vec3>, kTurns> places;
   for (int k = 0; k < kTurns; ++k) m_.scene().place_scene()->places(world, turned(k), places[k]);
   Rng draw = m_.rng(world, request, "planner/place");
-  std::vector<Refusal> refusals;
-  std::size_t most = 0;
-  for (const auto& of_turn : places) most = std::max(most, of_turn.size());
-  for (std::size_t i = 0; i < most; ++i) {
+  std::vector<Rejection> rejections;
+  std::size_t maximum = 0;
+  for (const auto& of_turn : places) maximum = std::max(maximum, of_turn.size());
+  for (std::size_t i = 0; i < maximum; ++i) {
     for (int k = 0; k < kTurns; ++k) {
       if (i >= places[k].size()) continue;
       const Pose goal = placed(object, m_.target_shape(world.id), places[k][i], k);
       const std::size_t before = plan.segments.size();
-      Refusal& refusal = refusals.emplace_back();
-      if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan, refusal))
+      Rejection& rejection = rejections.emplace_back();
+      if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan, rejection))
         return true;
       if (plan.segments.size() > before) plan.segments.resize(before);
-      if (refusals.size() > kMostGoals) break;
+      if (rejections.size() > kMaxGoals) break;
     }
-    if (refusals.size() > kMostGoals) break;
+    if (rejections.size() > kMaxGoals) break;
   }
-  plan.refusal = text_of("poses of the object at its goal", refusals, world.model);
+  plan.rejection = text_of("poses of the object at its goal", rejections, world.model);
   return false;
 }
 
@@ -91,8 +91,8 @@ bool Placing::reaches(const World& world, const HandPlanner& hand, const HandPos
   return false;
 }
 
-bool Placing::gets_away(const World& world, HandPlanner& hand, const HandPose& at,
-                        const Pose& object, HandPose& away) const {
+bool Placing::retreat_is_free(const World& world, HandPlanner& hand, const HandPose& at,
+                              const Pose& object, HandPose& away) const {
   const int gripper = hand.hand().gripper, body = m_.target_body(world.id);
   CollisionQuery empty(hand.collisions(), world);
   empty.open(gripper);
@@ -108,7 +108,7 @@ bool Placing::gets_away(const World& world, HandPlanner& hand, const HandPose& a
 
 bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& query,
                        const HandPose& start, const Pose& object, const Pose& tool_object,
-                       const Home& home, Rng& rng, Plan& plan, Refusal& refusal) const {
+                       const Home& home, Rng& rng, Plan& plan, Rejection& rejection) const {
   const ManipulationPlannerCfg& cfg = m_.cfg();
   const int gripper = hand.hand().gripper;
   const Pose tool = object * inverse(tool_object), over = raised(tool, cfg.preplace);
@@ -120,28 +120,28 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
   query.forget_touching();
   if (!(hand.reach_along(world, over, start, above) && fits()) &&
       !(hand.reach(world, over, start, above, 300) && fits())) {
-    refusal = {"out of reach"};
-    if (query.touching().first >= 0) refusal = Refusal::collision(query.touching());
+    rejection = {"out of reach"};
+    if (query.touching().first >= 0) rejection = Rejection::collision(query.touching());
     return false;
   }
   query.set_margin(0);
   if (!hand.is_free(query, at)) {
-    refusal = Refusal::collision(query.touching());
+    rejection = Rejection::collision(query.touching());
     return false;
   }
-  refusal = {"without space for the fingers to open and retreat"};
-  if (!gets_away(world, hand, at, object, away)) return false;
-  refusal = {"without a collision-free path to them"};
+  rejection = {"without space for the fingers to open and retreat"};
+  if (!retreat_is_free(world, hand, at, object, away)) return false;
+  rejection = {"without a collision-free path to them"};
   query.set_margin(kMargin);
   if (!hand.is_free(query, start) || !hand.is_free(query, above)) query.set_margin(0);
-  if (!hand.add_way(world, query, plan, kPreplace, start, above, rng)) return false;
+  if (!hand.add_path(world, query, plan, kPreplace, start, above, rng)) return false;
   for (Segment& segment : plan.segments) segment.holds(gripper);
   const MoveGroup& group = m_.gripper_group(hand);
   hand.add_line(world, plan, kPlace, above.tool, tool, cfg.slow, cfg.place_settle).holds(gripper);
   hand.add_line(world, plan, kPlace, tool, tool, cfg.slow, cfg.open_time)
       .grip(gripper, group.open_command);
   hand.add_line(world, plan, kRetreat, tool, away.tool, cfg.fast);
-  go_home(world, hand, away, object, home, rng, plan);
+  plan_return_home(world, hand, away, object, home, rng, plan);
   plan.wait(kUnknownPhase, cfg.rest);
   return true;
 }
@@ -154,13 +154,13 @@ bool Placing::put_back(const World& world, const Follower& follower, HandPlanner
   const Pose object = start.tool * tool_object;
   const double above = object.p.z + underside(m_.target_shape(world.id), object.q) -
                        m_.scene().support_height(world.id);
-  if (above < cfg.clearance || above > kMostLowered) return false;
+  if (above < cfg.clearance || above > kMaxLowered) return false;
   const double down = cfg.clearance - above;
   CollisionQuery query(hand.collisions(), world);
   query.hold(hand.hand().tool, gripper, m_.target_body(world.id), tool_object);
   HandPose at, away;
   if (!hand.line_is_free(world, query, start, raised(start.tool, down), at) ||
-      !hand.is_free(query, at) || !gets_away(world, hand, at, raised(object, down), away))
+      !hand.is_free(query, at) || !retreat_is_free(world, hand, at, raised(object, down), away))
     return false;
   hand.add_line(world, plan, kPlace, start.tool, at.tool, cfg.slow, cfg.place_settle)
       .holds(gripper);
@@ -171,8 +171,8 @@ bool Placing::put_back(const World& world, const Follower& follower, HandPlanner
 }
 
 // The hand stays where it is if no collision-free path exists.
-void Placing::go_home(const World& world, HandPlanner& hand, const HandPose& from,
-                      const Pose& object, const Home& home, Rng& rng, Plan& plan) const {
+void Placing::plan_return_home(const World& world, HandPlanner& hand, const HandPose& from,
+                               const Pose& object, const Home& home, Rng& rng, Plan& plan) const {
   CollisionQuery query(hand.collisions(), world);
   query.open(hand.hand().gripper);
   query.place(m_.target_body(world.id), object);
@@ -182,7 +182,7 @@ void Placing::go_home(const World& world, HandPlanner& hand, const HandPose& fro
   query.set_margin(kMargin);
   if (!hand.is_free(query, from) || !hand.is_free(query, there)) query.set_margin(0);
   if (!hand.is_free(query, there)) return;
-  hand.add_way(world, query, plan, kGoHome, from, there, rng);
+  hand.add_path(world, query, plan, kGoHome, from, there, rng);
 }
 
 }  // namespace mjsense

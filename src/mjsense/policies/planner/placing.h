@@ -4,7 +4,7 @@
 // retreats.
 
 #include "mjsense/policies/planner/manipulation.h"
-#include "mjsense/policies/planner/refusals.h"
+#include "mjsense/policies/planner/rejections.h"
 
 namespace mjsense {
 
@@ -38,13 +38,13 @@ class Placing {
   double underside(const ObjectShape& shape, const Quat& object) const;
   // True if the open hand can retreat from the object released at X_WO; `away` is the pose after
   // that.
-  bool gets_away(const World& world, HandPlanner& hand, const HandPose& at, const Pose& object,
-                 HandPose& away) const;
+  bool retreat_is_free(const World& world, HandPlanner& hand, const HandPose& at,
+                       const Pose& object, HandPose& away) const;
   bool place_at(const World& world, HandPlanner& hand, CollisionQuery& query, const HandPose& start,
                 const Pose& object, const Pose& tool_object, const Home& home, Rng& rng, Plan& plan,
-                Refusal& refusal) const;
-  void go_home(const World& world, HandPlanner& hand, const HandPose& from, const Pose& object,
-               const Home& home, Rng& rng, Plan& plan) const;
+                Rejection& rejection) const;
+  void plan_return_home(const World& world, HandPlanner& hand, const HandPose& from,
+                        const Pose& object, const Home& home, Rng& rng, Plan& plan) const;
 
   const Manipulation& m_;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A plan: a sequence of segments, each with a phase and the motions of the move groups. Planners
-// make plans; the Follower (follower.h) executes them.
+// make plans; the Follower (plan_follower.h) executes them.
 
 #include <limits>
 #include <span>
@@ -56,7 +56,7 @@ struct Segment {
 
 struct Plan {
   std::vector<Segment> segments;  // empty: no plan was found
-  std::string refusal;            // reason for that, shown to users; may be empty
+  std::string rejection;          // reason for that, shown to users; may be empty
   Pose grasp;                     // X_WT that policies record; kept from plan to plan
   // The task needs a further stage that cannot be planned yet. The planner is called for it when
   // these segments are done.
@@ -64,7 +64,7 @@ struct Plan {
 
   void clear() {
     segments.clear();
-    refusal.clear();
+    rejection.clear();
     more = false;
   }
   // Moves the tool at `speed` (m/s) and at most `turn` (rad/s), then waits for `settle` s.

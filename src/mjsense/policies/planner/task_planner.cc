@@ -49,11 +49,11 @@ bool TaskPlanner::plan(const World& world) {
   make_plan(world, {state.retries, state.stage}, plan);
   follower_.begin(world);
   state.planned = !plan.segments.empty();
-  if (!state.planned) state.refusal = plan.refusal;
+  if (!state.planned) state.rejection = plan.rejection;
   return state.planned;
 }
 
-void TaskPlanner::begin_again(const World& world, Action& action) {
+void TaskPlanner::replan(const World& world, Action& action) {
   State& state = states_[world.id];
   state.planned = false;
   state.stops = true;
@@ -69,9 +69,9 @@ std::string TaskPlanner::failure(int world) const {
   const State& state = states_[world];
   std::string text = text_of(state.failure);
   const bool unplanned = state.failure == PlanFailure::kUnplanned;
-  if (state.no_other_way && !unplanned) text += ", then it found no plan";
-  if ((state.no_other_way || unplanned) && !state.refusal.empty())
-    text += " (" + state.refusal + ")";
+  if (state.no_other_path && !unplanned) text += ", then it found no plan";
+  if ((state.no_other_path || unplanned) && !state.rejection.empty())
+    text += " (" + state.rejection + ")";
   return text;
 }
 
@@ -89,14 +89,14 @@ void TaskPlanner::act(const World& world, Action& action) {
     if (state.gives_up) return give_up(action);
     action = {};
     follower_.restart(world);
-    state.no_other_way = !plan(world);
+    state.no_other_path = !plan(world);
   }
   if (state.planned && !follower_.finished(world.id)) {
     PlanFailure failure = follower_.failure(world);
     if (failure == PlanFailure::kNone && gone_wrong(world)) failure = PlanFailure::kAstray;
     if (failure != PlanFailure::kNone) {
       state.failure = failure;
-      return begin_again(world, action);
+      return replan(world, action);
     }
   }
   if (!state.planned) return give_up(action);
@@ -106,7 +106,7 @@ void TaskPlanner::act(const World& world, Action& action) {
     if (!plan(world)) {
       state.failure = PlanFailure::kUnplanned;
       action = {};
-      return begin_again(world, action);
+      return replan(world, action);
     }
     follower_.follow(world, action);
   }

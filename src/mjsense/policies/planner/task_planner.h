@@ -15,7 +15,7 @@
 
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
-#include "mjsense/policies/planner/follower.h"
+#include "mjsense/policies/planner/plan_follower.h"
 
 namespace mjsense {
 
@@ -50,7 +50,7 @@ class TaskPlanner : public PlannerPolicy {
   // Throws ValueError for an unsupported task or robot.
   virtual void initialize_planner() = 0;
   // Fills an empty plan for the current state of the world. No segments mean that there is no plan:
-  // the planner gives up, or retries if this was not the first stage; plan.refusal is the reason.
+  // the planner gives up, or retries if this was not the first stage; plan.rejection is the reason.
   // Calls for different worlds run in parallel.
   virtual void make_plan(const World& world, const PlanRequest& request, Plan& plan) = 0;
   // Phase while the first plan is made.
@@ -73,11 +73,11 @@ class TaskPlanner : public PlannerPolicy {
     bool gives_up = false;  // gives up instead, once at rest
     int retries = 0, stage = 0;
     PlanFailure failure = PlanFailure::kNone;
-    bool no_other_way = false;  // the retry found no plan
-    std::string refusal;        // reason of the last time that no plan was found
+    bool no_other_path = false;  // the retry found no plan
+    std::string rejection;       // reason of the last time that no plan was found
   };
   bool plan(const World& world);
-  void begin_again(const World& world, Action& action);
+  void replan(const World& world, Action& action);
   static void give_up(Action& action);
 
   TaskPlannerCfg planner_cfg_;

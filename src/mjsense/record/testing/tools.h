@@ -69,8 +69,8 @@ inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) 
   };
   std::vector<Running> running(a.worlds);
   std::int64_t next = 0;
-  for (int decided = 0; !recorder.enough();) {
-    for (int w = 0; w < a.worlds && !recorder.enough(); ++w) {
+  for (int decided = 0; !recorder.has_all_episodes();) {
+    for (int w = 0; w < a.worlds && !recorder.has_all_episodes(); ++w) {
       Running& r = running[w];
       if (r.episode < 0) {
         while (recorder.decided(next)) ++next;

@@ -47,7 +47,7 @@ void set_box(const std::array<float, 6>& box, RayGeom& shape) {
 
 // A flex or skin: triangles that move.
 struct SceneRenderer::Soft {
-  SoftMesh mesh;
+  DeformableMesh mesh;
   std::vector<float> vertices;  // those that the mesh has
   std::vector<float> normals, density;
   MeshSurface surface;
@@ -347,9 +347,9 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
         if (!(length > 0)) continue;
         double* m = part.shape.mat;
         for (double& x : along) x /= length;
-        const int least = std::abs(along[0]) < 0.5 ? 0 : 1;
+        const int minimum = std::abs(along[0]) < 0.5 ? 0 : 1;
         double x[3] = {}, size = 0;
-        for (int k = 0; k < 3; ++k) x[k] = (k == least) - along[least] * along[k];
+        for (int k = 0; k < 3; ++k) x[k] = (k == minimum) - along[minimum] * along[k];
         for (double v : x) size += v * v;
         for (int k = 0; k < 3; ++k) {
           const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -380,7 +380,7 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
     place->num_faces = count;
     std::vector<int> faces(3 * static_cast<std::size_t>(count));
     for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = static_cast<int>(i);
-    place->mesh = SoftMesh(device_.get(), faces, now);
+    place->mesh = DeformableMesh(device_.get(), faces, now);
     box_around(now, place->box);
   } else if (!std::ranges::equal(now, place->mesh.vertices())) {
     std::ranges::copy(now, place->mesh.vertices().begin());
@@ -420,7 +420,8 @@ void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
   const bool first = !place;
   if (first) {
     place = std::make_unique<Soft>();
-    place->mesh = SoftMesh(device_.get(), {faces, 3 * static_cast<std::size_t>(num_faces)}, now);
+    place->mesh =
+        DeformableMesh(device_.get(), {faces, 3 * static_cast<std::size_t>(num_faces)}, now);
     place->normals.resize(9 * static_cast<std::size_t>(num_faces));
   }
   Soft& soft = *place;

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "mjsense/rays/soft_mesh.h"
+#include "mjsense/rays/deformable_mesh.h"
 #include "mjsense/render/abstract/abstract_scene.h"
 #include "mjsense/render/abstract/decoration_shapes.h"
 #include "mjsense/render/abstract/model_arrays.h"

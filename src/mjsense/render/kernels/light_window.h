@@ -39,15 +39,15 @@ inline LitWindow window_of(const LightFrame& f, const float (*p)[kLanes], std::u
   float slack = error;
   if (f.perspective) {
     const float nearest = lane_min(w0) - error;
-    float most = -out.u0;
-    for (float x : {out.u1, -out.v0, out.v1}) most = x > most ? x : most;
-    slack = nearest > error ? error * (1 + most) / nearest : kInfinity;
+    float maximum = -out.u0;
+    for (float x : {out.u1, -out.v0, out.v1}) maximum = x > maximum ? x : maximum;
+    slack = nearest > error ? error * (1 + maximum) / nearest : kInfinity;
   }
-  const auto least = [&](float x) { return x - slack > -f.limit ? x - slack : -f.limit; };
-  out.u0 = least(out.u0);
-  out.v0 = least(out.v0);
-  out.u1 = -least(-out.u1);
-  out.v1 = -least(-out.v1);
+  const auto minimum = [&](float x) { return x - slack > -f.limit ? x - slack : -f.limit; };
+  out.u0 = minimum(out.u0);
+  out.v0 = minimum(out.v0);
+  out.u1 = -minimum(-out.u1);
+  out.v1 = -minimum(-out.v1);
   return out;
 }
 
@@ -104,11 +104,13 @@ struct SeenByLight {
       }
       if (perspective) {
         const Mask ahead = error < low[2];
-        const Float least = one / select(ahead, high[2], one),
-                    most = one / select(ahead, low[2], one);
+        const Float minimum = one / select(ahead, high[2], one),
+                    maximum = one / select(ahead, low[2], one);
         for (int i = 0; i < 2; ++i) {
-          low[i] = select(ahead, low[i] * select(low[i] < zero, most, least), splat(-kInfinity));
-          high[i] = select(ahead, high[i] * select(zero < high[i], most, least), splat(kInfinity));
+          low[i] =
+              select(ahead, low[i] * select(low[i] < zero, maximum, minimum), splat(-kInfinity));
+          high[i] =
+              select(ahead, high[i] * select(zero < high[i], maximum, minimum), splat(kInfinity));
         }
       }
       store(out.u0 + k, low[0]);

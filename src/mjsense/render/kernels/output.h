@@ -2,7 +2,7 @@
 #pragma once
 // Writes the results of a packet of pixels to the output images. Part of the tile kernels.
 
-#include "mjsense/render/kernels/layers.h"
+#include "mjsense/render/kernels/transparency.h"
 
 namespace mjsense {
 namespace {

@@ -69,7 +69,7 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, const TriangleB
     shown = shown & (low[0] <= splat(tile.around[1])) & (splat(tile.around[0]) <= high[0]) &
             (low[1] <= splat(tile.around[3])) & (splat(tile.around[2]) <= high[1]) &
             (splat(0.0f) < farthest);
-    if (!grid.bent && tile.regular) {
+    if (!grid.distorted_rays && tile.regular) {
       const Mask over = holds_center(low[0], high[0], tile.around[0], grid.dx) &
                         holds_center(low[1], high[1], tile.around[3], grid.dy);
       shown = shown & (over | ~ahead);
@@ -166,14 +166,14 @@ struct TileFrustum {
     for (int k = 0; k < kClusterSize; k += kWidth) {
       const Vec3f c{load(node.center[0] + k), load(node.center[1] + k), load(node.center[2] + k)};
       const Vec3f h{load(node.half[0] + k), load(node.half[1] + k), load(node.half[2] + k)};
-      Float least = splat(kInfinity);
+      Float minimum = splat(kInfinity);
       for (int p = 0; p < kPlanes; ++p)
-        least = min(least, dot(splat(a[p]), c) + fma(splat(size[p][0]), h.x, splat(b[p])) +
-                               fma(splat(size[p][1]), h.y, splat(size[p][2]) * h.z));
+        minimum = min(minimum, dot(splat(a[p]), c) + fma(splat(size[p][0]), h.x, splat(b[p])) +
+                                   fma(splat(size[p][1]), h.y, splat(size[p][2]) * h.z));
       const Vec3f d = c - splat(eye);
       const Vec3f axis{load(node.axis[0] + k), load(node.axis[1] + k), load(node.axis[2] + k)};
       const Float away = fma(load(node.spread + k), sqrt(dot(d, d)), sqrt(dot(h, h)));
-      seen |= bits((splat(0.0f) <= least) & (dot(axis, d) <= away)) << k;
+      seen |= bits((splat(0.0f) <= minimum) & (dot(axis, d) <= away)) << k;
     }
     return seen & ((1u << node.count) - 1);
   }
@@ -182,8 +182,8 @@ struct TileFrustum {
 constexpr int kMaxBlocks = 640;  // in one tile; more are never worth rasterising
 
 // Writes the blocks of triangles that the tile may see and returns their number, or -1 if it
-// exceeds `most`.
-inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int most,
+// exceeds `maximum`.
+inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int maximum,
                        int* blocks) {
   int waiting[Clusters::kMaxWaiting];
   int left = 1, found = 0;
@@ -194,7 +194,7 @@ inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int
       const int child = node.child[__builtin_ctz(seen)];
       if (child >= 0) {
         waiting[left++] = child;
-      } else if (found < most) {
+      } else if (found < maximum) {
         blocks[found++] = ~child;
       } else {
         return -1;
@@ -217,9 +217,9 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
   const Clusters& clusters = *g.clusters;
   // A packet of rays costs about as much as kBlocksPerPacket blocks.
   constexpr int kBlocksPerPacket = 40;
-  const int most = kBlocksPerPacket * __builtin_popcount(packets);
+  const int maximum = kBlocksPerPacket * __builtin_popcount(packets);
   int blocks[kMaxBlocks];
-  const int count = find_blocks(clusters, TileFrustum(g, tile), most, blocks);
+  const int count = find_blocks(clusters, TileFrustum(g, tile), maximum, blocks);
   if (count < 0) return false;
   Drawn drawn;
   for (int i = 0; i < count; ++i) {

@@ -5,10 +5,10 @@
 
 #include <mujoco/mujoco.h>
 
-#include "mjsense/rays/clusters.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/simd.h"
+#include "mjsense/rays/triangle_clusters.h"
 #include "mjsense/render/view/view.h"
 
 namespace mjsense {
@@ -60,15 +60,15 @@ inline Vec3f hit_point(const View& view, const Pixels& pixels, const Hits& hits,
 // Bounding box of the points of `lanes`; low > high if there are none.
 inline void bounds(const float (*p)[kLanes], std::uint32_t lanes, float* low, float* high) {
   for (int c = 0; c < 3; ++c) {
-    Float least = splat(kInfinity), most = splat(-kInfinity);
+    Float minimum = splat(kInfinity), maximum = splat(-kInfinity);
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(lanes >> k & kAllLanes);
       const Float x = load(p[c] + k);
-      least = min(least, select(m, x, splat(kInfinity)));
-      most = max(most, select(m, x, splat(-kInfinity)));
+      minimum = min(minimum, select(m, x, splat(kInfinity)));
+      maximum = max(maximum, select(m, x, splat(-kInfinity)));
     }
-    low[c] = lane_min(least);
-    high[c] = lane_max(most);
+    low[c] = lane_min(minimum);
+    high[c] = lane_max(maximum);
   }
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 // Background of a packet: the skybox, and the haze in front of it. Part of the tile kernels.
 
-#include "mjsense/render/kernels/shade.h"
+#include "mjsense/render/kernels/shading.h"
 
 namespace mjsense {
 namespace {

@@ -13,7 +13,7 @@ struct alignas(64) Surfaces {
   float p[3][kLanes], n[3][kLanes];
   float rgb[3][kLanes], alpha[kLanes];
   float texture[3][kLanes];  // 0..1
-  float specular[kLanes], exponent[kLanes], dull[kLanes], emission[kLanes];
+  float specular[kLanes], exponent[kLanes], highlight_threshold[kLanes], emission[kLanes];
 };
 
 // Normal of a primitive at the surface point p, geom frame, any length.
@@ -117,9 +117,9 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
     Rgb color;
     if (texture.cube) {
       const Vec3f d{q.x * s.stretch[0], q.y * s.stretch[1], q.z * s.stretch[2]};
-      const Float most = max(max(abs(d.x), max(abs(d.y), abs(d.z))), splat(kTiny));
+      const Float maximum = max(max(abs(d.x), max(abs(d.y), abs(d.z))), splat(kTiny));
       const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
-      color = sample_cube(texture, m, d, length * splat(0.5f * width * stretch) / most);
+      color = sample_cube(texture, m, d, length * splat(0.5f * width * stretch) / maximum);
     } else {
       Float u, v, footprint;
       if (plane || s.from_above) {
@@ -203,7 +203,7 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     put(out.alpha, splat(s.rgba[3]));
     put(out.specular, splat(s.specular));
     put(out.exponent, splat(s.exponent));
-    put(out.dull, splat(s.dull));
+    put(out.highlight_threshold, splat(s.highlight_threshold));
     put(out.emission, splat(s.emission));
     if (!s.texture) continue;
     store(local[0] + k, q.x);

@@ -3,10 +3,10 @@
 // Renders a tile of 16 x 16 pixels: finds the geoms it can see, the hit of each pixel, and its
 // colour. Part of the tile kernels.
 
-#include "mjsense/render/kernels/fixed.h"
-#include "mjsense/render/kernels/layers.h"
 #include "mjsense/render/kernels/output.h"
 #include "mjsense/render/kernels/sky.h"
+#include "mjsense/render/kernels/tile_fixed_layer.h"
+#include "mjsense/render/kernels/transparency.h"
 
 namespace mjsense {
 namespace {
@@ -18,15 +18,15 @@ alignas(64) constexpr int kRow[kLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3,
 // Lanes outside the image repeat its border; they cost no extra work and are not written.
 inline Int within(Int i, int size) { return select(less(i, int_of(size)), i, int_of(size - 1)); }
 
-inline void fill_bent(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
-                      Pixels& out) {
+inline void fill_distorted(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
+                           Pixels& out) {
   float* w = out.window;
   w[0] = w[2] = kInfinity;
   w[1] = w[3] = -kInfinity;
   for (int i = 0; i < kLanes; ++i) {
     const int column = x0 + kColumn[i] < grid.width ? x0 + kColumn[i] : grid.width - 1;
     const int row = y0 + kRow[i] < grid.height ? y0 + kRow[i] : grid.height - 1;
-    const float* ray = grid.bent + 2 * (row * grid.width + column);
+    const float* ray = grid.distorted_rays + 2 * (row * grid.width + column);
     const float px = out.x[i] = ray[0] + shift_x * grid.dx;
     const float py = out.y[i] = ray[1] + shift_y * grid.dy;
     w[0] = px < w[0] ? px : w[0];
@@ -40,7 +40,7 @@ inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float s
                         Pixels& out) {
   const PixelGrid& grid = view.grid;
   for (int k = 0; k < kLanes; k += kWidth) store(out.near + k, splat(view.near));
-  if (grid.bent) return fill_bent(grid, x0, y0, shift_x, shift_y, out);
+  if (grid.distorted_rays) return fill_distorted(grid, x0, y0, shift_x, shift_y, out);
   const auto place = [](float first, float step, Int i, float shift) {
     return splat(first) + splat(step) * (to_float(i) + splat(0.5f + shift));
   };
@@ -70,7 +70,7 @@ inline void find_row(const View& view, int ty, TileScratch& scratch) {
   scratch.row_count = 0;
   for (int i = 0; i < view.num_opaque + view.num_transparent; ++i) {
     const float* w = view.geoms[i].window;
-    if (grid.bent || (w[2] <= high && w[3] >= low)) scratch.row[scratch.row_count++] = i;
+    if (grid.distorted_rays || (w[2] <= high && w[3] >= low)) scratch.row[scratch.row_count++] = i;
   }
 }
 
@@ -102,8 +102,9 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
 }
 
 // Computes the colours of packet `q` before transparent geoms: surfaces, sky, reflections, haze.
-inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrored& mirrored, int q,
-                         const Pixels& pixels, Hits& hits, Shadows& shadows, Colors& colors) {
+inline void shade_packet(const View& view, const FixedTile* fixed, const Reflection& reflection,
+                         int q, const Pixels& pixels, Hits& hits, Shadows& shadows,
+                         Colors& colors) {
   const std::uint32_t lanes = hit_lanes(hits);
   shadows.packet = q;
   shadows.settled = false;
@@ -117,14 +118,14 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrore
     shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
   }
   if (lanes != 0xffffu) shade_background(view, pixels, ~lanes & 0xffffu, colors);
-  if (view.reflection) add_reflection(view, mirrored, q, colors);
+  if (view.reflection) add_reflection(view, reflection, q, colors);
   if (view.sky_distance > 0) add_haze(view, pixels, hits, colors);
 }
 
 // Work space of a thread; TileScratch::tile points to it.
 struct TileSpace {
   Tile tile;
-  Mirrored mirrored;
+  Reflection reflection;
   Tile sampled;
 };
 
@@ -162,10 +163,10 @@ inline void start_tile(const View& view, int x0, int y0, int across, int packets
 }
 
 // Computes the colours of packet `q` with transparent geoms. `color`: where to store them.
-inline void shade_pixels(const View& view, const FixedTile* fixed, const Mirrored& mirrored, int q,
-                         const TileLists& lists, const TileScratch& scratch, Tile& tile,
+inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflection& reflection,
+                         int q, const TileLists& lists, const TileScratch& scratch, Tile& tile,
                          Shadows& shadows, Colors& colors) {
-  shade_packet(view, fixed, mirrored, q, tile.pixels[q], tile.hits[q], shadows, colors);
+  shade_packet(view, fixed, reflection, q, tile.pixels[q], tile.hits[q], shadows, colors);
   if (lists.transparent)
     shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.hits[q],
                       colors);
@@ -193,7 +194,7 @@ inline void find_edges(const View& view, const TileLists& lists, int across, int
         nearness[at + r * kSide + i] = 1 / tile.hits[q].t[4 * r + i];
       }
   }
-  const float most = 2 * kBend * grid.dx;
+  const float maximum = 2 * kBend * grid.dx;
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) {
       const int at = y * kSide + x, id = geom[at];
@@ -201,7 +202,7 @@ inline void find_edges(const View& view, const TileLists& lists, int across, int
         if ((before && geom[at - step] != id) || (after && geom[at + step] != id)) return true;
         if (!before || !after) return false;
         const float bend = nearness[at - step] + nearness[at + step] - 2 * nearness[at];
-        return (bend < 0 ? -bend : bend) > most * nearness[at];
+        return (bend < 0 ? -bend : bend) > maximum * nearness[at];
       };
       if (differs(x > 0, x + 1 < columns, 1) || differs(y > 0, y + 1 < rows, kSide))
         edges[y / 4 * across + x / 4] |= 1u << (y % 4 * 4 + x % 4);
@@ -269,7 +270,8 @@ inline void start_samples(const View& view, const Tile& centers, const SampledPi
 // the surface of its centre keeps its colour, unless its packet is in `always`.
 inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
                           const SampledPixels& pixels, int samples, PacketMask always,
-                          TileScratch& scratch, Tile& tile, Mirrored& mirrored, Colors* colors) {
+                          TileScratch& scratch, Tile& tile, Reflection& reflection,
+                          Colors* colors) {
   start_samples(view, centers, pixels, samples, tile);
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
   const int packets = (pixels.count * samples + kLanes - 1) / kLanes;
@@ -302,11 +304,11 @@ inline void shade_samples(const View& view, const TileLists& lists, const Tile& 
   if (!shaded) return;
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
-  if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+  if (view.reflection) trace_reflection(view, packets, tile, reflection);
   for (; shaded; shaded &= shaded - 1) {
     const int q = __builtin_ctz(shaded);
     Colors sampled;
-    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, sampled);
+    shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, sampled);
     for (int k = 0; k < kLanes; k += samples) {
       if (!(lanes[q] >> k & 1u)) continue;
       const int pixel = (q * kLanes + k) / samples;
@@ -323,7 +325,7 @@ inline void shade_samples(const View& view, const TileLists& lists, const Tile& 
 // samples see different surfaces.
 inline void render_multisampled(const View& view, const ImageTargets& targets, int x0, int y0,
                                 TileScratch& scratch) {
-  auto& [tile, mirrored, sampled] = *static_cast<TileSpace*>(scratch.tile);
+  auto& [tile, reflection, sampled] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
@@ -338,7 +340,7 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
-  if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+  if (view.reflection) trace_reflection(view, packets, tile, reflection);
   std::uint32_t edges[kTilePackets] = {};
   find_edges(view, lists, across, down, scratch, tile, edges);
   PacketMask always = 0;
@@ -346,31 +348,33 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
     always |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
   Colors colors[kTilePackets];
   for (int q = 0; q < packets; ++q) {
-    shade_pixels(view, nullptr, mirrored, q, lists, scratch, tile, shadows, colors[q]);
+    shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, colors[q]);
     // Edges of what is reflected.
-    if (view.reflection && mirrored.lanes[q] && hit_lanes(mirrored.tile.hits[q])) always |= 1u << q;
+    if (view.reflection && reflection.lanes[q] && hit_lanes(reflection.tile.hits[q]))
+      always |= 1u << q;
     if (always >> q & 1u) edges[q] = 0xffffu;
   }
-  const int most = kTilePackets * kLanes / samples;  // pixels in a tile of samples
+  const int maximum = kTilePackets * kLanes / samples;  // pixels in a tile of samples
   SampledPixels pixels;
   for (int q = 0; q < packets; ++q) {
     for (std::uint32_t lanes = edges[q]; lanes; lanes &= lanes - 1) {
       pixels.packet[pixels.count] = q;
       pixels.lane[pixels.count++] = __builtin_ctz(lanes);
-      if (pixels.count < most) continue;
-      shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, mirrored, colors);
+      if (pixels.count < maximum) continue;
+      shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, reflection,
+                    colors);
       pixels.count = 0;
     }
   }
   if (pixels.count)
-    shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, mirrored, colors);
+    shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, reflection, colors);
   for (int q = 0; q < packets; ++q)
     write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
 }
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  auto& [tile, mirrored, sampled] = *static_cast<TileSpace*>(scratch.tile);
+  auto& [tile, reflection, sampled] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
@@ -411,10 +415,10 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     if (targets.rgb && sample < samples) {
       Shadows shadows;
       if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);
-      if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
+      if (view.reflection) trace_reflection(view, packets, tile, reflection);
       for (int q = 0; q < packets; ++q) {
         Colors colors;
-        shade_pixels(view, fixed, mirrored, q, lists, scratch, tile, shadows, colors);
+        shade_pixels(view, fixed, reflection, q, lists, scratch, tile, shadows, colors);
         for (int c = 0; c < 3; ++c)
           for (int k = 0; k < kLanes; k += kWidth) {
             const Float color = load(colors.rgb[c] + k);

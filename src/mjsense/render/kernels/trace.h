@@ -102,7 +102,7 @@ inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limi
 
 // The first hit on a closed surface is a front face. Only lanes whose first hit is a back face are
 // traced again with Embree's filter that tests the side of every triangle.
-inline void look_behind_backs(const ViewGeom& g, Float limit, EmbreeRayHits& rays, int* valid) {
+inline void trace_past_back_faces(const ViewGeom& g, Float limit, EmbreeRayHits& rays, int* valid) {
   const Vec3f n{load(rays.hit.Ng_x), load(rays.hit.Ng_y), load(rays.hit.Ng_z)};
   const Vec3f d{load(rays.ray.dir_x), load(rays.ray.dir_y), load(rays.ray.dir_z)};
   int* ids = reinterpret_cast<int*>(rays.hit.geomID);
@@ -132,7 +132,7 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
       const Float before = load(h.t + k), limit = before * splat(1.0f + kSame);
       if (!fill_rays(at, pixels[q], k, limit, rays, valid)) continue;
       embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
-      look_behind_backs(g, limit, rays, valid);
+      trace_past_back_faces(g, limit, rays, valid);
       const Float t = load(rays.ray.tfar);
       const Int found = load(reinterpret_cast<int*>(rays.hit.geomID));
       const Mask hit = less(int_of(-1), found) & shows(t, int_of(g.id), before, load(h.id + k));

@@ -8,11 +8,11 @@
 namespace mjsense {
 
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel*, const GlRendererCfg&,
-                                             const std::string& place) {
+                                             const std::string& context) {
   throw RuntimeError(fmt::format(
       "{}: renderer 'opengl' is not in this build: install libegl-dev and configure with "
       "-DMJSENSE_OPENGL=ON, or use renderer 'rays'",
-      place));
+      context));
 }
 
 }  // namespace mjsense

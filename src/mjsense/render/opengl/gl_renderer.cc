@@ -32,13 +32,13 @@ struct Egl {
   decltype(&eglDestroyContext) destroy_context;
   decltype(&eglMakeCurrent) make_current;
 
-  explicit Egl(const std::string& place) {
+  explicit Egl(const std::string& context) {
     void* library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
     if (!library)
-      throw RuntimeError(fmt::format("{}: OpenGL: {}; is libegl1 installed?", place, dlerror()));
+      throw RuntimeError(fmt::format("{}: OpenGL: {}; is libegl1 installed?", context, dlerror()));
     const auto find = [&](auto& function, const char* name) {
       function = reinterpret_cast<std::decay_t<decltype(function)>>(dlsym(library, name));
-      if (!function) throw RuntimeError(fmt::format("{}: OpenGL: libEGL has no {}", place, name));
+      if (!function) throw RuntimeError(fmt::format("{}: OpenGL: libEGL has no {}", context, name));
     };
     find(get_error, "eglGetError");
     find(get_display, "eglGetDisplay");
@@ -55,10 +55,10 @@ struct Egl {
 // A context without a window, on Mesa's surfaceless platform or else the default display.
 class EglContext {
  public:
-  explicit EglContext(const std::string& place) : egl_(place) {
+  explicit EglContext(const std::string& context) : egl_(context) {
     const auto fail = [&](const char* what) {
       throw RuntimeError(
-          fmt::format("{}: OpenGL: {} (EGL error {:#x}); is libgl1-mesa-dri installed?", place,
+          fmt::format("{}: OpenGL: {} (EGL error {:#x}); is libgl1-mesa-dri installed?", context,
                       what, static_cast<unsigned>(egl_.get_error())));
     };
     display_ =
@@ -107,10 +107,10 @@ void flip_rows(auto* pixels, int width, int height) {
 
 class MujocoGl final : public GlRenderer {
  public:
-  MujocoGl(const mjModel* model, const GlRendererCfg& cfg, const std::string& place)
+  MujocoGl(const mjModel* model, const GlRendererCfg& cfg, const std::string& context)
       : cfg_(cfg),
-        place_(place),
-        egl_(place),
+        error_context_(context),
+        egl_(context),
         model_(call_mujoco(mj_copyModel, nullptr, model)),
         data_(call_mujoco(mj_makeData, model_.get())),
         worlds_(cfg.num_worlds, VisualFields(model)) {
@@ -186,7 +186,7 @@ class MujocoGl final : public GlRenderer {
   void take() {
     if (!egl_.take())
       throw RuntimeError(
-          fmt::format("{}: OpenGL: the context is in use by another thread", place_));
+          fmt::format("{}: OpenGL: the context is in use by another thread", error_context_));
   }
 
   // mjrContext keeps its own copies of the materials' texture fields.
@@ -261,7 +261,7 @@ class MujocoGl final : public GlRenderer {
   }
 
   GlRendererCfg cfg_;
-  std::string place_;
+  std::string error_context_;
   EglContext egl_;
   struct Delete {
     void operator()(mjModel* m) const { mj_deleteModel(m); }
@@ -281,8 +281,8 @@ class MujocoGl final : public GlRenderer {
 }  // namespace
 
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRendererCfg& cfg,
-                                             const std::string& place) {
-  return std::make_unique<MujocoGl>(model, cfg, place);
+                                             const std::string& context) {
+  return std::make_unique<MujocoGl>(model, cfg, context);
 }
 
 }  // namespace mjsense

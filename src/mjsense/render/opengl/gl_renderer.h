@@ -44,8 +44,8 @@ class GlRenderer {
                       const ImageTargets& targets) = 0;
 };
 
-// Throws RuntimeError, with a message that starts with `place`, if OpenGL is not available.
+// Throws RuntimeError, with a message that starts with `context`, if OpenGL is not available.
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRendererCfg& cfg,
-                                             const std::string& place);
+                                             const std::string& context);
 
 }  // namespace mjsense

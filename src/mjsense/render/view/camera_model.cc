@@ -82,12 +82,12 @@ double undo_fisheye(double r, std::span<const double> k) {
 
 // Throws ValueError: the lens images no direction at pixel (x, y).
 [[noreturn]] void throw_out_of_reach(const PixelGrid& grid, Lens lens, std::span<const double> k,
-                                     const char* place, int x, int y) {
+                                     const char* context, int x, int y) {
   if (lens == Lens::kBrownConrady)
     throw ValueError(fmt::format(
         "{}: the distortion has no inverse at pixel ({}, {}): with these coefficients the image "
         "folds over before it; use a longer focal length (fx {:.4g} now) or smaller coefficients",
-        place, x, y, 1 / grid.dx));
+        context, x, y, 1 / grid.dx));
   const double corner =
       std::max(std::hypot(grid.left, grid.top),
                std::hypot(grid.left + grid.dx * grid.width, grid.top + grid.dy * grid.height));
@@ -96,12 +96,12 @@ double undo_fisheye(double r, std::span<const double> k) {
     throw ValueError(fmt::format(
         "{}: the distortion has no inverse at pixel ({}, {}): these coefficients put 89 degrees at "
         "radius {:.4g}",
-        place, x, y, reach));
+        context, x, y, reach));
   throw ValueError(
       fmt::format("{}: the distortion has no inverse at pixel ({}, {}): the direction would be "
                   "more than 89 degrees from the optical axis; use a longer focal length (fx "
                   "{:.4g} now, {:.4g} or more)",
-                  place, x, y, 1 / grid.dx, std::ceil(corner / (grid.dx * reach))));
+                  context, x, y, 1 / grid.dx, std::ceil(corner / (grid.dx * reach))));
 }
 
 }  // namespace
@@ -156,8 +156,8 @@ std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficien
   return {scale * x, scale * y};
 }
 
-std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients,
-                             const char* place) {
+std::vector<float> distorted_rays(const PixelGrid& grid, Lens lens,
+                                  std::span<const double> coefficients, const char* context) {
   std::vector<float> rays(static_cast<std::size_t>(grid.width) * grid.height * 2);
   for (int y = 0; y < grid.height; ++y) {
     for (int x = 0; x < grid.width; ++x) {
@@ -173,7 +173,7 @@ std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const d
         const double scale = r > 1e-12 ? std::tan(theta) / r : 1;
         straight = {seen.x * scale, seen.y * scale};
       }
-      if (!found) throw_out_of_reach(grid, lens, coefficients, place, x, y);
+      if (!found) throw_out_of_reach(grid, lens, coefficients, context, x, y);
       float* out = rays.data() + 2 * (static_cast<std::size_t>(y) * grid.width + x);
       out[0] = static_cast<float>(straight.x);
       out[1] = static_cast<float>(-straight.y);

@@ -39,8 +39,8 @@ std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficien
 
 // Rays [H, W, 2] for PixelGrid::bent: the direction of each pixel through a lens with these
 // coefficients (defined in CameraSensorCfg). Throws ValueError, with a message that starts with
-// `place`, if the lens cannot be inverted over the image or would see 180 degrees.
-std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients,
-                             const char* place);
+// `context`, if the lens cannot be inverted over the image or would see 180 degrees.
+std::vector<float> distorted_rays(const PixelGrid& grid, Lens lens,
+                                  std::span<const double> coefficients, const char* context);
 
 }  // namespace mjsense

@@ -12,7 +12,8 @@ namespace {
 
 bool equal(const PixelGrid& a, const PixelGrid& b) {
   return a.width == b.width && a.height == b.height && a.left == b.left && a.top == b.top &&
-         a.dx == b.dx && a.dy == b.dy && a.orthographic == b.orthographic && a.bent == b.bent;
+         a.dx == b.dx && a.dy == b.dy && a.orthographic == b.orthographic &&
+         a.distorted_rays == b.distorted_rays;
 }
 
 std::size_t count_tiles(int width, int height) {
@@ -81,10 +82,10 @@ bool FixedLayer::same(const View& view) const {
 }
 
 FixedLayers::FixedLayers(const mjModel* m, int width, int height, int num_worlds,
-                         std::size_t most_bytes)
+                         std::size_t max_bytes)
     : common_(m, width, height) {
-  const std::size_t most = most_bytes / FixedLayer::bytes(width, height);
-  const std::size_t count = num_worlds > 1 ? std::min<std::size_t>(num_worlds, most) : 0;
+  const std::size_t maximum = max_bytes / FixedLayer::bytes(width, height);
+  const std::size_t count = num_worlds > 1 ? std::min<std::size_t>(num_worlds, maximum) : 0;
   own_.reserve(count);
   for (std::size_t i = 0; i < count; ++i) own_.emplace_back(m, width, height);
 }

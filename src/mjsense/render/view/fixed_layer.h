@@ -53,10 +53,10 @@ class FixedLayers {
  public:
   // Maximum memory for the worlds' own layers. Further worlds have none and are always rendered in
   // full.
-  static constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+  static constexpr std::size_t kMaxBytes = std::size_t{256} << 20;
 
   FixedLayers(const mjModel* model, int width, int height, int num_worlds,
-              std::size_t most_bytes = kMostBytes);
+              std::size_t max_bytes = kMaxBytes);
 
   // Tiles that show the fixed part of the world's view, or null.
   const FixedTile* find(int world, const View& view);

@@ -49,13 +49,13 @@ Frustum::Frustum(const PixelGrid& grid, const double position[3], const double r
 
 bool Frustum::misses(const float low[3], const float high[3]) const {
   for (const Side& side : sides_) {
-    double least = -side.offset, scale = 1 + std::abs(side.offset);
+    double minimum = -side.offset, scale = 1 + std::abs(side.offset);
     for (int i = 0; i < 3; ++i) {
       const double term = side.normal[i] * (side.normal[i] > 0 ? low[i] : high[i]);
-      least += term;
+      minimum += term;
       scale += std::abs(term);
     }
-    if (least > kSlack * scale) return true;
+    if (minimum > kSlack * scale) return true;
   }
   return false;
 }

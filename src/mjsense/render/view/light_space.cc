@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "mjsense/render/view/view_window.h"
+#include "mjsense/render/view/image_window.h"
 
 namespace mjsense {
 namespace {
@@ -23,10 +23,10 @@ float length(const float* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2]
 // Completes axes[2] to an orthonormal frame.
 void complete(LightFrame& f) {
   const float* w = f.axes[2];
-  const int least = std::abs(w[0]) < std::abs(w[1]) ? (std::abs(w[0]) < std::abs(w[2]) ? 0 : 2)
-                                                    : (std::abs(w[1]) < std::abs(w[2]) ? 1 : 2);
+  const int minimum = std::abs(w[0]) < std::abs(w[1]) ? (std::abs(w[0]) < std::abs(w[2]) ? 0 : 2)
+                                                      : (std::abs(w[1]) < std::abs(w[2]) ? 1 : 2);
   float* u = f.axes[0];
-  for (int i = 0; i < 3; ++i) u[i] = (i == least) - w[least] * w[i];
+  for (int i = 0; i < 3; ++i) u[i] = (i == minimum) - w[minimum] * w[i];
   const float inverse = 1 / length(u);
   for (int i = 0; i < 3; ++i) u[i] *= inverse;
   for (int i = 0; i < 3; ++i)
@@ -70,8 +70,8 @@ Window window_of(const LightFrame& f, const ViewGeom& g) {
       low = std::min(low, x);
       high = std::max(high, x);
     }
-    const float most = std::max(std::abs(low), std::abs(high));
-    const float slack = f.perspective ? error * (1 + most) / nearest : error;
+    const float maximum = std::max(std::abs(low), std::abs(high));
+    const float slack = f.perspective ? error * (1 + maximum) / nearest : error;
     out.low[i] = low - slack;
     out.high[i] = high + slack;
   }

@@ -10,13 +10,13 @@ constexpr int kCatenaryPoints = 100;  // MuJoCo's limit
 
 // Maximum number of geoms that mjv_addGeoms() creates for all sites and tendons, and for
 // slider-cranks, which it adds as well.
-std::size_t most_geoms(const mjModel* m, const MarkerOptions& options) {
-  std::size_t most = options.site_groups ? m->nsite : 0;
+std::size_t max_geoms(const mjModel* m, const MarkerOptions& options) {
+  std::size_t maximum = options.site_groups ? m->nsite : 0;
   for (int i = 0; options.tendon_groups && i < m->ntendon; ++i) {
     const bool may_hang = m->tendon_num[i] == 2;
-    most += std::max(2 * m->tendon_num[i], may_hang ? kCatenaryPoints : 0);
+    maximum += std::max(2 * m->tendon_num[i], may_hang ? kCatenaryPoints : 0);
   }
-  return most == 0 ? 0 : most + 2 * m->nactuator;
+  return maximum == 0 ? 0 : maximum + 2 * m->nactuator;
 }
 
 Marker marker_of(const mjvGeom& g) {
@@ -50,7 +50,7 @@ Marker marker_of(const mjvGeom& g) {
 }  // namespace
 
 Markers::Markers(const mjModel* model, const MarkerOptions& options)
-    : geoms_(most_geoms(model, options)), markers_(geoms_.size()) {
+    : geoms_(max_geoms(model, options)), markers_(geoms_.size()) {
   mjv_defaultOption(&options_);
   options_.flags[mjVIS_TEXTURE] = options.textures;
   options_.flags[mjVIS_TENDON] = options.tendon_groups != 0;

@@ -28,14 +28,14 @@ struct Extent {
       high[i] = std::max<double>(high[i], boxes.high[i][k]);
     }
   }
-  double least(const double* n) const {
+  double minimum(const double* n) const {
     double sum = 0;
     for (int i = 0; i < 3; ++i) sum += n[i] * (n[i] > 0 ? low[i] : high[i]);
     return sum;
   }
-  double most(const double* n) const {
+  double maximum(const double* n) const {
     const double away[3] = {-n[0], -n[1], -n[2]};
-    return -least(away);
+    return -minimum(away);
   }
   double size() const {
     const double d[3] = {high[0] - low[0], high[1] - low[1], high[2] - low[2]};
@@ -63,15 +63,15 @@ Extent extent_of(const BoxList& list) {
 double longest_shadow(const RayWorld& world, const Extent& extent, const RayLight& light,
                       const double* to_light) {
   // Objects behind the light cast no shadow; see dark_lanes() of the kernels.
-  double longest = std::min(extent.most(to_light), dot(light.pos, to_light));
-  longest = std::max(longest - extent.least(to_light), 0.0);
+  double longest = std::min(extent.maximum(to_light), dot(light.pos, to_light));
+  longest = std::max(longest - extent.minimum(to_light), 0.0);
   const BoxList& boxes = world.boxes();
   const auto add_plane = [&](int k) {
     if (!is_plane(boxes.all(), k)) return;
     const RayGeom& plane = world.geom(boxes.object(k));
     const double n[3] = {plane.mat[2], plane.mat[5], plane.mat[8]};
     const double height = dot(n, plane.pos), slope = std::abs(dot(n, to_light));
-    const double away = std::max(extent.most(n) - height, height - extent.least(n));
+    const double away = std::max(extent.maximum(n) - height, height - extent.minimum(n));
     longest = std::max(longest, slope > 0 ? away / slope : kEndless);
   };
   boxes.each([&](int block) { return is_plane(boxes.blocks(), block); }, add_plane);

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "mjsense/core/by_content.h"
+#include "mjsense/core/content_cache.h"
 #include "mjsense/rays/flex_surface.h"
 
 namespace mjsense {
@@ -156,14 +156,15 @@ void add_coordinates(MeshTables& tables, int count, const float* vert, const int
 }
 
 std::shared_ptr<const StoredTexture> stored_texture(const mjModel* m, int id) {
-  static ByContent<StoredTexture> all;
+  static ContentCache<StoredTexture> all;
   const int channels = m->tex_nchannel[id], width = m->tex_width[id], height = m->tex_height[id];
   // Textures with another number of channels are encoded for another renderer and ignored.
   if (channels != 3 && channels != 4) return std::make_shared<const StoredTexture>();
   const int form[] = {m->tex_type[id], m->tex_colorspace[id], channels, width, height};
   const std::size_t bytes = static_cast<std::size_t>(width) * height * channels;
-  const ContentKey key =
-      ContentKey().add(std::span<const int>(form)).add(std::span(m->tex_data + m->tex_adr[id], bytes));
+  const ContentKey key = ContentKey()
+                             .add(std::span<const int>(form))
+                             .add(std::span(m->tex_data + m->tex_adr[id], bytes));
   return all.get(key, [&] {
     auto made = std::make_shared<StoredTexture>();
     fill_texture(m, id, *made);
@@ -189,7 +190,7 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id) {
     texcoord = part(m->mesh_texcoord, m->mesh_texcoordadr[id], m->mesh_texcoordnum[id], 2);
     texcoords = part(m->mesh_facetexcoord, first, faces, 3);
   }
-  static ByContent<MeshTables> all;
+  static ContentCache<MeshTables> all;
   ContentKey key;
   for (const auto& values : {vert, normal, texcoord}) key.add(values);
   for (const auto& values : {vertices, normals, texcoords}) key.add(values);

@@ -23,14 +23,14 @@ struct PixelGrid {
   float left = 0, top = 0, dx = 0, dy = 0;
   bool orthographic = false;
   // [H, W, 2]: X and Y of each pixel for a lens with distortion; null: use the formula above.
-  const float* bent = nullptr;
+  const float* distorted_rays = nullptr;
 };
 
 // MuJoCo's classic material of a geom.
 struct Surface {
   float rgba[4];
   float specular, exponent, emission;  // exponent: 128 * shininess
-  float dull;                          // (N . H)^2 below which the highlight is 0, or -1
+  float highlight_threshold;           // (N . H)^2 below which the highlight is 0, or -1
   const Texture* texture;              // null: no texture
   float repeat[2], shift[2];  // for 2D textures: coordinates are multiplied by repeat, then shifted
   float stretch[3];           // for cube maps: multiplies the direction
@@ -132,7 +132,7 @@ struct View {
   bool layered = false;
   const FixedTile* fixed = nullptr;
   const int* index_of_id = nullptr;  // index in `geoms` by id, for visible geoms
-  bool backs = false;  // depth and segmentation include planes seen from behind
+  bool backs = false;                // depth and segmentation include planes seen from behind
   float global_ambient = 0;
   const Texture* skybox = nullptr;
   float r_wc[9] = {};      // for the skybox

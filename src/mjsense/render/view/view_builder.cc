@@ -12,8 +12,8 @@
 #include "mjsense/rays/skin_shapes.h"
 #include "mjsense/render/view/fixed_layer.h"
 #include "mjsense/render/view/frustum.h"
+#include "mjsense/render/view/image_window.h"
 #include "mjsense/render/view/shadow_reach.h"
-#include "mjsense/render/view/view_window.h"
 
 namespace mjsense {
 namespace {
@@ -56,7 +56,7 @@ std::array<float, 3> drawn_extent(const ViewGeom& g) {
 
 }  // namespace
 
-float dull_below(float exponent) {
+float highlight_threshold_of(float exponent) {
   if (!(exponent >= 4)) return -1;
   const float x = 0.9999f * std::max(0.3f, std::exp(-33 / exponent));
   return x * x;
@@ -145,7 +145,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   };
   const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
-    if (rgba[3] == 0 || !(flags & options_.groups) || id == left_out_) return;
+    if (rgba[3] == 0 || !(flags & options_.groups) || id == excluded_geom_) return;
     if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
       endless = &source;
     add_shape(source, id, rgba, material < 0 ? nullptr : &appearance.materials()[material],
@@ -160,7 +160,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   int id = world.num_geoms();
   // Bounding boxes of skins and markers, which may receive shadows, are not stored.
   const bool unbounded = options_.shadows && (world.skins() || !markers.empty());
-  if (grid.bent || unbounded || options_.everything) {
+  if (grid.distorted_rays || unbounded || options_.disable_culling) {
     for (int i = 0; i < id; ++i) add_geom(i);
   } else {
     Frustum frustum(grid, position, rotation);
@@ -186,7 +186,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   }
   id = first_marker();
   for (const Marker& marker : markers) {
-    if (id++ == left_out_) continue;
+    if (id++ == excluded_geom_) continue;
     add_shape(marker.shape, id - 1, marker.rgba, &marker.material, position, rotation,
               [&](ViewGeom& g) {
                 set_primitive(marker.shape.type, marker.object, marker.id, g);
@@ -220,7 +220,7 @@ bool ViewBuilder::ends_mirror_search(const RayGeom& g, int id, float alpha, floa
     for (int k = 0; k < 3; ++k) along += normal[k] * rotation[3 * k + j];
     for (int k = 0; k < 3; ++k) r[3 * k + j] = rotation[3 * k + j] - 2 * along * normal[k];
   }
-  mirrored_->left_out_ = id;
+  mirrored_->excluded_geom_ = id;
   mirrored_->own_headlight_ = false;
   for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
   mirrored_->tint_ = reflectance;
@@ -250,7 +250,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     const RayGeom& shape = geom.shape;
     if (!endless && shape.type == mjGEOM_PLANE && shape.size[0] == 0 && shape.size[1] == 0)
       endless = &shape;
-    if (id++ == left_out_) continue;
+    if (id++ == excluded_geom_) continue;
     add_shape(shape, id - 1, geom.rgba, &geom.material, position, rotation, [&](ViewGeom& g) {
       set_primitive(shape.type, geom.object, geom.object_id, g);
       if (geom.bvh) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
@@ -389,7 +389,7 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
   g.transparent = s.rgba[3] < kOpaque || g.behind;
   s.specular = 0.5f;
   s.exponent = 128.0f * (material ? material->shininess : 0.5f);
-  s.dull = dull_below(s.exponent);
+  s.highlight_threshold = highlight_threshold_of(s.exponent);
   if (!material) return;
   s.specular = material->specular;
   s.emission = material->emission;
@@ -430,7 +430,7 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
 // longest rays go through the image's corners.
 float ViewBuilder::sky_from(const Sky& sky) const {
   const PixelGrid& grid = view_.grid;
-  if (grid.bent) return 0;
+  if (grid.distorted_rays) return 0;
   const float x = std::max(std::abs(grid.left), std::abs(grid.left + grid.dx * grid.width));
   const float y = std::max(std::abs(grid.top), std::abs(grid.top + grid.dy * grid.height));
   return std::max(1 - sky.haze_width, 0.0f) * sky.distance / std::sqrt(1 + x * x + y * y);

@@ -28,8 +28,8 @@ struct ViewOptions {
   bool reflections = false;
   bool layered = false;  // View::layered
   float near = 0, far = 0;
-  std::size_t markers = 0;  // maximum number of markers
-  bool everything = false;  // disables culling, for tests
+  std::size_t markers = 0;       // maximum number of markers
+  bool disable_culling = false;  // disables culling, for tests
 };
 
 // A geom with everything that its image depends on; used where the geoms do not come from a RayWorld.
@@ -62,7 +62,7 @@ struct DrawnScene {
 // Computes Surface::dull: the value below which the kernels' power() returns 0, with a margin for
 // rounding. power() returns 0 for x below 0.3 if the exponent is at least 4, and where x^exponent
 // is below e^-32.3.
-float dull_below(float exponent);
+float highlight_threshold_of(float exponent);
 
 // Owns the geoms of one view. build() updates it and allocates nothing.
 class ViewBuilder {
@@ -135,7 +135,7 @@ class ViewBuilder {
   std::vector<MeshSurface> soft_surfaces_;
   bool projected_ = false;                 // DrawnScene::projected_textures
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
-  int left_out_ = -1;                      // geom that is not shown: the mirror itself
+  int excluded_geom_ = -1;                 // geom that is not shown: the mirror itself
   bool own_headlight_ = true;  // otherwise headlight_, the viewing direction of the real camera
   double headlight_[3] = {};
   float tint_ = 1;  // factor of every colour: the mirror's reflectance

@@ -101,13 +101,13 @@ void ActuatedController::need_position_servos(const ControllerInit& init, const 
                                               int count) const {
   if (count > 0 && size() != count) {
     throw ValueError(fmt::format("{}: the controller '{}' needs {} actuators; the group has {}",
-                                 init.place, kind, count, size()));
+                                 init.context, kind, count, size()));
   }
   for (int a : group_.actuators) {
     if (is_position_servo(model_, a)) continue;
     throw ValueError(fmt::format(
         "{}: the controller '{}' needs position servos of joints; the actuator '{}' is not one",
-        init.place, kind, name_of(model_, mjOBJ_ACTUATOR, a)));
+        init.context, kind, name_of(model_, mjOBJ_ACTUATOR, a)));
   }
 }
 

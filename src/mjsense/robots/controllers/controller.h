@@ -34,8 +34,8 @@ struct ControllerInit {
   int num_worlds = 1;
   int base_body = -1;
   ControlPeriods periods;
-  std::string prefix;  // of the robot's names
-  std::string place;   // "robot 'x', move group 'arm'"
+  std::string prefix;   // of the robot's names
+  std::string context;  // "robot 'x', move group 'arm'"
 };
 
 class Controller {

@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/robots/controllers/actuated.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -52,7 +52,7 @@ class Wheels final : public DifferentialBase {
       throw ValueError(
           fmt::format("{}: the controller 'differential_base' of two wheels needs velocity servos; "
                       "the actuator '{}' is not one",
-                      init.place, name_of(init.model, mjOBJ_ACTUATOR, a)));
+                      init.context, name_of(init.model, mjOBJ_ACTUATOR, a)));
     }
   }
   void begin(const World& world, std::span<const double> /*target*/,

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/pose_target.h"
 #include "mjsense/scene/resolve.h"
 
@@ -35,12 +35,12 @@ std::unique_ptr<Controller> make_kind(const FreeBaseCfg& cfg, const MoveGroup& /
     throw ValueError(
         fmt::format("{}: the controller 'free_base' needs a free joint; the base '{}' "
                     "has none",
-                    init.place, name_of(m, mjOBJ_BODY, base)));
+                    init.context, name_of(m, mjOBJ_BODY, base)));
   }
-  const int target = resolve(m, mjOBJ_BODY, init.prefix + cfg.target, init.place);
+  const int target = resolve(m, mjOBJ_BODY, init.prefix + cfg.target, init.context);
   if (m->body_mocapid[target] < 0) {
     throw ValueError(
-        fmt::format("{}: the target '{}' is not a mocap body", init.place, cfg.target));
+        fmt::format("{}: the target '{}' is not a mocap body", init.context, cfg.target));
   }
   const double* q0 = m->qpos0 + m->jnt_qposadr[joint];
   const Pose X_WB{vec3(q0), quat(q0 + 3)};

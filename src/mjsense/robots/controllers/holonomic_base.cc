@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/action_noise.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/ramp.h"
-#include "mjsense/robots/noise.h"
 
 namespace mjsense {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Controller `joint_position`: commands are the actuators' controls, clipped to their ranges.
 
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/ramp.h"
 
 namespace mjsense {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "mjsense/robots/controllers/actuated.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 
 namespace mjsense {
 namespace {

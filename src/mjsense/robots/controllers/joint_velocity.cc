@@ -7,7 +7,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/robots/controllers/actuated.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/pose_target.h"
 #include "mjsense/scene/resolve.h"
 
@@ -16,7 +16,7 @@ std::unique_ptr<Controller> make_kind(const MocapBaseCfg& cfg, const MoveGroup& 
   if (mocap < 0) {
     throw ValueError(
         fmt::format("{}: the controller 'mocap_base' needs a mocap body; the base '{}' is not one",
-                    init.place, name_of(init.model, mjOBJ_BODY, init.base_body)));
+                    init.context, name_of(init.model, mjOBJ_BODY, init.base_body)));
   }
   return std::make_unique<PoseTarget>(mocap, Pose{}, cfg.max_speed, cfg.max_turn, init);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Controller `none`: the group takes no command and keeps its start position.
 #include "mjsense/robots/controllers/actuated.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 
 namespace mjsense {
 namespace {

@@ -15,7 +15,7 @@ PoseTarget::PoseTarget(int mocap, const Pose& base_to_mocap, double max_speed, d
       base_to_mocap_(base_to_mocap),
       max_step_(max_speed * init.periods.ctrl_dt),
       max_turn_(max_turn * init.periods.ctrl_dt),
-      place_(init.place),
+      context_(init.context),
       goals_(init.num_worlds) {}
 
 void PoseTarget::describe(MoveGroup& group) const {
@@ -48,7 +48,7 @@ void PoseTarget::command(const World& world, std::span<const double> command,
     throw ValueError(
         fmt::format("{}: the quaternion ({}, {}, {}, {}) of the command is not a rotation; a "
                     "command is x, y, z and the quaternion w, x, y, z",
-                    place_, q.w, q.x, q.y, q.z));
+                    context_, q.w, q.x, q.y, q.z));
   }
   goals_[world.id] = {true, {vec3(command.data()), normalized(q)}};
 }
@@ -62,14 +62,14 @@ mjtStage PoseTarget::compute(const World& world, int /*index*/, const StateRow& 
   const Goal& goal = goals_[world.id];
   if (!goal.given) return mjSTAGE_ACC;
   const Pose now = base_at(state.mocap_pos, state.mocap_quat);
-  const Vec3 way = goal.base.p - now.p;
+  const Vec3 offset = goal.base.p - now.p;
   const Vec3 turn = log3(conjugate(now.q) * goal.base.q);
   // Translation and rotation take the same number of control steps.
-  const double far = std::max(norm(way) / max_step_, norm(turn) / max_turn_);
+  const double far = std::max(norm(offset) / max_step_, norm(turn) / max_turn_);
   if (far <= 1.0) {
     write(goal.base, state);
   } else {
-    write({now.p + (1.0 / far) * way, normalized(now.q * exp3((1.0 / far) * turn))}, state);
+    write({now.p + (1.0 / far) * offset, normalized(now.q * exp3((1.0 / far) * turn))}, state);
   }
   return mjSTAGE_NONE;
 }

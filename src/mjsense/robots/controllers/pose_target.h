@@ -36,7 +36,7 @@ class PoseTarget : public Controller {
   int mocap_;
   Pose base_to_mocap_;
   double max_step_, max_turn_;  // m and rad per control step
-  std::string place_;
+  std::string context_;
   struct Goal {
     bool given = false;
     Pose base;  // X_WB

@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/robots/controllers/actuated.h"
-#include "mjsense/robots/controllers/kinds.h"
+#include "mjsense/robots/controllers/controller_kinds.h"
 
 namespace mjsense {
 namespace {
@@ -20,7 +20,7 @@ class TorsoHeight final : public ActuatedController {
     need_position_servos(init, "torso_height", static_cast<int>(cfg.ratio.size()));
     if (!(cfg.range[0] < cfg.range[1])) {
       throw ValueError(fmt::format("{}: controller.range is {} .. {}: must be ascending",
-                                   init.place, cfg.range[0], cfg.range[1]));
+                                   init.context, cfg.range[0], cfg.range[1]));
     }
   }
   void describe(MoveGroup& group) const override {

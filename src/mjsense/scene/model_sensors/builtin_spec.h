@@ -4,7 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
-#include "mjsense/core/spec.h"
+#include "mjsense/core/sensor_spec.h"
 
 namespace mjsense {
 

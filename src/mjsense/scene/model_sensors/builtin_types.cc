@@ -114,13 +114,13 @@ const std::vector<std::string> kFrames = {"body", "xbody", "geom", "site", "came
 std::span<const BuiltinType> builtin_types() { return kTypes; }
 std::span<const RangeField> range_fields() { return kRangeFields; }
 
-const BuiltinType& builtin_type(std::string_view name, std::string_view place) {
+const BuiltinType& builtin_type(std::string_view name, std::string_view context) {
   std::vector<std::string> names;
   for (const BuiltinType& type : kTypes) {
     if (type.name == name && type.group != G::kContact) return type;
     if (type.group != G::kContact) names.emplace_back(type.name);
   }
-  throw ValueError(std::string(place) + ": unknown sensor_type '" + std::string(name) + "'" +
+  throw ValueError(std::string(context) + ": unknown sensor_type '" + std::string(name) + "'" +
                    suggest(name, names));
 }
 

@@ -49,7 +49,7 @@ struct BuiltinType {
 std::span<const BuiltinType> builtin_types();
 
 // Throws ValueError with the nearest names.
-const BuiltinType& builtin_type(std::string_view name, std::string_view place);
+const BuiltinType& builtin_type(std::string_view name, std::string_view context);
 const BuiltinType& builtin_type(mjtSensor type);
 
 // Object types that this group accepts as obj and as ref; empty: none.

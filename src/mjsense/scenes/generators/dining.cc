@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/scenes/generators/dining.h"
 
-#include "mjsense/scenes/generators/finishes.h"
-#include "mjsense/scenes/generators/room_text.h"
+#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense {
 namespace {
@@ -11,7 +11,7 @@ constexpr Colour kRugs[] = {{0.48, 0.30, 0.28}, {0.34, 0.40, 0.46}, {0.62, 0.56,
 constexpr Colour kPaintings[] = {{0.36, 0.50, 0.58}, {0.66, 0.52, 0.36}, {0.44, 0.54, 0.38}};
 
 // A body named `name`: a chair that faces -x or +x, with its seat at x, y.
-void chair(RoomText& room, const char* name, double x, double y, double back) {
+void chair(RoomWriter& room, const char* name, double x, double y, double back) {
   room.open_body(name, {x, y, 0});
   for (int i = 0; i < 4; ++i) {
     const double dx = i & 1 ? 0.18 : -0.18, dy = i & 2 ? 0.18 : -0.18;
@@ -27,7 +27,7 @@ void chair(RoomText& room, const char* name, double x, double y, double back) {
 
 ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
-  RoomText room("dining");
+  RoomWriter room("dining");
   write_shell_finishes(room, rng);
   const Colour wood = wood_colour(rng);
   const Gloss satin{.specular = 0.2, .shininess = 0.4};

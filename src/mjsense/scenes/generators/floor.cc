@@ -9,9 +9,9 @@
 #include <numbers>
 #include <numeric>
 
-#include "mjsense/scenes/generators/finishes.h"
 #include "mjsense/scenes/generators/floor_plan.h"
 #include "mjsense/scenes/generators/furniture.h"
+#include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense {
 namespace {
@@ -87,7 +87,7 @@ Stand against_wall(const Rect& room, int side, double along, FloorSpace size) {
 
 class Furnisher {
  public:
-  Furnisher(Building& out, FloorPlan& plan, Rng& rng, SceneFileCfg& cfg)
+  Furnisher(BuildingWriter& out, FloorPlan& plan, Rng& rng, SceneFileCfg& cfg)
       : out_(out), plan_(plan), rng_(rng), cfg_(cfg) {}
 
   // Lets furniture move between episodes: pieces at walls along the wall, tables in the middle of a
@@ -96,8 +96,9 @@ class Furnisher {
   void loosen() {
     for (const Piece& piece : pieces_) {
       const Rect& s = piece.space;
-      for (const double most : kMoves) {
-        const double move = piece.along_x && piece.along_y ? std::min(most, kTableMove) : most;
+      for (const double maximum : kMoves) {
+        const double move =
+            piece.along_x && piece.along_y ? std::min(maximum, kTableMove) : maximum;
         const double x = piece.along_x ? move : 0, y = piece.along_y ? move : 0;
         if (!plan_.widen(piece.room, s, {s.x0 - x, s.y0 - y, s.x1 + x, s.y1 + y})) continue;
         SceneVaryCfg vary;
@@ -141,7 +142,7 @@ class Furnisher {
   void place(Furniture piece, int room, const std::string& where, const Stand& stand) {
     const std::string name = unique(fmt::format("{}_{}", where, name_of(piece)));
     pieces_.push_back({name, room, stand.space});
-    Building::Local local(out_, name, stand.at, stand.yaw);
+    BuildingWriter::Local local(out_, name, stand.at, stand.yaw);
     write_furniture(out_, piece, name, rng_, cfg_.regions);
   }
   void table(int room, const std::string& where) {
@@ -157,7 +158,7 @@ class Furnisher {
       plan_.take(space);
       const std::string name = unique(where + "_table");
       pieces_.push_back({name, room, space, true, true});
-      Building::Local local(out_, name, {x, y, 0}, along_x ? 0 : 0.5 * pi);
+      BuildingWriter::Local local(out_, name, {x, y, 0}, along_x ? 0 : 0.5 * pi);
       write_dining_table(out_, name, 4, rng_, cfg_.regions);
       return;
     }
@@ -172,7 +173,7 @@ class Furnisher {
     plan_.take(space);
     const std::string name = unique(where + "_coffee_table");
     pieces_.push_back({name, room, space, true, true});
-    Building::Local local(out_, name, middle, sofa.yaw);
+    BuildingWriter::Local local(out_, name, middle, sofa.yaw);
     write_rug(out_, "cloth_3", 1.15, 0.70);
     write_coffee_table(out_, name, rng_, cfg_.regions);
   }
@@ -184,7 +185,7 @@ class Furnisher {
     bool along_x = false, along_y = false;  // axes along which it can be displaced
   };
 
-  Building& out_;
+  BuildingWriter& out_;
   FloorPlan& plan_;
   Rng& rng_;
   SceneFileCfg& cfg_;
@@ -192,9 +193,9 @@ class Furnisher {
   std::vector<Piece> pieces_;
 };
 
-void write_walls(Building& out, const FloorPlan& plan, Rng& rng) {
-  Building::Local walls(out, "walls", {0, 0, 0}, 0);
-  const WallLook look{.thickness = kWall, .height = kHeight};
+void write_walls(BuildingWriter& out, const FloorPlan& plan, Rng& rng) {
+  BuildingWriter::Local walls(out, "walls", {0, 0, 0}, 0);
+  const WallFinish look{.thickness = kWall, .height = kHeight};
   for (const PlannedWall& w : plan.walls()) {
     std::vector<Opening> openings;
     if (w.opening) openings.push_back({w.from, w.to, 0, 2.12});
@@ -210,7 +211,7 @@ void write_walls(Building& out, const FloorPlan& plan, Rng& rng) {
 }
 
 // A picture at the centre of a wall without a window or opening.
-void write_pictures(Building& out, const FloorPlan& plan, Rng& rng) {
+void write_pictures(BuildingWriter& out, const FloorPlan& plan, Rng& rng) {
   for (const PlannedWall& w : plan.walls()) {
     if (w.opening || w.other < 0 || w.length() < 1.2 || rng.below(2) == 0) continue;
     const double side = rng.below(2) == 0 ? 1 : -1, off = side * 0.5 * kWall;
@@ -218,7 +219,7 @@ void write_pictures(Building& out, const FloorPlan& plan, Rng& rng) {
                   0.5 * (w.y0 + w.y1) + (w.along_x() ? off : 0), 0};
     // The painting faces -y of its frame.
     const double yaw = w.along_x() ? (side > 0 ? pi : 0) : (side > 0 ? 0.5 * pi : -0.5 * pi);
-    Building::Local local(out, "", at, yaw);
+    BuildingWriter::Local local(out, "", at, yaw);
     write_painting(out, fmt::format("painting_{}", rng.below(3)), 0.7, 0.5, 1.6);
   }
 }
@@ -226,7 +227,7 @@ void write_pictures(Building& out, const FloorPlan& plan, Rng& rng) {
 ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   FloorPlan plan(rng);
-  RoomText text("floor");
+  RoomWriter text("floor");
   write_shell_finishes(text, rng);
   write_furniture_materials(text, rng);
   for (int i = 0; i < 3; ++i) write_picture(text, fmt::format("painting_{}", i), rng);
@@ -237,7 +238,7 @@ ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   text.tiled("floor_3", tiles_png({0.70, 0.68, 0.64}, {0.52, 0.51, 0.49}, 3, false, rng.next()),
              1.2, polished);
 
-  Building out(text);
+  BuildingWriter out(text);
   const auto& rooms = plan.rooms();
   const Rect& all = plan.whole();
   text.slab("ceiling", "ceiling_paint", Facing::kDown, {0.5 * all.x1, 0.5 * all.y1, kHeight},

@@ -7,7 +7,7 @@
 namespace mjsense {
 namespace {
 
-constexpr double kLeast = 2.9;      // m, minimum side of a room
+constexpr double kMin = 2.9;        // m, minimum side of a room
 constexpr double kShared = 1.75;    // m, minimum length of a shared wall with an opening
 constexpr double kHalfWall = 0.06;  // m
 constexpr double kRobot = 0.95;     // m, width of a path
@@ -29,12 +29,12 @@ FloorPlan::FloorPlan(Rng& rng) {
 void FloorPlan::divide(const Rect& r, int rooms, Rng& rng) {
   const bool across = r.width() > r.depth();
   const double length = across ? r.width() : r.depth();
-  if (rooms <= 1 || length < 2 * kLeast) {
+  if (rooms <= 1 || length < 2 * kMin) {
     rooms_.push_back(r);
     return;
   }
   const int first = rooms / 2;
-  const double share = std::clamp(rng.uniform(0.42, 0.58) * length, kLeast, length - kLeast);
+  const double share = std::clamp(rng.uniform(0.42, 0.58) * length, kMin, length - kMin);
   Rect a = r, b = r;
   if (across) {
     a.x1 = b.x0 = r.x0 + share;

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <optional>
 
-#include "mjsense/scenes/generators/finishes.h"
+#include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense {
 namespace {
@@ -23,8 +23,9 @@ struct Part {
 };
 
 // A level top for objects, which may be placed on all of it except the edge, or on a part of it.
-void top(Building& out, const std::string& name, Vec3 center, Vec3 half, std::string_view material,
-         std::vector<SceneRegionCfg>& regions, std::optional<Part> part = {}) {
+void top(BuildingWriter& out, const std::string& name, Vec3 center, Vec3 half,
+         std::string_view material, std::vector<SceneRegionCfg>& regions,
+         std::optional<Part> part = {}) {
   out.text().box(name + "_top", material, center, half);
   const double y = std::max(half.y - kRim, 0.02);
   const Part p = part.value_or(Part{-half.x + kRim, half.x - kRim, -y, y});
@@ -42,15 +43,15 @@ void top(Building& out, const std::string& name, Vec3 center, Vec3 half, std::st
   regions.push_back(std::move(region));
 }
 
-void four_legs(Building& out, double half_x, double half_y, double y, double height, double radius,
-               std::string_view material) {
+void four_legs(BuildingWriter& out, double half_x, double half_y, double y, double height,
+               double radius, std::string_view material) {
   for (const double a : {-1.0, 1.0}) {
     for (const double b : {-1.0, 1.0})
       out.cylinder({a * half_x, y + b * half_y, 0.5 * height}, radius, 0.5 * height, material);
   }
 }
 
-void chair(Building& out, Rng& rng) {
+void chair(BuildingWriter& out, Rng& rng) {
   const double seat = rng.uniform(0.44, 0.47);
   four_legs(out, 0.18, 0.17, -0.21, seat - 0.02, 0.014, "dark_wood");
   out.box({0, -0.21, seat - 0.01}, {0.21, 0.20, 0.016}, "wood");
@@ -60,7 +61,7 @@ void chair(Building& out, Rng& rng) {
   out.box({0, -0.01, seat + 0.33}, {0.17, 0.010, 0.085}, "wood");
 }
 
-void sofa(Building& out, Rng& rng) {
+void sofa(BuildingWriter& out, Rng& rng) {
   const double half = rng.uniform(0.85, 0.95), arm = rng.uniform(0.08, 0.11);
   out.box({0, -0.44, 0.17}, {half, 0.41, 0.10}, "cloth_1");
   out.box({0, -0.12, 0.50}, {half, 0.10, 0.28}, "cloth_1");
@@ -77,7 +78,7 @@ void sofa(Building& out, Rng& rng) {
                 axis_angle({1, 0, 0}, -0.3));
 }
 
-void armchair(Building& out, Rng& rng) {
+void armchair(BuildingWriter& out, Rng& rng) {
   const double half = rng.uniform(0.38, 0.42);
   out.box({0, -0.40, 0.22}, {half, 0.36, 0.10}, "cloth_2");
   out.box({0, -0.12, 0.52}, {half, 0.10, 0.30}, "cloth_2");
@@ -87,7 +88,7 @@ void armchair(Building& out, Rng& rng) {
   four_legs(out, half - 0.06, 0.28, -0.40, 0.12, 0.018, "dark_wood");
 }
 
-void television(Building& out, const std::string& name, Rng& rng,
+void television(BuildingWriter& out, const std::string& name, Rng& rng,
                 std::vector<SceneRegionCfg>& regions) {
   const double half = rng.uniform(0.72, 0.85), height = rng.uniform(0.46, 0.56);
   out.box({0, -0.21, 0.5 * height}, {half - 0.02, 0.19, 0.5 * height - 0.05}, "white_wood");
@@ -103,7 +104,7 @@ void television(Building& out, const std::string& name, Rng& rng,
   out.box({-0.15, -0.18, height + 0.008}, {0.20, 0.09, 0.006}, "black");
 }
 
-void bookcase(Building& out, Rng& rng) {
+void bookcase(BuildingWriter& out, Rng& rng) {
   const double half = rng.uniform(0.38, 0.46), height = rng.uniform(1.75, 1.95);
   constexpr int kShelves = 5;
   for (const double a : {-1.0, 1.0})
@@ -125,7 +126,8 @@ void bookcase(Building& out, Rng& rng) {
   }
 }
 
-void desk(Building& out, const std::string& name, Rng& rng, std::vector<SceneRegionCfg>& regions) {
+void desk(BuildingWriter& out, const std::string& name, Rng& rng,
+          std::vector<SceneRegionCfg>& regions) {
   const double half = rng.uniform(0.60, 0.72), height = rng.uniform(0.72, 0.76);
   top(out, name, {0, -0.34, height - 0.014}, {half, 0.33, 0.014}, "wood", regions,
       Part{-half + kRim, 0.05 * half, -0.26, 0.20});
@@ -140,12 +142,13 @@ void desk(Building& out, const std::string& name, Rng& rng, std::vector<SceneReg
   out.box({0.30, -0.13, height + 0.06}, {0.02, 0.01, 0.06}, "black", false);
   out.box({0.30, -0.14, height + 0.004}, {0.11, 0.08, 0.004}, "black");
   out.box({0.30, -0.42, height + 0.008}, {0.20, 0.06, 0.008}, "black");
-  Building::Local seat(out, "", {-0.15, -0.86, 0}, pi + rng.uniform(-0.3, 0.3));
-  Building::Local back(out, "", {0, 0.21, 0}, 0);
+  BuildingWriter::Local seat(out, "", {-0.15, -0.86, 0}, pi + rng.uniform(-0.3, 0.3));
+  BuildingWriter::Local back(out, "", {0, 0.21, 0}, 0);
   chair(out, rng);
 }
 
-void bed(Building& out, const std::string& name, Rng& rng, std::vector<SceneRegionCfg>& regions) {
+void bed(BuildingWriter& out, const std::string& name, Rng& rng,
+         std::vector<SceneRegionCfg>& regions) {
   const double half = rng.uniform(0.70, 0.85);
   out.box({0, -0.03, 0.45}, {half + 0.03, 0.03, 0.45}, "wood");
   out.box({0, -1.05, 0.17}, {half, 1.0, 0.09}, "wood");
@@ -158,7 +161,7 @@ void bed(Building& out, const std::string& name, Rng& rng, std::vector<SceneRegi
     out.ellipsoid({a * half, -0.32, 0.51}, {0.34, 0.20, 0.075}, "sheet");
 }
 
-void wardrobe(Building& out, Rng& rng) {
+void wardrobe(BuildingWriter& out, Rng& rng) {
   const double half = rng.uniform(0.55, 0.75);
   out.box({0, -0.29, 1.0}, {half, 0.28, 1.0}, "white_wood");
   for (const double a : {-1.0, 1.0}) {
@@ -167,7 +170,7 @@ void wardrobe(Building& out, Rng& rng) {
   }
 }
 
-void sideboard(Building& out, const std::string& name, Rng& rng,
+void sideboard(BuildingWriter& out, const std::string& name, Rng& rng,
                std::vector<SceneRegionCfg>& regions) {
   const double half = rng.uniform(0.55, 0.70), height = rng.uniform(0.74, 0.84);
   four_legs(out, half - 0.06, 0.15, -0.20, 0.14, 0.018, "dark_wood");
@@ -181,7 +184,7 @@ void sideboard(Building& out, const std::string& name, Rng& rng,
   }
 }
 
-void nightstand(Building& out, const std::string& name, Rng& rng,
+void nightstand(BuildingWriter& out, const std::string& name, Rng& rng,
                 std::vector<SceneRegionCfg>& regions) {
   const double height = rng.uniform(0.48, 0.56);
   out.box({0, -0.20, 0.5 * height}, {0.21, 0.18, 0.5 * height - 0.02}, "white_wood");
@@ -190,7 +193,7 @@ void nightstand(Building& out, const std::string& name, Rng& rng,
   out.ellipsoid({0, -0.40, 0.65 * height}, {0.012, 0.012, 0.012}, "steel");
 }
 
-void plant(Building& out, Rng& rng) {
+void plant(BuildingWriter& out, Rng& rng) {
   const double height = rng.uniform(0.25, 0.34), radius = rng.uniform(0.13, 0.17);
   out.cylinder({0, -0.25, 0.5 * height}, radius, 0.5 * height, "pot");
   out.cylinder({0, -0.25, height}, radius - 0.012, 0.004, "soil", false);
@@ -205,7 +208,7 @@ void plant(Building& out, Rng& rng) {
   }
 }
 
-void floor_lamp(Building& out, Rng& rng) {
+void floor_lamp(BuildingWriter& out, Rng& rng) {
   const double height = rng.uniform(1.45, 1.65);
   out.cylinder({0, -0.2, 0.012}, 0.14, 0.012, "steel");
   out.cylinder({0, -0.2, 0.5 * height}, 0.012, 0.5 * height, "steel");
@@ -242,7 +245,7 @@ FloorSpace floor_space(Furniture piece) {
   return {1, 1};
 }
 
-void write_furniture(Building& out, Furniture piece, const std::string& name, Rng& rng,
+void write_furniture(BuildingWriter& out, Furniture piece, const std::string& name, Rng& rng,
                      std::vector<SceneRegionCfg>& regions) {
   switch (piece) {
     case Furniture::kSofa:
@@ -270,7 +273,7 @@ void write_furniture(Building& out, Furniture piece, const std::string& name, Rn
   }
 }
 
-void write_dining_table(Building& out, const std::string& name, int chairs, Rng& rng,
+void write_dining_table(BuildingWriter& out, const std::string& name, int chairs, Rng& rng,
                         std::vector<SceneRegionCfg>& regions) {
   const double half_x = 0.32 * chairs / 2 + 0.10, half_y = 0.42, height = rng.uniform(0.73, 0.76);
   top(out, name, {0, 0, height - 0.015}, {half_x, half_y, 0.015}, "wood", regions);
@@ -278,13 +281,13 @@ void write_dining_table(Building& out, const std::string& name, int chairs, Rng&
   for (int i = 0; i < chairs; ++i) {
     const double side = i % 2 == 0 ? 1 : -1;
     const double x = (i / 2 - 0.25 * (chairs - 2)) * 0.60;
-    Building::Local seat(out, "", {x, side * (half_y + 0.22 + rng.uniform(-0.06, 0.06)), 0},
-                         (side > 0 ? 0 : pi) + rng.uniform(-0.12, 0.12));
+    BuildingWriter::Local seat(out, "", {x, side * (half_y + 0.22 + rng.uniform(-0.06, 0.06)), 0},
+                               (side > 0 ? 0 : pi) + rng.uniform(-0.12, 0.12));
     chair(out, rng);
   }
 }
 
-void write_coffee_table(Building& out, const std::string& name, Rng& rng,
+void write_coffee_table(BuildingWriter& out, const std::string& name, Rng& rng,
                         std::vector<SceneRegionCfg>& regions) {
   const double half_x = rng.uniform(0.42, 0.52), height = rng.uniform(0.38, 0.44);
   top(out, name, {0, 0, height - 0.014}, {half_x, 0.28, 0.014}, "wood", regions);
@@ -292,7 +295,7 @@ void write_coffee_table(Building& out, const std::string& name, Rng& rng,
   out.box({0, 0, 0.14}, {half_x - 0.05, 0.23, 0.008}, "wood");
 }
 
-void write_furniture_materials(RoomText& text, Rng& rng) {
+void write_furniture_materials(RoomWriter& text, Rng& rng) {
   constexpr Colour kCloths[] = {{0.42, 0.48, 0.55}, {0.62, 0.58, 0.50}, {0.33, 0.42, 0.38},
                                 {0.60, 0.38, 0.30}, {0.72, 0.66, 0.55}, {0.30, 0.34, 0.45},
                                 {0.70, 0.52, 0.28}, {0.46, 0.30, 0.34}};
@@ -328,16 +331,16 @@ void write_furniture_materials(RoomText& text, Rng& rng) {
   text.glowing("window_pane", {0.80, 0.89, 0.97}, 0.75);
 }
 
-void write_picture(RoomText& text, const std::string& name, Rng& rng) {
+void write_picture(RoomWriter& text, const std::string& name, Rng& rng) {
   text.texture(name, landscape_png(rng.next()), false);
   text.asset(fmt::format("<material name=\"{0}\" texture=\"{0}\" specular=\"0.05\"/>\n", name));
 }
 
-void write_rug(Building& out, std::string_view material, double half_x, double half_y) {
+void write_rug(BuildingWriter& out, std::string_view material, double half_x, double half_y) {
   out.box({0, 0, 0.004}, {half_x, half_y, 0.004}, material, false);
 }
 
-void write_painting(Building& out, std::string_view picture, double width, double height,
+void write_painting(BuildingWriter& out, std::string_view picture, double width, double height,
                     double z) {
   out.box({0, -0.012, z}, {0.5 * width + 0.025, 0.012, 0.5 * height + 0.025}, "dark_wood", false);
   out.text().slab("", picture, Facing::kMinusY, {0, -0.0255, z}, width, height, 0.002,

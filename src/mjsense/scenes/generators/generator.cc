@@ -22,13 +22,13 @@ std::span<const Generator> generators() {
 }
 
 ModelSource generate(SceneFileCfg& cfg) {
-  const std::string place = fmt::format("scene '{}'", cfg.name);
+  const std::string context = fmt::format("scene '{}'", cfg.name);
   const auto all = generators();
   const auto one = std::ranges::find(all, cfg.generator, &Generator::name);
   if (one == all.end()) {
     std::vector<std::string> names;
     for (const Generator& g : all) names.emplace_back(g.name);
-    throw_unknown(place, "generator", cfg.generator, names);
+    throw_unknown(context, "generator", cfg.generator, names);
   }
   const auto number = static_cast<std::uint64_t>(cfg.house);
   GeneratorInput input{
@@ -41,7 +41,8 @@ ModelSource generate(SceneFileCfg& cfg) {
   for (const auto& [name, value] : cfg.parameters) {
     const auto at = std::ranges::find(known, name);
     if (at == known.end()) {
-      throw_unknown(fmt::format("{}, generator '{}'", place, one->name), "parameter", name, known);
+      throw_unknown(fmt::format("{}, generator '{}'", context, one->name), "parameter", name,
+                    known);
     }
     input.parameters[at - known.begin()] = value;
   }

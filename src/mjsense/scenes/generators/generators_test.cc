@@ -11,7 +11,7 @@
 #include "mjsense/scenes/episode_scene.h"
 #include "mjsense/scenes/generators/generator.h"
 #include "mjsense/scenes/load_scene.h"
-#include "mjsense/scenes/occupancy.h"
+#include "mjsense/scenes/occupancy_grid.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
@@ -104,9 +104,9 @@ TEST(Generators, OccupancyCoversDisplacedFurniture) {
     const auto map = [&](bool wherever) {
       OccupancyCfg cfg;
       if (wherever) cfg.elsewhere = [&](int geom) { return scene.elsewhere(geom); };
-      return Occupancy(m, data.get(), stands, cfg);
+      return OccupancyGrid(m, data.get(), stands, cfg);
     };
-    const Occupancy known = map(true), still = map(false);
+    const OccupancyGrid known = map(true), still = map(false);
     std::map<int, std::set<double>> places;
     int outside = 0, others = 0;
     for (std::uint64_t episode = 0; episode < 12; ++episode) {
@@ -119,7 +119,7 @@ TEST(Generators, OccupancyCoversDisplacedFurniture) {
         if (!scene.elsewhere(g).empty())
           places[m->geom_bodyid[g]].insert(data->geom_xpos[3 * g] + data->geom_xpos[3 * g + 1]);
       }
-      const Occupancy now = map(false);
+      const OccupancyGrid now = map(false);
       ASSERT_EQ(now.columns(), known.columns());
       for (int row = 0; row < now.rows(); ++row) {
         for (int column = 0; column < now.columns(); ++column) {

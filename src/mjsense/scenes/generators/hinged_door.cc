@@ -14,7 +14,7 @@ constexpr double kReach = 0.014;               // m, by which the bolt protrudes
 constexpr double kBolt = 0.006;                // m, half of its thickness
 
 // Jambs, head and casings on both faces of the wall.
-void frame(Building& out, const HingedDoor& door, double thickness) {
+void frame(BuildingWriter& out, const HingedDoor& door, double thickness) {
   const double half = 0.5 * door.width + kGap, deep = 0.5 * thickness;
   const double top = door.height + 2 * kGap;
   for (const double side : {-1.0, 1.0}) {
@@ -36,7 +36,7 @@ void frame(Building& out, const HingedDoor& door, double thickness) {
 
 // The leaf with panels on both faces. The body frame is at the hinge, x points to the latch; s =
 // +-1 is the direction of opening along y.
-void leaf(Building& out, const HingedDoor& door, double s) {
+void leaf(BuildingWriter& out, const HingedDoor& door, double s) {
   const double middle = 0.5 * door.width, y = -s * 0.5 * kThick;
   const double half = middle - kGap, tall = 0.5 * (door.height - 0.008);
   out.text().add(fmt::format(
@@ -60,7 +60,7 @@ void leaf(Building& out, const HingedDoor& door, double s) {
     out.cylinder({0, s * 0.004, z}, 0.008, 0.05, "door_metal", false, "mass=\"0\"");
 }
 
-void lever(Building& out, const HingedDoor& door, double s) {
+void lever(BuildingWriter& out, const HingedDoor& door, double s) {
   const double u = door.width - 0.065, y = -s * 0.5 * kThick, z = door.handle_height;
   for (const double face : {-1.0, 1.0}) {
     const double at = y + face * (0.5 * kThick + 0.004);
@@ -83,7 +83,7 @@ void lever(Building& out, const HingedDoor& door, double s) {
   out.text().add("</body>");
 }
 
-void bolt(Building& out, const HingedDoor& door, double s) {
+void bolt(BuildingWriter& out, const HingedDoor& door, double s) {
   const double u = door.width - kGap, y = -s * 0.5 * kThick, z = door.handle_height;
   out.text().add(fmt::format("<body name=\"door_bolt\" pos=\"{:.4f} {:.4f} {:.4f}\">", u, y, z));
   out.text().add(
@@ -117,11 +117,11 @@ HingedDoor draw_door(Rng& rng) {
 double opening_width(const HingedDoor& door) { return door.width + 2 * (kGap + kJamb); }
 double opening_height(const HingedDoor& door) { return door.height + 2 * kGap + kJamb; }
 
-void write_door(Building& out, const HingedDoor& door, double wall_thickness) {
+void write_door(BuildingWriter& out, const HingedDoor& door, double wall_thickness) {
   const double side = door.hinge_left ? 1 : -1;  // side of the hinge along y
   const double s = side;                         // the leaf's y axis points to +x or to -x
   {
-    Building::Local body(out, "door_frame", {0, 0, 0}, 0);
+    BuildingWriter::Local body(out, "door_frame", {0, 0, 0}, 0);
     frame(out, door, wall_thickness);
     // The strike blocks the bolt's motion; the latch edge is opposite to the hinge.
     const double from = 0.5 * door.width + 0.001;

@@ -4,7 +4,7 @@
 // opening at y = 0, and opens towards +x: pushed from x < 0, pulled from x > 0.
 
 #include "mjsense/core/rng.h"
-#include "mjsense/scenes/generators/building.h"
+#include "mjsense/scenes/generators/building_writer.h"
 
 namespace mjsense {
 
@@ -32,6 +32,6 @@ double opening_height(const HingedDoor& door);
 // strike of the frame, so that the door does not move until the lever is pressed by `press`. The
 // hinge turns by a negative angle if it is on the right. Uses the materials "door_paint",
 // "door_metal", "black" and "skirting".
-void write_door(Building& out, const HingedDoor& door, double wall_thickness);
+void write_door(BuildingWriter& out, const HingedDoor& door, double wall_thickness);
 
 }  // namespace mjsense

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <vector>
 
-#include "mjsense/scenes/generators/finishes.h"
 #include "mjsense/scenes/generators/kitchen_units.h"
-#include "mjsense/scenes/generators/room_text.h"
+#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense {
 namespace {
@@ -25,7 +25,7 @@ struct Placed {
   double y0, wide;
 };
 
-void materials(RoomText& room, Rng& rng) {
+void materials(RoomWriter& room, Rng& rng) {
   write_shell_finishes(room, rng);
   const Gloss satin{.specular = 0.2, .shininess = 0.4};
   if (rng.below(2) == 0) {
@@ -68,7 +68,7 @@ void materials(RoomText& room, Rng& rng) {
 }
 
 // Static items at the back of a worktop.
-void clutter(RoomText& room, Rng& rng, double z, double y0, double wide) {
+void clutter(RoomWriter& room, Rng& rng, double z, double y0, double wide) {
   const double x = 0.52;
   const double jar = y0 + 0.08 + rng.uniform(0, 0.05);
   room.open_body("jar", {x, jar, z});
@@ -88,7 +88,7 @@ void clutter(RoomText& room, Rng& rng, double z, double y0, double wide) {
 
 ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
-  RoomText room("kitchen");
+  RoomWriter room("kitchen");
   materials(room, rng);
   KitchenStyle style;
   style.high = rng.uniform(0.86, 0.92);

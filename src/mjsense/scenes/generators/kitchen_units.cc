@@ -15,7 +15,7 @@ constexpr char kHinge[] = "damping=\"0.35\" frictionloss=\"0.25\" armature=\"0.0
 constexpr char kLight[] = "density=\"450\"";
 
 // The boards of a box with an open front, from x = kPanel to `deep`.
-void carcass(RoomText& room, std::string_view material, double y0, double wide, double z0,
+void carcass(RoomWriter& room, std::string_view material, double y0, double wide, double z0,
              double z1, double deep) {
   const double x = (kPanel + deep) / 2, hx = (deep - kPanel) / 2, t = kPanel / 2;
   const double y = y0 + wide / 2, z = (z0 + z1) / 2, hz = (z1 - z0) / 2;
@@ -31,20 +31,20 @@ struct Leaf {
   std::string thing;
   double x = 0, y0 = 0, wide = 0, z0 = 0, z1 = 0;
   bool hinge_at_y0 = true;
-  double most = 1.75;  // rad
+  double maximum = 1.75;  // rad
   std::string_view material = "front";
   double handle_z = 0, handle_length = 0;
   double thick = kPanel;
 };
 
-void leaf(RoomText& room, const KitchenStyle& style, const Leaf& l) {
+void leaf(RoomWriter& room, const KitchenStyle& style, const Leaf& l) {
   const double side = l.hinge_at_y0 ? 1 : -1;
   const double hinge = l.hinge_at_y0 ? l.y0 + kGap / 2 : l.y0 + l.wide - kGap / 2;
   const double w = l.wide - kGap, middle = (l.z0 + l.z1) / 2;
   room.open_body(l.thing + "/door", {l.x, hinge, middle});
   room.add(
       fmt::format("<joint name=\"{}/hinge\" type=\"hinge\" axis=\"0 0 {}\" range=\"0 {}\" {}/>",
-                  l.thing, side, l.most, kHinge));
+                  l.thing, side, l.maximum, kHinge));
   room.box(l.thing + "/leaf", l.material, {l.thick / 2, side * w / 2, 0},
            {l.thick / 2, w / 2, (l.z1 - l.z0 - kGap) / 2}, kLight);
   write_handle(room, style, l.thing, {0, side * (w - 0.045), l.handle_z - middle}, {0, 0, 1},
@@ -53,7 +53,7 @@ void leaf(RoomText& room, const KitchenStyle& style, const Leaf& l) {
 
 }  // namespace
 
-void write_handle(RoomText& room, const KitchenStyle& style, std::string_view thing, Vec3 middle,
+void write_handle(RoomWriter& room, const KitchenStyle& style, std::string_view thing, Vec3 middle,
                   Vec3 along, double length) {
   const Vec3 bar = middle + Vec3{-style.stand_off, 0, 0};
   const Vec3 end = (length / 2) * along;
@@ -72,7 +72,7 @@ void write_handle(RoomText& room, const KitchenStyle& style, std::string_view th
   }
 }
 
-void write_drawer_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0, double wide,
+void write_drawer_unit(RoomWriter& room, KitchenStyle& style, Rng& rng, double y0, double wide,
                        int drawers) {
   const double bottom = style.plinth, top = style.carcass_top();
   carcass(room, "carcass", y0, wide, bottom, top, style.deep);
@@ -105,7 +105,7 @@ void write_drawer_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0,
   }
 }
 
-void write_door_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0, double wide) {
+void write_door_unit(RoomWriter& room, KitchenStyle& style, Rng& rng, double y0, double wide) {
   const double bottom = style.plinth, top = style.carcass_top();
   room.box("", "plinth", {0.07, y0 + wide / 2, bottom / 2}, {0.01, wide / 2, bottom / 2});
   carcass(room, "carcass", y0, wide, bottom, top, style.deep);
@@ -131,7 +131,7 @@ void write_door_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0, d
   }
 }
 
-void write_wall_cabinet(RoomText& room, KitchenStyle& style, Rng& rng, double y0, double wide) {
+void write_wall_cabinet(RoomWriter& room, KitchenStyle& style, Rng& rng, double y0, double wide) {
   const double x = style.deep + 0.02 - style.wall_deep;
   const int leaves = wide > 0.6 ? 2 : 1;
   const bool at_y0 = rng.below(2) == 0;
@@ -160,7 +160,7 @@ void write_wall_cabinet(RoomText& room, KitchenStyle& style, Rng& rng, double y0
   }
 }
 
-void write_oven_unit(RoomText& room, KitchenStyle& style, double y0, double wide) {
+void write_oven_unit(RoomWriter& room, KitchenStyle& style, double y0, double wide) {
   const double bottom = style.plinth, top = style.carcass_top(), y = y0 + wide / 2;
   room.box("", "plinth", {0.07, y, bottom / 2}, {0.01, wide / 2, bottom / 2});
   carcass(room, "oven_inside", y0, wide, bottom, top, style.deep);
@@ -194,7 +194,7 @@ void write_oven_unit(RoomText& room, KitchenStyle& style, double y0, double wide
   room.close_body();
 }
 
-void write_hood(RoomText& room, const KitchenStyle& style, double y0, double wide) {
+void write_hood(RoomWriter& room, const KitchenStyle& style, double y0, double wide) {
   const double y = y0 + wide / 2, back = style.deep + 0.02, deep = 0.42;
   room.box("hood", "steel", {back - deep / 2, y, 1.62}, {deep / 2, wide / 2 - 0.02, 0.03});
   room.box("", "steel", {back - 0.14, y, 2.1}, {0.13, 0.14, 0.45});
@@ -202,7 +202,7 @@ void write_hood(RoomText& room, const KitchenStyle& style, double y0, double wid
            "contype=\"0\" conaffinity=\"0\"");
 }
 
-void write_fridge(RoomText& room, const KitchenStyle& style, double y0, double wide, double high,
+void write_fridge(RoomWriter& room, const KitchenStyle& style, double y0, double wide, double high,
                   bool hinge_at_y0) {
   const double foot = 0.06, split = 0.68, deep = style.deep + 0.02, y = y0 + wide / 2;
   const double w = wide - 0.01, thick = 0.045;
@@ -241,7 +241,7 @@ void write_fridge(RoomText& room, const KitchenStyle& style, double y0, double w
   door("freezer_0", foot, split, split - 0.06 - style.bar_length / 2, style.bar_length);
 }
 
-void write_microwave(RoomText& room, const KitchenStyle& style, double middle) {
+void write_microwave(RoomWriter& room, const KitchenStyle& style, double middle) {
   const double wide = 0.48, deep = 0.36, high = 0.28, x = 0.16, z = style.high + 0.012;
   const double door = 0.35, y0 = middle - wide / 2;
   room.open_body("microwave_0", {x, 0, 0});
@@ -274,13 +274,14 @@ void write_microwave(RoomText& room, const KitchenStyle& style, double middle) {
   room.close_body();
 }
 
-void write_worktop(RoomText& room, const KitchenStyle& style, int number, double y0, double wide) {
+void write_worktop(RoomWriter& room, const KitchenStyle& style, int number, double y0,
+                   double wide) {
   room.slab(fmt::format("worktop_{}", number), "worktop", Facing::kUp,
             {style.deep / 2, y0 + wide / 2, style.high}, style.deep + 0.04, wide, style.worktop,
             "friction=\"0.9 0.005 0.0002\"");
 }
 
-void write_sink_worktop(RoomText& room, const KitchenStyle& style, int number, double y0,
+void write_sink_worktop(RoomWriter& room, const KitchenStyle& style, int number, double y0,
                         double wide) {
   const double x0 = 0.10, x1 = 0.46, half = 0.23, y = y0 + wide / 2, z = style.high;
   const double front = -0.02, back = style.deep + 0.02;
@@ -307,7 +308,7 @@ void write_sink_worktop(RoomText& room, const KitchenStyle& style, int number, d
   room.capsule("", "steel", {tx, y + 0.02, z + 0.09}, {tx - 0.02, y + 0.08, z + 0.13}, 0.007);
 }
 
-void write_hob(RoomText& room, const KitchenStyle& style, double y0, double wide) {
+void write_hob(RoomWriter& room, const KitchenStyle& style, double y0, double wide) {
   const double y = y0 + wide / 2, x = style.deep / 2 + 0.02, z = style.high;
   room.box("hob", "glass", {x, y, z + 0.003}, {0.25, wide / 2 - 0.02, 0.003});
   for (int i = 0; i < 4; ++i) {

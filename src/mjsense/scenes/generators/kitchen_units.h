@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "mjsense/core/rng.h"
-#include "mjsense/scenes/generators/room_text.h"
+#include "mjsense/scenes/generators/room_writer.h"
 
 namespace mjsense {
 
@@ -27,23 +27,23 @@ struct KitchenStyle {
 
 // A bar handle on two posts, 45 mm in front of x = front, with the axis `along`. Named
 // <thing>/handle.
-void write_handle(RoomText& room, const KitchenStyle& style, std::string_view thing, Vec3 middle,
+void write_handle(RoomWriter& room, const KitchenStyle& style, std::string_view thing, Vec3 middle,
                   Vec3 along, double length);
 
-void write_drawer_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0, double wide,
+void write_drawer_unit(RoomWriter& room, KitchenStyle& style, Rng& rng, double y0, double wide,
                        int drawers);
 // A unit below the worktop, with one or two leaves depending on its width.
-void write_door_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0, double wide);
-void write_wall_cabinet(RoomText& room, KitchenStyle& style, Rng& rng, double y0, double wide);
-void write_oven_unit(RoomText& room, KitchenStyle& style, double y0, double wide);
-void write_hood(RoomText& room, const KitchenStyle& style, double y0, double wide);
-void write_fridge(RoomText& room, const KitchenStyle& style, double y0, double wide, double high,
+void write_door_unit(RoomWriter& room, KitchenStyle& style, Rng& rng, double y0, double wide);
+void write_wall_cabinet(RoomWriter& room, KitchenStyle& style, Rng& rng, double y0, double wide);
+void write_oven_unit(RoomWriter& room, KitchenStyle& style, double y0, double wide);
+void write_hood(RoomWriter& room, const KitchenStyle& style, double y0, double wide);
+void write_fridge(RoomWriter& room, const KitchenStyle& style, double y0, double wide, double high,
                   bool hinge_at_y0);
-void write_microwave(RoomText& room, const KitchenStyle& style, double middle);
+void write_microwave(RoomWriter& room, const KitchenStyle& style, double middle);
 // Worktop `number` from y0. The second function adds a basin and a tap at its centre.
-void write_worktop(RoomText& room, const KitchenStyle& style, int number, double y0, double wide);
-void write_sink_worktop(RoomText& room, const KitchenStyle& style, int number, double y0,
+void write_worktop(RoomWriter& room, const KitchenStyle& style, int number, double y0, double wide);
+void write_sink_worktop(RoomWriter& room, const KitchenStyle& style, int number, double y0,
                         double wide);
-void write_hob(RoomText& room, const KitchenStyle& style, double y0, double wide);
+void write_hob(RoomWriter& room, const KitchenStyle& style, double y0, double wide);
 
 }  // namespace mjsense

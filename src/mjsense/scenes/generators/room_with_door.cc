@@ -5,9 +5,9 @@
 
 #include <numbers>
 
-#include "mjsense/scenes/generators/finishes.h"
 #include "mjsense/scenes/generators/furniture.h"
 #include "mjsense/scenes/generators/hinged_door.h"
+#include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense {
 namespace {
@@ -23,7 +23,7 @@ struct Sizes {
   double left, right;  // m, from the centre of the door to the walls at y > 0 and y < 0
 };
 
-void write_shell_of(Building& out, const Sizes& s, const HingedDoor& door) {
+void write_shell_of(BuildingWriter& out, const Sizes& s, const HingedDoor& door) {
   const double mid = 0.5 * (s.left - s.right), wide = s.left + s.right;
   out.text().slab("floor_front", "floor_front", Facing::kUp, {-0.5 * s.front, mid, 0}, s.front,
                   wide, 0.1);
@@ -31,8 +31,8 @@ void write_shell_of(Building& out, const Sizes& s, const HingedDoor& door) {
                   0.1);
   out.text().slab("ceiling", "ceiling_paint", Facing::kDown,
                   {0.5 * (s.back - s.front), mid, kHeight}, s.back + s.front, wide, 0.1);
-  Building::Local walls(out, "walls", {0, 0, 0}, 0);
-  const WallLook look{.thickness = kWall, .height = kHeight};
+  BuildingWriter::Local walls(out, "walls", {0, 0, 0}, 0);
+  const WallFinish look{.thickness = kWall, .height = kHeight};
   const double half = 0.5 * opening_width(door);
   write_wall(out, {0, -s.right, 0}, {0, s.left, 0},
              {{s.right - half, s.right + half, 0, opening_height(door)}}, look);
@@ -47,7 +47,7 @@ void write_shell_of(Building& out, const Sizes& s, const HingedDoor& door) {
     write_window(out, {x, s.left, 0}, 0, kWindow, kSill, kLintel, kWall);
 }
 
-void write_materials(RoomText& text, Rng& rng) {
+void write_materials(RoomWriter& text, Rng& rng) {
   constexpr Colour kPaints[] = {{0.90, 0.89, 0.86},
                                 {0.62, 0.67, 0.66},
                                 {0.80, 0.76, 0.68},
@@ -79,9 +79,9 @@ ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   if (input.parameters[1] != 0) door.hinge_left = input.parameters[1] > 0;
   const Sizes s{rng.uniform(3.4, 4.0), rng.uniform(3.4, 4.0), rng.uniform(2.1, 2.6),
                 rng.uniform(2.1, 2.6)};
-  RoomText text("room_with_door");
+  RoomWriter text("room_with_door");
   write_materials(text, rng);
-  Building out(text);
+  BuildingWriter out(text);
   write_shell_of(out, s, door);
   const double mid = 0.5 * (s.left - s.right);
   for (const auto& [name, x] :
@@ -93,7 +93,7 @@ ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   // At the far walls, outside of the space needed to open the door: x, y on the wall's face, yaw.
   const double f = -s.front + 0.06, b = s.back - 0.06, l = s.left - 0.06, r = -s.right + 0.06;
   const auto stand = [&](Furniture piece, const char* name, double x, double y, double yaw) {
-    Building::Local local(out, name, {x, y, 0}, yaw);
+    BuildingWriter::Local local(out, name, {x, y, 0}, yaw);
     write_furniture(out, piece, name, rng, cfg.regions);
   };
   stand(Furniture::kSideboard, "sideboard", f, mid + rng.uniform(-0.4, 0.4), 0.5 * pi);
@@ -102,13 +102,13 @@ ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   stand(Furniture::kSofa, "sofa", b, mid + rng.uniform(-0.3, 0.3), -0.5 * pi);
   stand(Furniture::kBookcase, "bookcase", s.back - 0.7, r, pi);
   const auto hang = [&](const char* picture, double x, double yaw, double z) {
-    Building::Local local(out, "", {x, mid, 0}, yaw);
+    BuildingWriter::Local local(out, "", {x, mid, 0}, yaw);
     write_painting(out, picture, 0.85, 0.57, z);
   };
   hang("painting_1", f, 0.5 * pi, 1.55);
   hang("painting_2", b, -0.5 * pi, 1.65);
   {
-    Building::Local rug(out, "", {-0.55 * s.front, mid, 0}, 0);
+    BuildingWriter::Local rug(out, "", {-0.55 * s.front, mid, 0}, 0);
     write_rug(out, "cloth_2", 0.75, 1.05);
   }
   write_door(out, door, kWall);

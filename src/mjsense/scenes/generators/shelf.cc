@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "mjsense/scenes/generators/finishes.h"
-#include "mjsense/scenes/generators/room_text.h"
+#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense {
 namespace {
@@ -16,10 +16,11 @@ constexpr Colour kSpines[] = {{0.55, 0.18, 0.16}, {0.16, 0.27, 0.42}, {0.22, 0.3
                               {0.80, 0.45, 0.22}, {0.20, 0.20, 0.22}};
 
 // A row of books from y0, about `length` long, with their backs at `x`. Returns their number.
-void books(RoomText& room, Rng& rng, double x, double y0, double length, double z, double most) {
+void books(RoomWriter& room, Rng& rng, double x, double y0, double length, double z,
+           double maximum) {
   double y = y0;
   while (true) {
-    const double thick = rng.uniform(0.018, 0.045), high = rng.uniform(0.62, 0.9) * most,
+    const double thick = rng.uniform(0.018, 0.045), high = rng.uniform(0.62, 0.9) * maximum,
                  deep = rng.uniform(0.13, 0.18);
     const auto colour = rng.below(static_cast<std::uint32_t>(std::size(kSpines)));
     if (y + thick > y0 + length) return;
@@ -31,7 +32,7 @@ void books(RoomText& room, Rng& rng, double x, double y0, double length, double 
 
 ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
-  RoomText room("shelf");
+  RoomWriter room("shelf");
   write_shell_finishes(room, rng);
   const bool painted = rng.below(3) == 0;
   const Colour colour = painted ? paint_colour(rng) : wood_colour(rng);

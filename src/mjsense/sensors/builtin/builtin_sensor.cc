@@ -8,10 +8,10 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {
@@ -22,34 +22,34 @@ std::string or_list(const std::vector<std::string>& words) {
 }
 
 void check_object(const ObjRef& ref, const std::vector<std::string>& allowed,
-                  std::string_view field, std::string_view type, std::string_view place) {
+                  std::string_view field, std::string_view type, std::string_view context) {
   if (std::find(allowed.begin(), allowed.end(), ref.type) == allowed.end()) {
-    throw ValueError(fmt::format("{}: {} requires {}.type {}, not '{}'", place, type, field,
+    throw ValueError(fmt::format("{}: {} requires {}.type {}, not '{}'", context, type, field,
                                  or_list(allowed), ref.type));
   }
   if (ref.name.empty())
-    throw ValueError(fmt::format("{}: {} requires {}.name", place, type, field));
+    throw ValueError(fmt::format("{}: {} requires {}.name", context, type, field));
 }
 
 // Bit mask of the requested fields, which must be in MuJoCo's order.
-int range_mask(const std::vector<std::string>& data, std::string_view place) {
+int range_mask(const std::vector<std::string>& data, std::string_view context) {
   std::vector<std::string> names;
   for (const RangeField& field : range_fields()) names.emplace_back(field.name);
   int mask = 0, last = -1;
   for (const std::string& name : data) {
     const int i = static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
     if (i == static_cast<int>(names.size())) {
-      throw ValueError(fmt::format("{}: data has no field '{}'; fields are {}", place, name,
+      throw ValueError(fmt::format("{}: data has no field '{}'; fields are {}", context, name,
                                    fmt::join(names, ", ")));
     }
     if (i <= last) {
       throw ValueError(fmt::format("{}: data fields ({}) must be distinct and in the order {}",
-                                   place, fmt::join(data, ", "), fmt::join(names, ", ")));
+                                   context, fmt::join(data, ", "), fmt::join(names, ", ")));
     }
     mask |= 1 << i;
     last = i;
   }
-  if (mask == 0) throw ValueError(fmt::format("{}: rangefinder without data fields", place));
+  if (mask == 0) throw ValueError(fmt::format("{}: rangefinder without data fields", context));
   return mask;
 }
 
@@ -66,53 +66,54 @@ std::string BuiltinSensorCfg::key() const {
 
 void BuiltinSensorCfg::validate() const {
   if (name.empty()) throw ValueError("sensor '': a sensor needs a name");
-  const std::string place = fmt::format("sensor '{}'", key());
-  check_fields(*this, place);
-  const BuiltinType& type = builtin_type(sensor_type, place);
+  const std::string context = fmt::format("sensor '{}'", key());
+  check_fields(*this, context);
+  const BuiltinType& type = builtin_type(sensor_type, context);
 
   const std::vector<std::string> objects = allowed_objects(type.group);
   const std::vector<std::string> refs = allowed_refs(type.group);
   if (!objects.empty()) {
     if (obj.empty()) {
       throw ValueError(
-          fmt::format("{}: {} requires obj (type {})", place, type.name, or_list(objects)));
+          fmt::format("{}: {} requires obj (type {})", context, type.name, or_list(objects)));
     }
-    check_object(obj, objects, "obj", type.name, place);
+    check_object(obj, objects, "obj", type.name, context);
   }
   const bool needs_ref = !refs.empty() && type.group != BuiltinGroup::kFrame;
   if (needs_ref && ref.empty()) {
-    throw ValueError(fmt::format("{}: {} requires ref (type {})", place, type.name, or_list(refs)));
+    throw ValueError(
+        fmt::format("{}: {} requires ref (type {})", context, type.name, or_list(refs)));
   }
   if (!ref.empty()) {
     if (refs.empty() && type.group != BuiltinGroup::kPlugin) {
-      throw ValueError(fmt::format("{}: {} takes no ref", place, type.name));
+      throw ValueError(fmt::format("{}: {} takes no ref", context, type.name));
     }
-    if (!refs.empty()) check_object(ref, refs, "ref", type.name, place);
+    if (!refs.empty()) check_object(ref, refs, "ref", type.name, context);
   }
 
   if (cutoff > 0 && is_unit(type.type)) {
     throw ValueError(fmt::format("{}: cutoff = {} cannot be applied to the unit vector of {}",
-                                 place, cutoff, type.name));
+                                 context, cutoff, type.name));
   }
   if ((delay > 0 || interval > 0) && nsample == 0) {
-    throw ValueError(fmt::format("{}: delay and interval need a history: nsample > 0", place));
+    throw ValueError(fmt::format("{}: delay and interval need a history: nsample > 0", context));
   }
   if (phase < 0 && phase <= -interval) {
-    throw ValueError(fmt::format("{}: phase = {} s must be in (-interval, 0] = (-{}, 0]", place,
+    throw ValueError(fmt::format("{}: phase = {} s must be in (-interval, 0] = (-{}, 0]", context,
                                  phase, interval));
   }
-  if (type.group == BuiltinGroup::kRangefinder) range_mask(data, place);
+  if (type.group == BuiltinGroup::kRangefinder) range_mask(data, context);
   if (enclosed && type.group != BuiltinGroup::kInside) {
     throw ValueError(
-        fmt::format("{}: enclosed applies to insidesite only, not to {}", place, type.name));
+        fmt::format("{}: enclosed applies to insidesite only, not to {}", context, type.name));
   }
   if (type.group == BuiltinGroup::kUser) {
     if (dim < 1)
-      throw ValueError(fmt::format("{}: a user sensor requires dim >= 1, not {}", place, dim));
+      throw ValueError(fmt::format("{}: a user sensor requires dim >= 1, not {}", context, dim));
   }
   if (type.group == BuiltinGroup::kPlugin && plugin.empty() == instance.empty()) {
     throw ValueError(
-        fmt::format("{}: a plugin sensor requires plugin or instance, one of them", place));
+        fmt::format("{}: a plugin sensor requires plugin or instance, one of them", context));
   }
 }
 
@@ -125,20 +126,20 @@ BuiltinSensor::BuiltinSensor(const BuiltinSensorCfg& cfg)
     : ModelSensor(cfg.key()), cfg_(std::make_unique<BuiltinSensorCfg>(cfg)) {}
 
 void BuiltinSensor::edit_spec(mjSpec* spec) {
-  const std::string place = fmt::format("sensor '{}'", name());
+  const std::string context = fmt::format("sensor '{}'", name());
   if (mjs_findElement(spec, mjOBJ_SENSOR, name().c_str())) {
     throw ValueError(cfg_->obj.entity.empty()
-                         ? fmt::format("{}: already exists in the scene", place)
-                         : fmt::format("{}: defined in both entity XML and scene config", place));
+                         ? fmt::format("{}: already exists in the scene", context)
+                         : fmt::format("{}: defined in both entity XML and scene config", context));
   }
-  const BuiltinType& type = builtin_type(cfg_->sensor_type, place);
+  const BuiltinType& type = builtin_type(cfg_->sensor_type, context);
   mjsSensor* sensor = mjs_addSensor(spec);
   mjs_setName(sensor->element, name().c_str());
   sensor->type = type.type;
   const auto attach = [&](const ObjRef& ref, mjtObj& target_type, mjString* target_name) {
     if (ref.empty() || type.group == BuiltinGroup::kWorld) return;
-    target_type = obj_type(ref.type, place);
-    find_in_spec(spec, target_type, ref.full_name(), place);
+    target_type = obj_type(ref.type, context);
+    find_in_spec(spec, target_type, ref.full_name(), context);
     mjs_setString(target_name, ref.full_name().c_str());
   };
   attach(cfg_->obj, sensor->objtype, sensor->objname);
@@ -156,7 +157,7 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
   sensor->interval[1] = cfg_->phase;
   switch (type.group) {
     case BuiltinGroup::kRangefinder:
-      sensor->intprm[0] = range_mask(cfg_->data, place);
+      sensor->intprm[0] = range_mask(cfg_->data, context);
       break;
     case BuiltinGroup::kInside:
       sensor->intprm[0] = cfg_->enclosed;
@@ -171,7 +172,7 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
       sensor->plugin.active = 1;
       if (!cfg_->plugin.empty()) {
         if (mjs_activatePlugin(spec, cfg_->plugin.c_str()) != 0) {
-          throw ValueError(fmt::format("{}: MuJoCo has no plugin '{}'", place, cfg_->plugin));
+          throw ValueError(fmt::format("{}: MuJoCo has no plugin '{}'", context, cfg_->plugin));
         }
         mjsPlugin* plugin = mjs_addPlugin(spec);
         mjs_setString(plugin->plugin_name, cfg_->plugin.c_str());
@@ -179,7 +180,7 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
         mjs_setString(sensor->plugin.plugin_name, cfg_->plugin.c_str());
         mjs_setString(sensor->plugin.name, name().c_str());
       } else {
-        find_in_spec(spec, mjOBJ_PLUGIN, cfg_->instance, place);
+        find_in_spec(spec, mjOBJ_PLUGIN, cfg_->instance, context);
         mjs_setString(sensor->plugin.name, cfg_->instance.c_str());
       }
       break;

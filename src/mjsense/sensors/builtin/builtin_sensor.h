@@ -16,13 +16,14 @@ namespace mjsense {
 
 enum class BuiltinInterp { kZoh, kLinear, kCubic };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<BuiltinInterp>{"zoh", "linear", "cubic"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<BuiltinInterp>{"zoh", "linear",
+                                                                           "cubic"};
 template <>
-inline constexpr std::array<std::string_view, 4> kWords<mjtDataType>{"real", "positive", "axis",
-                                                                     "quaternion"};
+inline constexpr std::array<std::string_view, 4> kEnumNames<mjtDataType>{"real", "positive", "axis",
+                                                                         "quaternion"};
 enum class BuiltinStage { kPos, kVel, kAcc };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<BuiltinStage>{"pos", "vel", "acc"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<BuiltinStage>{"pos", "vel", "acc"};
 
 struct BuiltinSensorCfg : SensorCfg {
   std::string sensor_type;
@@ -32,13 +33,13 @@ struct BuiltinSensorCfg : SensorCfg {
   double interval = 0.0;
   double phase = 0.0;
   int nsample = 0;
-  Word<BuiltinInterp> interp;
+  NamedEnum<BuiltinInterp> interp;
   double noise = 0.0;
   std::vector<std::string> data{"dist"};
   bool enclosed = false;
   int dim = 0;
-  Word<mjtDataType> datatype;
-  Word<BuiltinStage> needstage = BuiltinStage::kAcc;
+  NamedEnum<mjtDataType> datatype;
+  NamedEnum<BuiltinStage> needstage = BuiltinStage::kAcc;
   std::string plugin, instance;
 
   // Throws ValueError for errors that can be found without a model.

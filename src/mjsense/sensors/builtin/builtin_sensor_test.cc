@@ -14,9 +14,9 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/scene/spec.h"
 #include "mjsense/sensors/builtin/builtin_cases.h"
 #include "mjsense/sim/simulation.h"
 

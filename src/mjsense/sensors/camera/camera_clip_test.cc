@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/sensors/camera/testing/shoot.h"
+#include "mjsense/sensors/camera/testing/render_image.h"
 
 namespace mjsense {
 namespace {

@@ -24,10 +24,10 @@ class Optics {
     double x = grid_.left + u * grid_.width * grid_.dx;
     double y = grid_.top + v * grid_.height * grid_.dy;
     if (grid_.orthographic) return to_world({x, y, -depth});
-    if (grid_.bent) {
+    if (grid_.distorted_rays) {
       const long column = std::lround(u * (grid_.width - 1)),
                  row = std::lround(v * (grid_.height - 1));
-      const float* bent = grid_.bent + 2 * (row * grid_.width + column);
+      const float* bent = grid_.distorted_rays + 2 * (row * grid_.width + column);
       x = bent[0];
       y = bent[1];
       depth /= std::sqrt(x * x + y * y + 1);
@@ -68,7 +68,7 @@ void CameraSensor::draw(const World& world, DebugShapes& shapes) {
     shapes.add_line(from, to, viz.line_width, viz.frustum_color, name() + "_frustum");
   };
   const auto rim = [&](double depth) {
-    const int parts = grid.bent ? kBentParts : 1;
+    const int parts = grid.distorted_rays ? kBentParts : 1;
     for (int side = 0; side < 4; ++side) {
       const double *a = kCorners[side], *b = kCorners[side + 1];
       const auto at = [&](int k) {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "mjsense/rays/ray_scene.h"
+#include "mjsense/rays/testing/reference.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/rays/testing/truth.h"
-#include "mjsense/sensors/camera/testing/shoot.h"
+#include "mjsense/sensors/camera/testing/render_image.h"
 
 namespace mjsense {
 namespace {
@@ -116,7 +116,7 @@ TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
     const auto camera = testing::shoot(camera_c(kWidth, kHeight, {"depth"}), m, rays);
     const auto depth = camera->field("depth").data.row<float>(0);
     each_pixel(m, kWidth, kHeight, 60, [&](int i, const double* d, double length) {
-      const testing::Truth truth = testing::mujoco_ray(m, m.data->cam_xpos, d);
+      const testing::Reference truth = testing::mujoco_ray(m, m.data->cam_xpos, d);
       ++pixels;
       if (truth.t < 0) return;
       ++ground;

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/parallel.h"
-#include "mjsense/core/shared.h"
+#include "mjsense/core/shared_cache.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
 #include "mjsense/sensors/camera/camera_data.h"
@@ -77,7 +77,7 @@ bool CameraSensor::wants(std::string_view type) const {
 }
 
 void CameraSensor::initialize(const SensorInit& init) {
-  const std::string place = fmt::format("camera '{}'", name());
+  const std::string context = fmt::format("camera '{}'", name());
   model_ = init.model;
   const std::string& camera = cfg_.camera_name.empty() ? name() : cfg_.camera_name;
   camera_ = mj_name2id(model_, mjOBJ_CAMERA, camera.c_str());
@@ -85,7 +85,7 @@ void CameraSensor::initialize(const SensorInit& init) {
     std::vector<std::string> names;
     for (int i = 0; i < model_->ncam; ++i)
       names.emplace_back(model_->names + model_->name_camadr[i]);
-    throw_unknown(place, "camera", camera, names);
+    throw_unknown(context, "camera", camera, names);
   }
   near_ =
       cfg_.clip_near == ClipNear::kModel ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
@@ -93,7 +93,7 @@ void CameraSensor::initialize(const SensorInit& init) {
     throw ValueError(
         fmt::format("{}: far is {} m, and clip_near 'model' clips at {:.6g} m (znear x "
                     "extent): need near < far",
-                    place, cfg_.far, near_));
+                    context, cfg_.far, near_));
   assets_ =
       surface_assets_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
   workspace_.reset();
@@ -110,8 +110,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (cfg_.distortion.model != LensKind::kNone) {
     lens = {cfg_.distortion.model == LensKind::kFisheye ? Lens::kFisheye : Lens::kBrownConrady,
             cfg_.distortion.coefficients};
-    bent_ = bent_rays(grid, lens->lens, lens->coefficients, place.c_str());
-    grid.bent = bent_.data();
+    distorted_rays_ = distorted_rays(grid, lens->lens, lens->coefficients, context.c_str());
+    grid.distorted_rays = distorted_rays_.data();
   }
   for (PerWorld& w : worlds_) w.grid = grid;
   optical_flow_.reset();
@@ -143,7 +143,7 @@ void CameraSensor::initialize(const SensorInit& init) {
       gl.fovy = cfg_.fovy;
       gl.orthographic = cfg_.orthographic;
     }
-    gl_ = make_gl_renderer(model_, gl, place);
+    gl_ = make_gl_renderer(model_, gl, context);
     return;
   }
   // Allocates all that cast() needs, except the shapes of the ray scene.
@@ -180,13 +180,13 @@ PixelGrid CameraSensor::grid_in(const mjModel* model) const {
 
 // Checks that need the camera of the model, in addition to validate().
 void CameraSensor::check_grid(const PixelGrid& grid) const {
-  const std::string place = fmt::format("camera '{}'", name());
+  const std::string context = fmt::format("camera '{}'", name());
   const bool orthographic = model_->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
-  if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, place);
+  if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, context);
   if (orthographic && (cfg_.intrinsics || cfg_.distortion.model != LensKind::kNone))
-    throw ValueError(place + ": an orthographic camera has no intrinsics and no lens distortion");
+    throw ValueError(context + ": an orthographic camera has no intrinsics and no lens distortion");
   if (orthographic && cfg_.depth_noise != DepthNoise::kNone)
-    throw ValueError(place +
+    throw ValueError(context +
                      ": depth_noise applies only to the planar depth of a perspective camera");
 }
 
@@ -242,7 +242,7 @@ void CameraSensor::compute(const World& world) {
   w.due |= is_due(world, w.image);  // an image that was due but not rendered is still due
   if (!w.due) return;
   const mjModel* m = world.model;
-  if (!w.grid.bent) w.grid = grid_in(m);
+  if (!w.grid.distorted_rays) w.grid = grid_in(m);
   if (gl_) {
     gl_->remember(world.id, m);
   } else {

@@ -21,7 +21,7 @@ namespace mjsense {
 // Throws ValueError for errors that can be found without a model.
 void validate(const CameraSensorCfg& cfg);
 // Throws ValueError for 180 degrees or more.
-void check_fovy(double degrees, std::string_view place);
+void check_fovy(double degrees, std::string_view context);
 
 class CameraSensor final : public Sensor {
  public:
@@ -33,7 +33,7 @@ class CameraSensor final : public Sensor {
   mjtStage needs() const override { return mjSTAGE_POS; }
   // A camera with its own rate must process every control step, because between two images it shows
   // the older one.
-  bool eager() const override { return cfg_.update_period > 0; }
+  bool needs_every_step() const override { return cfg_.update_period > 0; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
@@ -77,7 +77,7 @@ class CameraSensor final : public Sensor {
   int camera_ = -1;
   double near_ = 0;  // m, near plane
   std::vector<PerWorld> worlds_;
-  std::vector<float> bent_;
+  std::vector<float> distorted_rays_;
   std::vector<int> due_;
   std::vector<std::vector<float>> clean_;  // by thread: true depth of one image; only with noise
   std::shared_ptr<const SurfaceAssets> assets_;

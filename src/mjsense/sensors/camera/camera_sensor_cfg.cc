@@ -30,30 +30,30 @@ void check_pose(const CameraSensorCfg& cfg, Fail&& fail) {
 
 }  // namespace
 
-void check_fovy(double degrees, std::string_view place) {
+void check_fovy(double degrees, std::string_view context) {
   if (degrees < 180) return;
   throw ValueError(fmt::format(
-      "{}: fovy is {} degrees: must be less than 180 for a perspective camera", place, degrees));
+      "{}: fovy is {} degrees: must be less than 180 for a perspective camera", context, degrees));
 }
 
-void validate(const LensDistortion& lens, std::string_view place) {
+void validate(const LensDistortion& lens, std::string_view context) {
   const LensKind kind = lens.model;
   const std::size_t needed = kind == LensKind::kNone ? 0 : kind == LensKind::kFisheye ? 4 : 5;
   if (lens.coefficients.size() != needed)
-    throw ValueError(fmt::format("{}: '{}' takes {} coefficients, got {}", place, word(kind),
+    throw ValueError(fmt::format("{}: '{}' takes {} coefficients, got {}", context, enum_name(kind),
                                  needed, lens.coefficients.size()));
 }
 
 void validate(const CameraSensorCfg& cfg) {
-  const std::string place = fmt::format("camera '{}'", cfg.name);
+  const std::string context = fmt::format("camera '{}'", cfg.name);
   const auto fail = [&](const std::string& what) {
-    throw ValueError(fmt::format("{}: {}", place, what));
+    throw ValueError(fmt::format("{}: {}", context, what));
   };
   if (cfg.name.empty()) throw ValueError("a camera needs a name");
-  check_fields(cfg, place);
+  check_fields(cfg, context);
   check_pose(cfg, fail);
   if (cfg.fovy) {
-    if (!cfg.orthographic && cfg.camera_name.empty()) check_fovy(*cfg.fovy, place);
+    if (!cfg.orthographic && cfg.camera_name.empty()) check_fovy(*cfg.fovy, context);
     if (cfg.intrinsics) fail("both fovy and intrinsics are given: set only one of them");
   }
   if (cfg.far > 0 && cfg.far <= cfg.near)
@@ -108,18 +108,18 @@ std::unique_ptr<Sensor> CameraSensorCfg::build() const {
 }
 
 void CameraSensor::edit_spec(mjSpec* spec) {
-  const std::string place = fmt::format("camera '{}'", name());
+  const std::string context = fmt::format("camera '{}'", name());
   if (!cfg_.camera_name.empty()) {
     mjsElement* element = mjs_findElement(spec, mjOBJ_CAMERA, cfg_.camera_name.c_str());
-    if (!element) throw_unknown(place, "camera", cfg_.camera_name, names_of(spec, mjOBJ_CAMERA));
+    if (!element) throw_unknown(context, "camera", cfg_.camera_name, names_of(spec, mjOBJ_CAMERA));
     return;  // this sensor's changes to the camera do not affect other sensors
   }
   mjsBody* body = mjs_findBody(spec, cfg_.parent_body.empty() ? "world" : cfg_.parent_body.c_str());
-  if (!body) throw_unknown(place, "body", cfg_.parent_body, names_of(spec, mjOBJ_BODY));
+  if (!body) throw_unknown(context, "body", cfg_.parent_body, names_of(spec, mjOBJ_BODY));
   if (mjs_findElement(spec, mjOBJ_CAMERA, name().c_str()))
     throw ValueError(fmt::format(
         "{}: repeated name: the model has a camera of this name; set camera_name to use it",
-        place));
+        context));
   mjsCamera* camera = mjs_addCamera(body, nullptr);
   mjs_setName(camera->element, name().c_str());
   std::copy(cfg_.pos.begin(), cfg_.pos.end(), camera->pos);

@@ -53,12 +53,12 @@ void visit_fields(V& v, CameraIntrinsics& c) {
 
 enum class LensKind { kNone, kBrownConrady, kFisheye };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<LensKind>{"none", "brown_conrady",
-                                                                  "fisheye"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<LensKind>{"none", "brown_conrady",
+                                                                      "fisheye"};
 
 // x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|, theta = atan r.
 struct LensDistortion {
-  Word<LensKind> model;
+  NamedEnum<LensKind> model;
   std::vector<double> coefficients;
 };
 template <class V>
@@ -77,7 +77,7 @@ void visit_fields(V& v, LensDistortion& c) {
 }
 
 // Throws ValueError unless there are as many coefficients as the model needs.
-void validate(const LensDistortion& lens, std::string_view place);
+void validate(const LensDistortion& lens, std::string_view context);
 
 struct CameraVizCfg {
   bool show_frustum = true, show_frame = true;
@@ -105,16 +105,16 @@ void visit_fields(V& v, CameraVizCfg& c) {
 
 enum class DepthKind { kPlanar, kRay };
 template <>
-inline constexpr std::array<std::string_view, 2> kWords<DepthKind>{"planar", "ray"};
+inline constexpr std::array<std::string_view, 2> kEnumNames<DepthKind>{"planar", "ray"};
 enum class DepthNoise { kNone, kD405, kD435 };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<DepthNoise>{"none", "d405", "d435"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<DepthNoise>{"none", "d405", "d435"};
 enum class ClipNear { kNone, kModel };
 template <>
-inline constexpr std::array<std::string_view, 2> kWords<ClipNear>{"none", "model"};
+inline constexpr std::array<std::string_view, 2> kEnumNames<ClipNear>{"none", "model"};
 enum class CameraRenderer { kRays, kOpenGl };
 template <>
-inline constexpr std::array<std::string_view, 2> kWords<CameraRenderer>{"rays", "opengl"};
+inline constexpr std::array<std::string_view, 2> kEnumNames<CameraRenderer>{"rays", "opengl"};
 
 inline constexpr std::array<std::string_view, 8> kCameraDataTypes{
     "rgb",     "depth",       "segmentation", "body_segmentation", "entity_segmentation",
@@ -138,14 +138,14 @@ struct CameraSensorCfg : SensorCfg {
   std::vector<int> enabled_site_groups, enabled_tendon_groups;
   int max_lights = 8;
   double near = 0, far = 0;
-  Word<ClipNear> clip_near;
+  NamedEnum<ClipNear> clip_near;
   double update_period = 0, phase = 0;
   int samples = 1;
-  Word<DepthKind> depth_kind;
+  NamedEnum<DepthKind> depth_kind;
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
-  Word<DepthNoise> depth_noise;
-  Word<CameraRenderer> renderer;
+  NamedEnum<DepthNoise> depth_noise;
+  NamedEnum<CameraRenderer> renderer;
   bool debug_vis = false;
   CameraVizCfg viz;
 

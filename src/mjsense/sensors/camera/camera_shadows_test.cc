@@ -7,7 +7,7 @@
 
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/sensors/camera/testing/shoot.h"
+#include "mjsense/sensors/camera/testing/render_image.h"
 
 namespace mjsense {
 namespace {

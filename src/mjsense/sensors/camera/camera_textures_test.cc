@@ -10,7 +10,7 @@
 #include <string>
 
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/sensors/camera/testing/shoot.h"
+#include "mjsense/sensors/camera/testing/render_image.h"
 
 namespace mjsense {
 namespace {

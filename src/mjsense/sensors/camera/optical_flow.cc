@@ -35,8 +35,8 @@ OpticalFlow::OpticalFlow(const mjModel* model, int camera, const std::optional<L
     s.depth.resize(pixels);
     s.segmentation.resize(2 * pixels);
   }
-  for (std::size_t i = 0; grid.bent && i < pixels; ++i) {
-    const double x = grid.bent[2 * i], y = grid.bent[2 * i + 1];
+  for (std::size_t i = 0; grid.distorted_rays && i < pixels; ++i) {
+    const double x = grid.distorted_rays[2 * i], y = grid.distorted_rays[2 * i + 1];
     reach2_ = std::max(reach2_, x * x + y * y);
   }
 }
@@ -129,7 +129,8 @@ void OpticalFlow::follow(const PerWorld& w, const Move& move, int y, int begin, 
   const PixelGrid& now = w.now.grid;
   for (int x = begin; x < end; ++x) {
     double ray[2] = {now.left + now.dx * (x + 0.5), now.top + now.dy * (y + 0.5)};
-    if (now.bent) std::copy_n(now.bent + 2 * (static_cast<std::size_t>(y) * now.width + x), 2, ray);
+    if (now.distorted_rays)
+      std::copy_n(now.distorted_rays + 2 * (static_cast<std::size_t>(y) * now.width + x), 2, ray);
     double d = depth[x];
     if (ray_depth && !now.orthographic) d /= std::sqrt(1 + ray[0] * ray[0] + ray[1] * ray[1]);
     const double spread = now.orthographic ? 1 : d;
@@ -149,7 +150,7 @@ void OpticalFlow::write(int world, const ImageTargets& image, int first, int las
                         float* flow) const {
   const PerWorld& w = worlds_[world];
   const PixelGrid& grid = w.now.grid;
-  const bool pinhole = !grid.bent && !image.ray_depth && !grid.orthographic;
+  const bool pinhole = !grid.distorted_rays && !image.ray_depth && !grid.orthographic;
   for (int y = first; y < last; ++y) {
     const std::size_t row = static_cast<std::size_t>(y) * grid.width;
     const std::int32_t* ids = image.segmentation + 2 * row;

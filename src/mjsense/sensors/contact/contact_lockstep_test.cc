@@ -36,11 +36,11 @@ std::shared_ptr<Scene> make_scene() {
   entity.model.xml = kHeap;
   cfg.entities.emplace_back("heap", entity);
   cfg.terrain = TerrainCfg{};
-  for (std::size_t i = 0; i < kWords<ContactReduce>.size(); ++i) {
+  for (std::size_t i = 0; i < kEnumNames<ContactReduce>.size(); ++i) {
     const auto reduce = static_cast<ContactReduce>(i);
     for (bool memory : {false, true}) {
       ContactSensorCfg c;
-      c.name = std::string(word(reduce)) + (memory ? "_memory" : "");
+      c.name = std::string(enum_name(reduce)) + (memory ? "_memory" : "");
       c.primary = {"body", {".*"}, "heap", {}};
       c.fields = {"found", "force", "torque", "dist", "pos", "normal", "tangent"};
       c.reduce = reduce;

@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
+#include "mjsense/core/name_matching.h"
 
 namespace mjsense {
 namespace {
@@ -22,42 +22,42 @@ std::string_view kind_of(const ContactMatch& match) {
   return match.mode == ContactMode::kGeom ? "geom" : "body";
 }
 
-void drop_excluded(std::string_view place, const ContactMatch& match,
+void drop_excluded(std::string_view context, const ContactMatch& match,
                    std::vector<ContactObject>& objects) {
   const std::vector<std::string> before = labels_of(objects);
-  const Exclude exclude(match.exclude, place);
+  const Exclude exclude(match.exclude, context);
   std::erase_if(objects, [&](const ContactObject& o) { return exclude.drops(o.label); });
   if (objects.empty()) {
     throw ValueError(
-        fmt::format("{}: exclude removes every match: {}", place, fmt::join(before, ", ")));
+        fmt::format("{}: exclude removes every match: {}", context, fmt::join(before, ", ")));
   }
 }
 
 }  // namespace
 
-void validate(const ContactMatch& match, std::string_view place) {
-  if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
+void validate(const ContactMatch& match, std::string_view context) {
+  if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", context));
   for (const std::string& pattern : match.pattern) {
-    if (pattern.empty()) throw ValueError(fmt::format("{}: a pattern is empty", place));
+    if (pattern.empty()) throw ValueError(fmt::format("{}: a pattern is empty", context));
     // The subtree of a secondary has a literal name, not a pattern.
-    if (!match.entity.empty() && match.mode != ContactMode::kSubtree) Regex(pattern, place);
+    if (!match.entity.empty() && match.mode != ContactMode::kSubtree) Regex(pattern, context);
   }
-  Exclude(match.exclude, place);
+  Exclude(match.exclude, context);
 }
 
-void validate_primary(const ContactMatch& match, std::string_view place) {
-  validate(match, place);
+void validate_primary(const ContactMatch& match, std::string_view context) {
+  validate(match, context);
   for (const std::string& pattern : match.pattern) {
-    if (!match.entity.empty()) Regex(pattern, place);
+    if (!match.entity.empty()) Regex(pattern, context);
   }
 }
 
-void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view place) {
-  validate(match, place);
+void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view context) {
+  validate(match, context);
   if (policy != ContactPolicy::kEach && policy != ContactPolicy::kAny &&
       match.pattern.size() != 1) {
     throw ValueError(
-        fmt::format("{}: {} patterns: must be a single name (policy 'each' takes several)", place,
+        fmt::format("{}: {} patterns: must be a single name (policy 'each' takes several)", context,
                     match.pattern.size()));
   }
 }
@@ -99,7 +99,7 @@ bool ContactNames::in_terrain(int body) const {
 }
 
 // All named elements of the entity, in model order.
-std::vector<ContactObject> ContactNames::of_entity(std::string_view place,
+std::vector<ContactObject> ContactNames::of_entity(std::string_view context,
                                                    const ContactMatch& match) const {
   const std::string prefix = match.entity + "/";
   const bool terrain = match.entity == "terrain" && terrain_ > 0;
@@ -126,14 +126,14 @@ std::vector<ContactObject> ContactNames::of_entity(std::string_view place,
     }
   }
   if (std::find(entities.begin(), entities.end(), match.entity) == entities.end()) {
-    throw ValueError(fmt::format("{}: entity '{}' not found{}", place, match.entity,
+    throw ValueError(fmt::format("{}: entity '{}' not found{}", context, match.entity,
                                  suggest(match.entity, entities)));
   }
   throw ValueError(
-      fmt::format("{}: entity '{}' has no named {}", place, match.entity, kind_of(match)));
+      fmt::format("{}: entity '{}' has no named {}", context, match.entity, kind_of(match)));
 }
 
-std::vector<ContactObject> ContactNames::literal(std::string_view place,
+std::vector<ContactObject> ContactNames::literal(std::string_view context,
                                                  const ContactMatch& match) const {
   const std::vector<Element>& all = elements(match);
   std::vector<ContactObject> result;
@@ -145,56 +145,56 @@ std::vector<ContactObject> ContactNames::literal(std::string_view place,
       for (const Element& e : all) {
         if (!e.name.empty()) names.push_back(e.name);
       }
-      throw_unknown(place, kind_of(match), name, names);
+      throw_unknown(context, kind_of(match), name, names);
     }
     const int id = static_cast<int>(found - all.begin());
     for (const ContactObject& other : result) {
-      if (other.id == id) throw ValueError(fmt::format("{}: '{}' is given twice", place, name));
+      if (other.id == id) throw ValueError(fmt::format("{}: '{}' is given twice", context, name));
     }
     result.push_back({id, name, name});
   }
   return result;
 }
 
-std::vector<ContactObject> ContactNames::by_regex(std::string_view place,
+std::vector<ContactObject> ContactNames::by_regex(std::string_view context,
                                                   const ContactMatch& match) const {
-  const std::vector<ContactObject> all = of_entity(place, match);
+  const std::vector<ContactObject> all = of_entity(context, match);
   std::vector<ContactObject> result;
-  for (int i : match_names(match.pattern, labels_of(all), place)) result.push_back(all[i]);
-  drop_excluded(place, match, result);
+  for (int i : match_names(match.pattern, labels_of(all), context)) result.push_back(all[i]);
+  drop_excluded(context, match, result);
   return result;
 }
 
 std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
                                                    const ContactMatch& match) const {
-  const std::string place = fmt::format("sensor '{}': primary", sensor);
-  validate_primary(match, place);
-  if (match.entity.empty()) return literal(place, match);
-  return by_regex(place, match);
+  const std::string context = fmt::format("sensor '{}': primary", sensor);
+  validate_primary(match, context);
+  if (match.entity.empty()) return literal(context, match);
+  return by_regex(context, match);
 }
 
 std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
                                                      const ContactMatch& match,
                                                      ContactPolicy policy) const {
-  const std::string place = fmt::format("sensor '{}': secondary", sensor);
-  validate_secondary(match, policy, place);
+  const std::string context = fmt::format("sensor '{}': secondary", sensor);
+  validate_secondary(match, policy, context);
   if (policy == ContactPolicy::kEach) {
-    return match.entity.empty() ? literal(place, match) : by_regex(place, match);
+    return match.entity.empty() ? literal(context, match) : by_regex(context, match);
   }
-  if (match.entity.empty()) return literal(place, match);
+  if (match.entity.empty()) return literal(context, match);
   if (match.mode == ContactMode::kSubtree) {  // a literal name, as in mjlab
-    const std::vector<ContactObject> all = of_entity(place, match);
+    const std::vector<ContactObject> all = of_entity(context, match);
     std::vector<ContactObject> result;
     for (const ContactObject& o : all) {
       if (o.label == match.pattern[0]) result = {o};
     }
-    if (result.empty()) throw_unknown(place, "body", match.pattern[0], labels_of(all));
-    drop_excluded(place, match, result);
+    if (result.empty()) throw_unknown(context, "body", match.pattern[0], labels_of(all));
+    drop_excluded(context, match, result);
     return result;
   }
-  std::vector<ContactObject> result = by_regex(place, match);
+  std::vector<ContactObject> result = by_regex(context, match);
   if (result.size() > 1 && policy == ContactPolicy::kError) {
-    throw ValueError(fmt::format("{}: '{}' matches {} names: {}", place, match.pattern[0],
+    throw ValueError(fmt::format("{}: '{}' matches {} names: {}", context, match.pattern[0],
                                  result.size(), fmt::join(labels_of(result), ", ")));
   }
   result.resize(1);

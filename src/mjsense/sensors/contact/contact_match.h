@@ -15,18 +15,18 @@ namespace mjsense {
 
 enum class ContactMode { kGeom, kBody, kSubtree };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<ContactMode>{"geom", "body", "subtree"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<ContactMode>{"geom", "body", "subtree"};
 
 enum class ContactPolicy { kFirst, kError, kAny, kEach };
 template <>
-inline constexpr std::array<std::string_view, 4> kWords<ContactPolicy>{"first", "error", "any",
-                                                                       "each"};
+inline constexpr std::array<std::string_view, 4> kEnumNames<ContactPolicy>{"first", "error", "any",
+                                                                           "each"};
 
 // With an entity, each pattern is a regular expression (Python's syntax) for the whole local name,
 // and the result is in model order. Without one, patterns are full MuJoCo names, in the given
 // order.
 struct ContactMatch {
-  Word<ContactMode> mode;
+  NamedEnum<ContactMode> mode;
   std::vector<std::string> pattern;
   std::string entity;
   std::vector<std::string> exclude;
@@ -48,11 +48,11 @@ void visit_fields(V& v, ContactMatch& c) {
     "expression that is searched for.");
 }
 
-// Throw ValueError for errors that do not depend on the model. `place` starts the message: "sensor
-// 'feet': primary".
-void validate(const ContactMatch& match, std::string_view place);
-void validate_primary(const ContactMatch& match, std::string_view place);
-void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view place);
+// Throw ValueError for errors that do not depend on the model. `context` starts the message:
+// "sensor 'feet': primary".
+void validate(const ContactMatch& match, std::string_view context);
+void validate_primary(const ContactMatch& match, std::string_view context);
+void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view context);
 
 // One matched geom, body or subtree.
 struct ContactObject {
@@ -79,9 +79,9 @@ class ContactNames {
     int body;    // id of the body, or of the geom's body
     int parent;  // of a body; -1 for a geom
   };
-  std::vector<ContactObject> of_entity(std::string_view place, const ContactMatch& match) const;
-  std::vector<ContactObject> literal(std::string_view place, const ContactMatch& match) const;
-  std::vector<ContactObject> by_regex(std::string_view place, const ContactMatch& match) const;
+  std::vector<ContactObject> of_entity(std::string_view context, const ContactMatch& match) const;
+  std::vector<ContactObject> literal(std::string_view context, const ContactMatch& match) const;
+  std::vector<ContactObject> by_regex(std::string_view context, const ContactMatch& match) const;
   const std::vector<Element>& elements(const ContactMatch& match) const;
   bool in_terrain(int body) const;
 

@@ -61,7 +61,7 @@ void ContactMemory::update_events(const World& world, const ContactReducer& cont
   }
 }
 
-bool ContactMemory::strike(int w, int p, double force_norm) {
+bool ContactMemory::add_contact(int w, int p, double force_norm) {
   fields_.found_any(w)[p] = true;
   float& first = fields_.first_touch_time(w)[p];
   if (first < 0) first = static_cast<float>(step_time_[w]);

@@ -41,11 +41,11 @@ class ContactMemory {
   ContactMemory() = default;
   ContactMemory(int num_worlds, int num_primaries, int decimation, const Fields& fields);
 
-  // Call for every substep: first next_substep(), then strike() for every primary in contact.
+  // Call for every substep: first next_substep(), then add_contact() for every primary in contact.
   void next_substep(const World& world, const ContactReducer& contacts);
-  bool wants_strikes() const { return static_cast<bool>(fields_.found_any); }
+  bool wants_contacts() const { return static_cast<bool>(fields_.found_any); }
   // Returns true if this is the strongest force of the control step so far; then call set_peak().
-  bool strike(int world, int primary, double force_norm);
+  bool add_contact(int world, int primary, double force_norm);
   void set_peak(int world, int primary, const ContactReading& reading);
 
   void reset(int world);

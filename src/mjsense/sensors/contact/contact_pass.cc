@@ -45,7 +45,7 @@ void ContactPass::run(const World& world) {
             return other.reducer == e.reducer && other.primary == e.primary;
           });
       if (counted) {
-        r.add_other_way(world.id, e.primary, contact);
+        r.add_other_path(world.id, e.primary, contact);
       } else {
         r.add(world.id, e.primary, contact, -1);
       }

@@ -216,8 +216,8 @@ int direction(const mjModel* m, const mjContact& c, ContactMode primary_mode,
 }
 
 struct PairCounts {
-  // both_ways: contacts of a primary that count for secondaries on both sides.
-  int pairs = 0, both_ways = 0;
+  // both_directions: contacts of a primary that count for secondaries on both sides.
+  int pairs = 0, both_directions = 0;
 };
 
 // Compares pair_found and pair_force with a search of mjData.contact. Names are full names.
@@ -254,7 +254,8 @@ void expect_pairs_of_brute_force(ContactSensor& sensor, const Model& model,
             << primaries[p] << " on " << secondaries[s];
       }
     }
-    for (int i = 0; i < model.d->ncon; ++i) counts.both_ways += seen[2 * i] && seen[2 * i + 1];
+    for (int i = 0; i < model.d->ncon; ++i)
+      counts.both_directions += seen[2 * i] && seen[2 * i + 1];
   }
 }
 
@@ -321,7 +322,7 @@ TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
     }
   }
   EXPECT_GT(counts.pairs, 300);
-  EXPECT_GT(counts.both_ways, 100);
+  EXPECT_GT(counts.both_directions, 100);
 }
 
 // Primaries and secondaries of an entity, given by regular expressions and with excludes.
@@ -367,7 +368,7 @@ TEST(ContactRandom, SecondariesWithExcludesMatchBruteForce) {
     }
   }
   EXPECT_GT(counts.pairs, 1000);
-  EXPECT_GT(counts.both_ways, 100);
+  EXPECT_GT(counts.both_directions, 100);
   EXPECT_GT(excluded, 100);
 }
 

@@ -99,7 +99,7 @@ void ContactReducer::add(int world, int primary, PassContact& contact, int sign)
   if (keep_pairs_) add_to_pairs(world, primary, contact, sign, {});
 }
 
-void ContactReducer::add_other_way(int world, int primary, PassContact& contact) {
+void ContactReducer::add_other_path(int world, int primary, PassContact& contact) {
   if (!keep_pairs_) return;
   add_to_pairs(world, primary, contact, -1, list(secondary_of_geom_, contact.contact.geom[1]));
 }

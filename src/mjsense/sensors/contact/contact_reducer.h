@@ -18,8 +18,8 @@ namespace mjsense {
 
 enum class ContactReduce { kNone, kMinDist, kMaxForce, kNetForce };
 template <>
-inline constexpr std::array<std::string_view, 4> kWords<ContactReduce>{"none", "mindist",
-                                                                       "maxforce", "netforce"};
+inline constexpr std::array<std::string_view, 4> kEnumNames<ContactReduce>{"none", "mindist",
+                                                                           "maxforce", "netforce"};
 
 // Force and torque in the contact frame. Equal to mj_contactForce, which is called only for
 // contacts that are not plain constraints. The edges of a pyramidal cone come in pairs, one pair
@@ -106,7 +106,7 @@ class ContactReducer {
   void add(int world, int primary, PassContact& contact, int sign);
   // For a contact that was added with the primary as geom 1 and that also matches as geom 2. It is
   // not counted again, but it is added to the pairs with secondaries on the side of geom 1.
-  void add_other_way(int world, int primary, PassContact& contact);
+  void add_other_path(int world, int primary, PassContact& contact);
 
   int num_primaries() const { return num_primaries_; }
   int num_slots() const { return num_slots_; }

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/say.h"
+#include "mjsense/core/print_stderr.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_field_sensor.h"
@@ -120,8 +120,8 @@ void ContactSensor::initialize(const SensorInit& init) {
   history_left_.assign(cfg_.history_length > 0 ? n * cfg_.num_slots : 0, 0);
   add_outputs(init);
   if (cfg_.debug) {
-    say("sensor '{}': primaries {}; secondaries {}\n", name(), fmt::join(primary_names_, ", "),
-        fmt::join(secondary_names_, ", "));
+    print_stderr("sensor '{}': primaries {}; secondaries {}\n", name(),
+                 fmt::join(primary_names_, ", "), fmt::join(secondary_names_, ", "));
   }
 }
 
@@ -206,7 +206,7 @@ void ContactSensor::compute(const World& world) {
 void ContactSensor::substep(const World& world) {
   compute(world);
   memory_.next_substep(world, reducer_);
-  if (memory_.wants_strikes()) remember(world);
+  if (memory_.wants_contacts()) remember(world);
   if (cfg_.history_length > 0) write_history(world.id);
 }
 
@@ -215,11 +215,11 @@ void ContactSensor::remember(const World& world) {
   for (int p : reducer_.touched(w)) {
     if (reducer_.is_net()) {
       const ContactSum& sum = reducer_.sum(w, p);
-      if (!memory_.strike(w, p, mju_norm3(sum.force))) continue;
+      if (!memory_.add_contact(w, p, mju_norm3(sum.force))) continue;
       memory_.set_peak(w, p, read_net_contact(world, sum));
     } else {
       const ContactRef& peak = reducer_.peak(w, p);
-      if (!memory_.strike(w, p, -peak.key)) continue;
+      if (!memory_.add_contact(w, p, -peak.key)) continue;
       memory_.set_peak(w, p, read_contact(world, peak, true, cfg_.global_frame));
     }
   }

@@ -60,9 +60,9 @@ struct ContactSensorCfg : SensorCfg {
   ContactMatch primary;
   std::optional<ContactMatch> secondary;
   std::vector<std::string> fields = {"found", "force"};
-  Word<ContactReduce> reduce = ContactReduce::kMaxForce;
+  NamedEnum<ContactReduce> reduce = ContactReduce::kMaxForce;
   int num_slots = 1;
-  Word<ContactPolicy> secondary_policy;
+  NamedEnum<ContactPolicy> secondary_policy;
   bool track_air_time = false;
   bool global_frame = false;
   int history_length = 0;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
@@ -11,12 +11,12 @@
 namespace mjsense {
 
 std::unique_ptr<Sensor> ContactSensorCfg::build() const {
-  const std::string place = sensor_place(name);
-  check_fields(*this, place);
-  validate_primary(primary, place + ": primary");
-  if (secondary) validate_secondary(*secondary, secondary_policy, place + ": secondary");
+  const std::string context = sensor_context(name);
+  check_fields(*this, context);
+  validate_primary(primary, context + ": primary");
+  if (secondary) validate_secondary(*secondary, secondary_policy, context + ": secondary");
   if (secondary_policy == ContactPolicy::kEach && !secondary) {
-    throw ValueError(fmt::format("{}: secondary_policy 'each' needs a secondary", place));
+    throw ValueError(fmt::format("{}: secondary_policy 'each' needs a secondary", context));
   }
   const auto asked = [&](std::string_view field) {
     return std::find(fields.begin(), fields.end(), field) != fields.end();
@@ -24,7 +24,7 @@ std::unique_ptr<Sensor> ContactSensorCfg::build() const {
   if (global_frame && reduce != ContactReduce::kNetForce &&
       !(asked("normal") && asked("tangent"))) {
     throw ValueError(
-        fmt::format("{}: global_frame needs 'normal' and 'tangent' among fields", place));
+        fmt::format("{}: global_frame needs 'normal' and 'tangent' among fields", context));
   }
   return std::make_unique<ContactSensor>(*this);
 }

@@ -196,11 +196,11 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
       for (std::size_t i = 2; i < f.size(); i += 3) sum += f[i];
       return sum;
     };
-    EXPECT_NEAR(sum_z("on_top"), 9.81, 0.01) << word(reduce);
-    EXPECT_NEAR(sum_z("on_bottom"), -2 * 9.81, 0.02) << word(reduce);
-    EXPECT_NEAR(sum_z("all"), -9.81, 0.02) << word(reduce);
+    EXPECT_NEAR(sum_z("on_top"), 9.81, 0.01) << enum_name(reduce);
+    EXPECT_NEAR(sum_z("on_bottom"), -2 * 9.81, 0.02) << enum_name(reduce);
+    EXPECT_NEAR(sum_z("all"), -9.81, 0.02) << enum_name(reduce);
     const auto n = scene->sensor("on_top").field("normal").data.row<float>(0);
-    EXPECT_NEAR(n[2], 1, 1e-6) << word(reduce);
+    EXPECT_NEAR(n[2], 1, 1e-6) << enum_name(reduce);
   }
 }
 
@@ -215,7 +215,7 @@ TEST(Contact, TerrainIsAnEntity) {
   cfg.entities.emplace_back("box", box);
   for (const ContactMode mode : {ContactMode::kGeom, ContactMode::kBody}) {
     auto c = std::make_shared<ContactSensorCfg>();
-    c->name = word(mode);
+    c->name = enum_name(mode);
     c->primary = {mode, {".*"}, "terrain", {}};
     c->secondary = ContactMatch{"geom", {"g"}, "box", {}};
     c->fields = {"force"};
@@ -245,7 +245,7 @@ constexpr char kFeet[] = R"(
   <body name="R" pos=".099 0 0"><joint type="slide" axis="1 0 0"/><geom name="R" size=".1" mass="1"/></body>
 </body></worldbody></mujoco>)";
 
-ContactSensorCfg feet_cfg(std::string name, Word<ContactMode> mode,
+ContactSensorCfg feet_cfg(std::string name, NamedEnum<ContactMode> mode,
                           std::vector<std::string> pattern) {
   ContactSensorCfg c;
   c.name = std::move(name);
@@ -302,7 +302,7 @@ TEST(Contact, ExcludeRemovesSecondaries) {
     EXPECT_THAT([&] { Lab("bot", kFeet, {c}); },
                 ::testing::ThrowsMessage<ValueError>(
                     HasSubstr("sensor 'none': secondary: exclude removes every match: L")))
-        << word(policy);
+        << enum_name(policy);
   }
 }
 
@@ -375,10 +375,10 @@ TEST(Contact, InvalidConfigurationsAreRefusedAtBuild) {
     return "";
   };
   using Cfg = ContactSensorCfg;
-  const std::string place = "sensor '" + box_cfg().name + "': ";
+  const std::string context = "sensor '" + box_cfg().name + "': ";
   EXPECT_EQ(message([](Cfg&) {}), "");
   EXPECT_EQ(message([](Cfg& c) { c.fields = {"fond"}; }),
-            place +
+            context +
                 "fields is 'fond': must be one of found, force, torque, dist, pos, normal, "
                 "tangent; did you mean 'found'?");
   EXPECT_THAT(message([](Cfg& c) { c.primary.pattern = {"("}; }), HasSubstr("primary"));

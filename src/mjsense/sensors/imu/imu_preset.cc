@@ -3,7 +3,7 @@
 #include <map>
 #include <numbers>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/noise.h"
@@ -47,8 +47,8 @@ ImuModel imu_preset(const std::string& name) {
   throw_unknown("imu", "preset", name, names);
 }
 
-void validate(const ImuModel::Axis& a, std::string_view place) {
-  require(a.bias_drift == 0 || a.bias_drift_time_s > 0, place, "bias_drift_time_s",
+void validate(const ImuModel::Axis& a, std::string_view context) {
+  require(a.bias_drift == 0 || a.bias_drift_time_s > 0, context, "bias_drift_time_s",
           a.bias_drift_time_s, "positive where there is a bias_drift");
 }
 

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/model_sensors/builtin_draw.h"
 #include "mjsense/sensors/imu/imu_data.h"
@@ -34,8 +34,8 @@ std::vector<std::string> site_names(mjSpec* spec) {
 }  // namespace
 
 std::unique_ptr<Sensor> ImuSensorCfg::build() const {
-  const std::string place = sensor_place(name);
-  check_fields(*this, place);
+  const std::string context = sensor_context(name);
+  check_fields(*this, context);
   if (site.name.empty() || (!site.type.empty() && site.type != "site")) {
     throw ValueError(fmt::format("sensor '{}': needs a site, not {} '{}'", name,
                                  site.type.empty() ? "object" : site.type, site.name));
@@ -68,7 +68,7 @@ void ImuSensor::edit_spec(mjSpec* spec) {
 void ImuSensor::initialize(const SensorInit& init) {
   clear_fields();
   parts_.clear();
-  eager_ = false;
+  needs_every_step_ = false;
   const std::string frame = "site " + cfg_.site.full_name();
   const auto add = [&](const char* part, int size, const std::string& axes, Effects effects) {
     const int id = mj_name2id(init.model, mjOBJ_SENSOR, mujoco_name(part).c_str());
@@ -83,7 +83,7 @@ void ImuSensor::initialize(const SensorInit& init) {
     chain_cfg.effects = std::move(effects);
     EffectChain chain(name() + "/" + part, spec, chain_cfg, init.num_worlds, tick_s,
                       tick_s * init.decimation);
-    eager_ |= chain.eager();
+    needs_every_step_ |= chain.needs_every_step();
     Field& field = add_field(part, spec, init.num_worlds);
     parts_.push_back({&field, init.model->sensor_adr[id], std::move(chain),
                       std::vector<float>(static_cast<std::size_t>(init.num_worlds) * size)});

@@ -70,7 +70,7 @@ void visit_fields(V& v, ImuModel& c) {
 ImuModel imu_preset(const std::string& name);
 
 // Checks fields that depend on each other. Throws ValueError.
-void validate(const ImuModel::Axis& axis, std::string_view place);
+void validate(const ImuModel::Axis& axis, std::string_view context);
 
 // The effects of the accelerometer or of the gyroscope, in the order of the signal path: scale and
 // axes, bias, noise, range, resolution.
@@ -123,7 +123,7 @@ class ImuSensor : public Sensor {
   void compute(const World& world) override;
   void reset(const World& world) override;
   void draw(const World& world, DebugShapes& shapes) override;  // draws the axes of the site
-  bool eager() const override { return eager_; }
+  bool needs_every_step() const override { return needs_every_step_; }
 
  private:
   struct Part {
@@ -138,7 +138,7 @@ class ImuSensor : public Sensor {
   ImuModel model_;
   std::vector<Part> parts_;
   int accelerometer_ = -1;  // id of MuJoCo's sensor
-  bool eager_ = false;
+  bool needs_every_step_ = false;
 };
 
 }  // namespace mjsense

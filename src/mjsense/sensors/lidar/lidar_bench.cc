@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 
 namespace mjsense {

@@ -33,8 +33,8 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
   cfg_.hit_ids = true;  // intensity needs them
   exclude_world_ = false;
   if (cfg.pattern != PatternCfg(GridPattern{}))
-    throw ValueError(place() + ": pattern does not apply to a lidar: use scan");
-  check_fields(cfg, place());
+    throw ValueError(context() + ": pattern does not apply to a lidar: use scan");
+  check_fields(cfg, context());
   if (const auto* s = std::get_if<SpinningScan>(&cfg.scan)) {
     rate_hz_ = s->rate_hz;
   } else {
@@ -46,40 +46,41 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
                cfg.range_resolution > 0 || cfg.dropout > 0;
 }
 
-void validate(const SpinningScan& s, std::string_view place) {
-  check_ray_count(static_cast<double>(s.channels) * s.samples, place);
+void validate(const SpinningScan& s, std::string_view context) {
+  check_ray_count(static_cast<double>(s.channels) * s.samples, context);
   if (!s.elevations_deg.empty() && static_cast<int>(s.elevations_deg.size()) != s.channels)
     throw ValueError(
         fmt::format("{}: elevations_deg has {} values, channels is {}: expected one per channel",
-                    place, s.elevations_deg.size(), s.channels));
+                    context, s.elevations_deg.size(), s.channels));
 }
 
 namespace {
 
-void check_rows(std::size_t rows, const TableScan& t, std::string_view place) {
+void check_rows(std::size_t rows, const TableScan& t, std::string_view context) {
   if (t.rays_per_scan > static_cast<int>(rows))
     throw ValueError(
-        fmt::format("{}: rays_per_scan is {}: must be between 0 and the table's {} rows", place,
+        fmt::format("{}: rays_per_scan is {}: must be between 0 and the table's {} rows", context,
                     t.rays_per_scan, rows));
 }
 
 }  // namespace
 
-void validate(const TableScan& t, std::string_view place) {
+void validate(const TableScan& t, std::string_view context) {
   if (!t.file.empty() && !t.angles.empty())
-    throw ValueError(fmt::format("{}: the scan has a file and angles: give one of them", place));
+    throw ValueError(fmt::format("{}: the scan has a file and angles: give one of them", context));
   if (t.file.empty() && t.angles.empty())
-    throw ValueError(fmt::format("{}: the scan's table has no rows: give a file or angles", place));
-  if (t.file.empty()) check_rows(t.angles.size(), t, place);
+    throw ValueError(
+        fmt::format("{}: the scan's table has no rows: give a file or angles", context));
+  if (t.file.empty()) check_rows(t.angles.size(), t, context);
 }
 
 void LidarSensor::read_table(const TableScan& t) {
-  angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file, place());
-  if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
+  angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file, context());
+  if (angles_.empty()) throw ValueError(context() + ": the scan's table has no rows");
   TableScan read = t;  // values of a file are checked like those of a table
   read.file.clear();
   read.angles = angles_;
-  check_fields(read, place());
+  check_fields(read, context());
   const int rows = static_cast<int>(angles_.size());
   if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
   angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
@@ -148,7 +149,7 @@ void LidarSensor::compute(const World& world) {
 void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
                          const RayPacket& packet, const HitPacket& hits) {
   const int first = frame * num_rays_per_frame();
-  ReturnRows rows;
+  LidarReturns rows;
   rays.returns(world, bundle.packet(p), packet, hits, rows);
   float* points = points_->data.row<float>(world).data() + 3 * first;
   float* intensity = intensity_->data.row<float>(world).data() + first;

@@ -79,8 +79,8 @@ template <>
 inline constexpr const char* kChoiceName<ScanCfg> = "LidarScanCfg";
 
 // Check fields that depend on each other. Throw ValueError. The sensor itself reads a table's file.
-void validate(const SpinningScan& scan, std::string_view place);
-void validate(const TableScan& scan, std::string_view place);
+void validate(const SpinningScan& scan, std::string_view context);
+void validate(const TableScan& scan, std::string_view context);
 
 struct LidarSensorCfg : RayCastSensorCfg {
   LidarSensorCfg() {

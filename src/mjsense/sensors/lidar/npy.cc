@@ -11,21 +11,21 @@
 #include <string_view>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/plain_file.h"
+#include "mjsense/core/regular_file.h"
 
 namespace mjsense {
 namespace {
 
-constexpr long kMostRows = 10'000'000;
+constexpr long kMaxRows = 10'000'000;
 
 // The file, and the place for messages.
 struct Source {
   const std::string& path;
-  std::string_view place;
+  std::string_view context;
 };
 
 [[noreturn]] void fail(const Source& source, std::string_view what) {
-  throw RuntimeError(fmt::format("{}: scan table '{}': {}", source.place, source.path, what));
+  throw RuntimeError(fmt::format("{}: scan table '{}': {}", source.context, source.path, what));
 }
 
 // The text after 'key': in the header's Python dict, up to the next comma at the same level.
@@ -39,8 +39,9 @@ std::string_view entry(std::string_view header, std::string_view key, const Sour
 
 }  // namespace
 
-std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::string_view place) {
-  const Source source{path, place};
+std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path,
+                                                  std::string_view context) {
+  const Source source{path, context};
   std::error_code ignored;
   const auto status = std::filesystem::status(path, ignored);
   // Opening a pipe would block until there is a writer.
@@ -78,7 +79,7 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   if (begin < 0 || end < begin ||
       static_cast<std::size_t>(end - begin) / row_bytes < static_cast<std::size_t>(rows))
     fail(source, fmt::format("is truncated: expected {} rows", rows));
-  if (rows > kMostRows) fail(source, fmt::format("has more than {} rows", kMostRows));
+  if (rows > kMaxRows) fail(source, fmt::format("has more than {} rows", kMaxRows));
   std::vector<char> raw(static_cast<std::size_t>(rows) * row_bytes);
   if (!in.seekg(begin).read(raw.data(), static_cast<std::streamsize>(raw.size())))
     fail(source, fmt::format("cannot be read: expected {} rows", rows));

@@ -12,8 +12,8 @@
 #include <numeric>
 #include <string>
 
-#include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {

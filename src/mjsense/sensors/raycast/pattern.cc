@@ -16,11 +16,11 @@ constexpr double kMaxRays = 1 << 24;
 
 using Direction = std::array<double, 3>;
 
-Direction unit(const Direction& d, std::string_view place) {
+Direction unit(const Direction& d, std::string_view context) {
   const double length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
   if (!std::isfinite(length) || length < 1e-12)
     throw ValueError(fmt::format("{}: ray direction ({}, {}, {}) must have a finite length above 0",
-                                 place, d[0], d[1], d[2]));
+                                 context, d[0], d[1], d[2]));
   return {d[0] / length, d[1] / length, d[2] / length};
 }
 
@@ -31,8 +31,8 @@ std::vector<double> grid_axis(double size, double resolution) {
   return values;
 }
 
-RayPattern make(const GridPattern& g, const mjModel*, std::string_view place) {
-  const Direction d = unit(g.direction, place);
+RayPattern make(const GridPattern& g, const mjModel*, std::string_view context) {
+  const Direction d = unit(g.direction, context);
   RayPattern pattern;
   for (double y : grid_axis(g.size[1], g.resolution))
     for (double x : grid_axis(g.size[0], g.resolution)) pattern.offsets.push_back({x, y, 0});
@@ -40,30 +40,30 @@ RayPattern make(const GridPattern& g, const mjModel*, std::string_view place) {
   return pattern;
 }
 
-void check_pinhole(double width, double height, double fovy, std::string_view place) {
+void check_pinhole(double width, double height, double fovy, std::string_view context) {
   if (!(width >= 1 && height >= 1))
     throw ValueError(fmt::format("{}: pinhole pattern of {} x {} rays: both must be at least 1",
-                                 place, width, height));
+                                 context, width, height));
   if (!(fovy > 0 && fovy < 180))
     throw ValueError(
-        fmt::format("{}: pinhole fovy is {} degrees: must be between 0 and 180", place, fovy));
-  check_ray_count(width * height, place);
+        fmt::format("{}: pinhole fovy is {} degrees: must be between 0 and 180", context, fovy));
+  check_ray_count(width * height, context);
 }
 
 double linspace(int i, int count) { return count > 1 ? -1.0 + 2.0 * i / (count - 1) : -1.0; }
 
-RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view place) {
+RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view context) {
   int width = p.width, height = p.height;
   double tan_v = std::tan(0.5 * p.fovy * std::numbers::pi / 180), tan_h = 0;
   double fovy = p.fovy;
   if (!p.camera.empty()) {
     if (model == nullptr)
-      throw ValueError(fmt::format("{}: camera '{}' needs a model", place, p.camera));
-    const int c = resolve(model, mjOBJ_CAMERA, p.camera, place);
+      throw ValueError(fmt::format("{}: camera '{}' needs a model", context, p.camera));
+    const int c = resolve(model, mjOBJ_CAMERA, p.camera, context);
     if (model->cam_projection[c] == mjPROJ_ORTHOGRAPHIC)
       throw ValueError(
           fmt::format("{}: camera '{}' is orthographic: its rays are parallel; use a grid pattern",
-                      place, p.camera));
+                      context, p.camera));
     width = model->cam_resolution[2 * c];
     height = model->cam_resolution[2 * c + 1];
     fovy = model->cam_fovy[c];
@@ -76,19 +76,19 @@ RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view 
       fovy = 2 * std::atan(tan_v) * 180 / std::numbers::pi;
     }
   }
-  check_pinhole(width, height, fovy, place);
+  check_pinhole(width, height, fovy, context);
   if (tan_h == 0) tan_h = tan_v * width / height;
   RayPattern pattern;
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u)
       pattern.directions.push_back(
-          unit({linspace(u, width) * tan_h, linspace(v, height) * tan_v, -1.0}, place));
+          unit({linspace(u, width) * tan_h, linspace(v, height) * tan_v, -1.0}, context));
   pattern.offsets.assign(pattern.directions.size(), {0, 0, 0});
   return pattern;
 }
 
-RayPattern make(const RingPattern& r, const mjModel*, std::string_view place) {
-  const Direction d = unit(r.direction, place);
+RayPattern make(const RingPattern& r, const mjModel*, std::string_view context) {
+  const Direction d = unit(r.direction, context);
   RayPattern pattern;
   if (r.include_center) pattern.offsets.push_back({0, 0, 0});
   for (const RingPattern::Ring& ring : r.rings) {
@@ -101,12 +101,12 @@ RayPattern make(const RingPattern& r, const mjModel*, std::string_view place) {
   return pattern;
 }
 
-RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
+RayPattern make(const UserPattern& u, const mjModel*, std::string_view context) {
   const std::size_t n = std::max(u.offsets.size(), u.directions.size());
   RayPattern pattern;
   for (std::size_t i = 0; i < n; ++i) {
     pattern.offsets.push_back(u.offsets[u.offsets.size() == 1 ? 0 : i]);
-    pattern.directions.push_back(unit(u.directions[u.directions.size() == 1 ? 0 : i], place));
+    pattern.directions.push_back(unit(u.directions[u.directions.size() == 1 ? 0 : i], context));
   }
   pattern.times = u.times;
   return pattern;
@@ -114,39 +114,41 @@ RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
 
 }  // namespace
 
-void check_ray_count(double rays, std::string_view place) {
+void check_ray_count(double rays, std::string_view context) {
   if (rays > kMaxRays)
-    throw ValueError(fmt::format("{}: {:.0f} rays: the maximum is {:.0f}", place, rays, kMaxRays));
+    throw ValueError(
+        fmt::format("{}: {:.0f} rays: the maximum is {:.0f}", context, rays, kMaxRays));
 }
 
-void validate(const GridPattern& g, std::string_view place) {
-  check_ray_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
-  unit(g.direction, place);
+void validate(const GridPattern& g, std::string_view context) {
+  check_ray_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), context);
+  unit(g.direction, context);
 }
 
-void validate(const PinholePattern& p, std::string_view place) {
-  if (p.camera.empty()) check_pinhole(p.width, p.height, p.fovy, place);
+void validate(const PinholePattern& p, std::string_view context) {
+  if (p.camera.empty()) check_pinhole(p.width, p.height, p.fovy, context);
 }
 
-void validate(const RingPattern& r, std::string_view place) {
-  unit(r.direction, place);
+void validate(const RingPattern& r, std::string_view context) {
+  unit(r.direction, context);
   double rays = r.include_center;
   for (const RingPattern::Ring& ring : r.rings) rays += ring.num_samples;
-  check_ray_count(rays, place);
-  if (rays == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
+  check_ray_count(rays, context);
+  if (rays == 0) throw ValueError(fmt::format("{}: the pattern has no rays", context));
 }
 
-void validate(const UserPattern& u, std::string_view place) {
+void validate(const UserPattern& u, std::string_view context) {
   const std::size_t n = std::max(u.offsets.size(), u.directions.size());
-  if (n == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
+  if (n == 0) throw ValueError(fmt::format("{}: the pattern has no rays", context));
   for (std::size_t count : {u.offsets.size(), u.directions.size()})
     if (count != n && count != 1)
       throw ValueError(fmt::format(
           "{}: pattern of {} offsets and {} directions: give equal numbers, or one of either",
-          place, u.offsets.size(), u.directions.size()));
-  for (const Direction& d : u.directions) unit(d, place);
+          context, u.offsets.size(), u.directions.size()));
+  for (const Direction& d : u.directions) unit(d, context);
   if (!u.times.empty() && u.times.size() != n)
-    throw ValueError(fmt::format("{}: pattern of {} rays and {} times", place, n, u.times.size()));
+    throw ValueError(
+        fmt::format("{}: pattern of {} rays and {} times", context, n, u.times.size()));
 }
 
 PinholePattern PinholePattern::from_intrinsic_matrix(const std::array<double, 9>& k, int width,
@@ -169,11 +171,11 @@ RingPattern RingPattern::single_ring(double radius, int num_samples) {
   return p;
 }
 
-RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place) {
+RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view context) {
   return std::visit(
       [&](const auto& p) {
-        check_fields(p, place);
-        return make(p, model, place);
+        check_fields(p, context);
+        return make(p, model, context);
       },
       cfg);
 }

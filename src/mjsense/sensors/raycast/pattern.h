@@ -122,17 +122,17 @@ template <>
 inline constexpr const char* kChoiceName<PatternCfg> = "RayPatternCfg";
 
 // Throws ValueError if there are more rays than a sensor may have.
-void check_ray_count(double rays, std::string_view place);
+void check_ray_count(double rays, std::string_view context);
 
 // Check fields that depend on each other: there must be rays, and not too many. Throw ValueError;
-// `place` starts every message: "sensor 'scan'".
-void validate(const GridPattern& grid, std::string_view place);
-void validate(const PinholePattern& pinhole, std::string_view place);
-void validate(const RingPattern& rings, std::string_view place);
-void validate(const UserPattern& user, std::string_view place);
+// `context` starts every message: "sensor 'scan'".
+void validate(const GridPattern& grid, std::string_view context);
+void validate(const PinholePattern& pinhole, std::string_view context);
+void validate(const RingPattern& rings, std::string_view context);
+void validate(const UserPattern& user, std::string_view context);
 
 // Throws ValueError for errors found by check_fields(), and KeyError for an unknown camera. `model`
 // may be null unless the pattern names a camera.
-RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place);
+RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view context);
 
 }  // namespace mjsense

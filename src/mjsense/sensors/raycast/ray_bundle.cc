@@ -19,13 +19,13 @@ void split(std::span<int> rays, std::span<const Key> keys) {
     return;
   }
   int widest = 0;
-  double most = -1;
+  double maximum = -1;
   for (int k = 0; k < 6; ++k) {
     const auto [low, high] = std::minmax_element(
         rays.begin(), rays.end(), [&](int a, int b) { return keys[a][k] < keys[b][k]; });
     const double width = keys[*high][k] - keys[*low][k];
-    if (width > most * (1 + 1e-9)) {
-      most = width;
+    if (width > maximum * (1 + 1e-9)) {
+      maximum = width;
       widest = k;
     }
   }

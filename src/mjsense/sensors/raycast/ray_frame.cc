@@ -12,20 +12,20 @@
 
 namespace mjsense {
 
-void validate_frame(const ObjRef& ref, std::string_view place) {
-  if (ref.name.empty()) throw ValueError(fmt::format("{}: a frame has no name", place));
+void validate_frame(const ObjRef& ref, std::string_view context) {
+  if (ref.name.empty()) throw ValueError(fmt::format("{}: a frame has no name", context));
   const std::array<std::string_view, 5> types = {"body", "xbody", "site", "geom", "camera"};
   if (std::find(types.begin(), types.end(), ref.type) == types.end())
     throw ValueError(
         fmt::format("{}: frame '{}' is a '{}': must be 'body', 'site', or 'geom' ('xbody' and "
                     "'camera' are accepted too)",
-                    place, ref.full_name(), ref.type));
+                    context, ref.full_name(), ref.type));
 }
 
 RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
-                   std::string_view place) {
-  validate_frame(ref, place);
-  const ResolvedObj obj = resolve(m, scene, ref, place);
+                   std::string_view context) {
+  validate_frame(ref, context);
+  const ResolvedObj obj = resolve(m, scene, ref, context);
   type_ = obj.type;
   id_ = obj.id;
   switch (type_) {

@@ -19,7 +19,7 @@ enum class RayAlignment {
 };
 
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<RayAlignment>{"base", "yaw", "world"};
+inline constexpr std::array<std::string_view, 3> kEnumNames<RayAlignment>{"base", "yaw", "world"};
 
 // Pose of a frame F, and the rotation of its rays.
 struct FramePose {
@@ -29,13 +29,13 @@ struct FramePose {
 };
 
 // Throws ValueError unless `ref` has a name and a type that can carry rays.
-void validate_frame(const ObjRef& ref, std::string_view place);
+void validate_frame(const ObjRef& ref, std::string_view context);
 
 class RayFrame {
  public:
   // `ref` may name a body or xbody (both are the body's own frame, not its inertial one), a site, a
   // geom or a camera.
-  RayFrame(const mjModel* model, const Scene* scene, const ObjRef& ref, std::string_view place);
+  RayFrame(const mjModel* model, const Scene* scene, const ObjRef& ref, std::string_view context);
 
   int body() const { return body_; }
   FramePose pose(const mjData* data, RayAlignment alignment) const;

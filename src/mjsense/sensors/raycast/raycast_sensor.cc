@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/parallel.h"
+#include "mjsense/core/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
 namespace mjsense {
@@ -17,7 +17,7 @@ namespace {
 
 // Number of packets that a thread takes at a time.
 constexpr int kChunk = 12;
-constexpr int kMostMoments = 100'000;  // maximum number of stored poses of a frame
+constexpr int kMaxMoments = 100'000;  // maximum number of stored poses of a frame
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // Of the two quaternions of a rotation, takes the one whose largest component is positive, as mjlab
@@ -28,16 +28,18 @@ void make_largest_positive(double q[4]) {
   if (largest < 0) mju_scl(q, q, -1.0, 4);
 }
 
-std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const std::string& place) {
+std::uint32_t group_mask(const std::optional<std::vector<int>>& groups,
+                         const std::string& context) {
   if (!groups) return 0x3f;
   std::uint32_t mask = 0;
   for (int g : *groups) {
     if (g < 0 || g > 5)
-      throw ValueError(fmt::format("{}: include_geom_groups has {}: groups are 0 to 5", place, g));
+      throw ValueError(
+          fmt::format("{}: include_geom_groups has {}: groups are 0 to 5", context, g));
     mask |= 1u << g;
   }
   if (mask == 0)
-    throw ValueError(place + ": include_geom_groups is empty: the rays would hit nothing");
+    throw ValueError(context + ": include_geom_groups is empty: the rays would hit nothing");
   return mask;
 }
 
@@ -50,27 +52,27 @@ std::unique_ptr<Sensor> RayCastSensorCfg::build() const {
 }
 
 RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), cfg_(cfg) {
-  sensor_place(cfg.name);
-  if (cfg.frame.empty()) throw ValueError(place() + ": no frame given");
-  check_fields(cfg, place());
+  sensor_context(cfg.name);
+  if (cfg.frame.empty()) throw ValueError(context() + ": no frame given");
+  check_fields(cfg, context());
   for (const ObjRef& ref : cfg.frame) {
     if (!cfg.any_frame && (ref.type == "xbody" || ref.type == "camera"))
       throw ValueError(
           fmt::format("{}: frame '{}' is a {}: must be 'body', 'site', or 'geom' "
                       "(any_frame takes xbody and camera)",
-                      place(), ref.full_name(), ref.type));
+                      context(), ref.full_name(), ref.type));
   }
   alignment_ = cfg.ray_alignment;
-  filter_.groups = group_mask(cfg.include_geom_groups, place());
+  filter_.groups = group_mask(cfg.include_geom_groups, context());
   if (!(cfg.min_distance < cfg.max_distance))
     throw ValueError(fmt::format("{}: min_distance is {} m: must be in [0, max_distance = {})",
-                                 place(), cfg.min_distance, cfg.max_distance));
-  for (const ObjRef& ref : cfg.frame) validate_frame(ref, place());
+                                 context(), cfg.min_distance, cfg.max_distance));
+  for (const ObjRef& ref : cfg.frame) validate_frame(ref, context());
 }
 
 RayCastSensor::~RayCastSensor() = default;
 
-std::string RayCastSensor::place() const { return fmt::format("sensor '{}'", name()); }
+std::string RayCastSensor::context() const { return fmt::format("sensor '{}'", name()); }
 
 Field& RayCastSensor::add(std::string_view name, Shape shape, std::string frame, double low,
                           double high, int num_worlds) {
@@ -83,7 +85,7 @@ Field& RayCastSensor::add(std::string_view name, Shape shape, std::string frame,
 void RayCastSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
   frames_.clear();
-  for (const ObjRef& ref : cfg_.frame) frames_.emplace_back(m, init.scene, ref, place());
+  for (const ObjRef& ref : cfg_.frame) frames_.emplace_back(m, init.scene, ref, context());
   pattern_ = build_pattern(m);
   const int count = static_cast<int>(pattern_.size()) / num_parts();
   bundles_.clear();
@@ -95,11 +97,11 @@ void RayCastSensor::initialize(const SensorInit& init) {
   if (!pattern_.times.empty()) {
     const double oldest = *std::min_element(pattern_.times.begin(), pattern_.times.end());
     const double steps = -oldest / m->opt.timestep + 3;
-    if (steps > kMostMoments)
+    if (steps > kMaxMoments)
       throw ValueError(
           fmt::format("{}: the times of its rays reach {} s back, which needs {:.0f} stored poses: "
                       "the maximum is {}",
-                      place(), -oldest, steps, kMostMoments));
+                      context(), -oldest, steps, kMaxMoments));
     history_ = PoseHistory(init.num_worlds * num_frames(), static_cast<int>(steps));
   }
   poses_.assign(static_cast<std::size_t>(init.num_worlds) * frames_.size(), FramePose{});
@@ -124,7 +126,7 @@ void RayCastSensor::initialize(const SensorInit& init) {
 }
 
 RayPattern RayCastSensor::build_pattern(const mjModel* model) const {
-  return make_pattern(cfg_.pattern, model, place());
+  return make_pattern(cfg_.pattern, model, context());
 }
 
 void RayCastSensor::remember(const World& world) {
@@ -238,13 +240,14 @@ RayCastSensor::WorldRay RayCastSensor::world_ray(int world, int r) const {
   return ray;
 }
 
-void RayCastSensor::place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const {
+void RayCastSensor::packet_to_world(const RayScene& rays, int world, int frame, int p,
+                                    RayPacket& out) const {
   const FramePose& pose = frame_pose(world, frame);
   std::copy_n(pose.pos, 3, out.origin);
   // The tolerance avoids that rounding turns a hit at max_distance into a miss.
   const float reach = static_cast<float>(cfg_.max_distance) * (1 + 4e-7f);
   if (history_.empty())
-    rays.place(bundles_[parts_[world]].packet(p), pose.align, reach, out);
+    rays.to_world(bundles_[parts_[world]].packet(p), pose.align, reach, out);
   else
     place_timed(world, frame, p, reach, out);
 }
@@ -256,14 +259,14 @@ void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, in
   const float nearest = static_cast<float>(cfg_.min_distance),
               farthest = static_cast<float>(cfg_.max_distance);
   RayPacket packets[kChunk];
-  for (int p = begin; p < end; ++p) place(rays, world, frame, p, packets[p - begin]);
-  rays.focus(world, seen_by, {packets, static_cast<std::size_t>(end - begin)}, scratch);
+  for (int p = begin; p < end; ++p) packet_to_world(rays, world, frame, p, packets[p - begin]);
+  rays.cull(world, seen_by, {packets, static_cast<std::size_t>(end - begin)}, scratch);
   const Outputs out = outputs(world, frame);
   HitPacket hits;
-  HitRows rows;
+  RayOutputs rows;
   for (int p = begin; p < end; ++p) {
     const RayPacket& packet = packets[p - begin];
-    rays.trace_focused(world, seen_by, packet, hits, scratch);
+    rays.trace_culled(world, seen_by, packet, hits, scratch);
     rays.rows(world, packet, nearest, farthest, out.geoms != nullptr, hits, rows);
     write(bundle, p, hits, rows, out);
     traced(rays, world, frame, bundle, p, packet, hits);
@@ -288,7 +291,7 @@ RayCastSensor::Outputs RayCastSensor::outputs(int world, int frame) {
 }
 
 void RayCastSensor::write(const RayBundle& bundle, int p, const HitPacket& hits,
-                          const HitRows& rows, const Outputs& out) {
+                          const RayOutputs& rows, const Outputs& out) {
   bundle.each_run(p, [&](auto n, int lane, int ray) {
     copy_some<n()>(rows.distance + lane, out.distances + ray);
     copy_some<3 * n()>(rows.pos + 3 * lane, out.hit_pos + 3 * ray);

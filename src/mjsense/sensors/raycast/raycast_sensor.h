@@ -62,7 +62,7 @@ void visit_fields(V& v, RayCastVizCfg& c) {
 struct RayCastSensorCfg : SensorCfg {
   std::vector<ObjRef> frame;
   PatternCfg pattern = GridPattern{};
-  Word<RayAlignment> ray_alignment;
+  NamedEnum<RayAlignment> ray_alignment;
   double max_distance = 10.0;
   bool exclude_parent_body = true;
   std::optional<std::vector<int>> include_geom_groups{{0, 1, 2}};
@@ -158,7 +158,7 @@ class RayCastSensor : public Sensor {
   // Called when all rays of a world have been traced. Worlds run in parallel, each on one thread.
   virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
   virtual bool wants_finish() const { return false; }
-  std::string place() const;
+  std::string context() const;
   Field& add(std::string_view name, Shape shape, std::string frame, double low, double high,
              int num_worlds);
   // Makes ray r of this world a miss. The caller sets hit_pos_w.
@@ -180,11 +180,11 @@ class RayCastSensor : public Sensor {
     int *geoms, *bodies, *materials;
   };
   Outputs outputs(int world, int frame);
-  static void write(const RayBundle& bundle, int p, const HitPacket& hits, const HitRows& rows,
+  static void write(const RayBundle& bundle, int p, const HitPacket& hits, const RayOutputs& rows,
                     const Outputs& out);
   void remember(const World& world);
   // Like RayScene::place(), but each ray has the frame's pose at its own time.
-  void place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const;
+  void packet_to_world(const RayScene& rays, int world, int frame, int p, RayPacket& out) const;
   void place_timed(int world, int frame, int p, float reach, RayPacket& out) const;
   void trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
                      RayScratch& scratch);

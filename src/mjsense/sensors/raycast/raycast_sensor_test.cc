@@ -166,7 +166,7 @@ TEST(RayCast, DistancesAtBothLimitsCount) {
 TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   std::vector<std::shared_ptr<const SensorCfg>> cfgs;
   for (RayAlignment alignment : {RayAlignment::kBase, RayAlignment::kYaw, RayAlignment::kWorld}) {
-    auto cfg = sensor_cfg<RayCastSensorCfg>(std::string(word(alignment)).c_str());
+    auto cfg = sensor_cfg<RayCastSensorCfg>(std::string(enum_name(alignment)).c_str());
     cfg->frame = {{"site", "scan", "r"}};  // rotated by 90 degrees about z
     cfg->pattern = UserPattern{{{0.3, 0, 0}}, {{0, 0, -2}}};
     cfg->ray_alignment = alignment;

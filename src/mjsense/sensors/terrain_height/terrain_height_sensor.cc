@@ -41,7 +41,7 @@ void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& sc
     const bool any =
         std::any_of(distance + first, distance + first + n, [](float t) { return t >= 0; });
     const float missing = any ? none : height_without_hits(rays, world, f, scratch);
-    float least = 0, most = 0;
+    float minimum = 0, maximum = 0;
     double sum = 0;
     for (int i = 0; i < n; ++i) {
       const int r = first + i;
@@ -49,12 +49,12 @@ void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& sc
       if (distance[r] >= 0)
         h = normal[3 * r + 2] < 0 ? 0.0f : static_cast<float>(z - hit[3 * r + 2]);
       if (reduction_ == HeightReduction::kNone) out[r] = h;
-      least = i == 0 ? h : std::min(least, h);
-      most = i == 0 ? h : std::max(most, h);
+      minimum = i == 0 ? h : std::min(minimum, h);
+      maximum = i == 0 ? h : std::max(maximum, h);
       sum += h;
     }
-    if (reduction_ == HeightReduction::kMin) out[f] = least;
-    if (reduction_ == HeightReduction::kMax) out[f] = most;
+    if (reduction_ == HeightReduction::kMin) out[f] = minimum;
+    if (reduction_ == HeightReduction::kMax) out[f] = maximum;
     if (reduction_ == HeightReduction::kMean) out[f] = static_cast<float>(sum / n);
   }
 }

@@ -19,11 +19,11 @@ namespace mjsense {
 
 enum class HeightReduction { kMin, kMax, kMean, kNone };
 template <>
-inline constexpr std::array<std::string_view, 4> kWords<HeightReduction>{"min", "max", "mean",
-                                                                         "none"};
+inline constexpr std::array<std::string_view, 4> kEnumNames<HeightReduction>{"min", "max", "mean",
+                                                                             "none"};
 
 struct TerrainHeightSensorCfg : RayCastSensorCfg {
-  Word<HeightReduction> reduction;
+  NamedEnum<HeightReduction> reduction;
 
   std::unique_ptr<Sensor> build() const override;
 };

@@ -35,7 +35,7 @@ void DoorOpeningTask::initialize_task() {
   if (doors_.empty())
     throw ValueError(
         fmt::format("{} has no door: no body higher than {} m on a vertical hinge with a range",
-                    place(), Door::kLeastHeight));
+                    context(), Door::kMinHeight));
   const RestingRobot rest(model(), robot());
   sides_.clear();
   for (const Door& door : doors_)
@@ -47,12 +47,12 @@ void DoorOpeningTask::initialize_task() {
   const auto of_door = [this](int geom) {
     const int body = model()->geom_bodyid[geom];
     return std::ranges::any_of(
-        doors_, [&](const Door& door) { return is_below(model(), body, door.body); });
+        doors_, [&](const Door& door) { return is_descendant_or_self(model(), body, door.body); });
   };
-  floor_ = std::make_unique<Occupancy>(rest.occupancy(footprint_->height(), elsewhere));
+  floor_ = std::make_unique<OccupancyGrid>(rest.occupancy(footprint_->height(), elsewhere));
   open_floor_ =
-      std::make_unique<Occupancy>(rest.occupancy(footprint_->height(), elsewhere, of_door));
-  if (driving_base(robot()) >= 0) routes_ = std::make_unique<BaseRoutes>(*floor_, *footprint_);
+      std::make_unique<OccupancyGrid>(rest.occupancy(footprint_->height(), elsewhere, of_door));
+  if (driving_base(robot()) >= 0) routes_ = std::make_unique<BasePlanner>(*floor_, *footprint_);
   episodes_.assign(num_worlds(), {});
   begin_with(doors_[0].handle, kHandle, true);
 }
@@ -69,18 +69,18 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
 
   // The robot starts in front of the door, on a random side, facing it up to kTurned.
   const Side& side = sides_[episode.door];
-  const Vec3 along{-side.way.y, side.way.x, 0};
+  const Vec3 along{-side.direction.y, side.direction.x, 0};
   const bool push = rng.below(2) == 0;
   for (int attempt = 0; attempt < kStarts; ++attempt) {
     episode.push = attempt < kStarts / 2 ? push : !push;
-    const Vec3 away = episode.push ? -side.way : side.way;
+    const Vec3 away = episode.push ? -side.direction : side.direction;
     const Vec3 at = side.middle + (rng.uniform(kNear, kFar) + footprint_->radius() - 0.5) * away +
                     rng.uniform(-kAside, kAside) * along;
     const double yaw = std::atan2(-away.y, -away.x) + rng.uniform(-kTurned, kTurned);
     if (!footprint_->fits(*floor_, at.x, at.y, yaw, 0.08)) continue;
     return Pose{{at.x, at.y, placed.p.z}, axis_angle({0, 0, 1}, yaw)};
   }
-  episode.push = dot(placed.p - side.middle, side.way) < 0;
+  episode.push = dot(placed.p - side.middle, side.direction) < 0;
   return placed;
 }
 
@@ -95,12 +95,13 @@ void DoorOpeningTask::begin(const World& world) {
   ObjectTask::begin(world);
   Episode& episode = episodes_[world.id];
   const Side& side = sides_[episode.door];
-  episode.push = dot(robot().base_pose(world).p - side.middle, side.way) < 0;
+  episode.push = dot(robot().base_pose(world).p - side.middle, side.direction) < 0;
 }
 
 Evaluation DoorOpeningTask::evaluate(const World& world) const {
   const bool success = fraction(world) >= kOpen;
-  return judge_by(world.id, success ? 1.0 : 0.0, success ? "" : "the door is not open far enough");
+  return make_evaluation_from(world.id, success ? 1.0 : 0.0,
+                              success ? "" : "the door is not open far enough");
 }
 
 std::string DoorOpeningTask::description(int world) const {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/scenes/base_route.h"
+#include "mjsense/scenes/base_planner.h"
 #include "mjsense/scenes/doors.h"
 #include "mjsense/scenes/object_task.h"
 
@@ -40,9 +40,9 @@ class DoorOpeningTask final : public ObjectTask {
   }
   bool push(int world) const { return episodes_[world].push; }
   // Free base poses with all doors shut; null for a robot whose base cannot drive.
-  const BaseRoutes* routes() const { return routes_.get(); }
+  const BasePlanner* routes() const { return routes_.get(); }
   // Occupancy of the floor without the doors.
-  const Occupancy& open_floor() const { return *open_floor_; }
+  const OccupancyGrid& open_floor() const { return *open_floor_; }
   // Footprint of the robot without its arms.
   const Footprint& trunk() const { return *trunk_; }
 
@@ -54,7 +54,7 @@ class DoorOpeningTask final : public ObjectTask {
 
  private:
   struct Side {
-    Vec3 middle, way;  // middle of the shut leaf; direction in which it starts to open
+    Vec3 middle, direction;  // middle of the shut leaf; direction in which it starts to open
   };
   struct Episode {
     int door = 0;
@@ -62,9 +62,9 @@ class DoorOpeningTask final : public ObjectTask {
   };
   std::vector<Door> doors_;
   std::vector<Side> sides_;  // one per door
-  std::unique_ptr<Occupancy> floor_, open_floor_;
+  std::unique_ptr<OccupancyGrid> floor_, open_floor_;
   std::unique_ptr<Footprint> footprint_, trunk_;
-  std::unique_ptr<BaseRoutes> routes_;
+  std::unique_ptr<BasePlanner> routes_;
   std::vector<Episode> episodes_;  // [B]
 };
 

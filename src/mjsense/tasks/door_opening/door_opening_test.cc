@@ -63,7 +63,7 @@ TEST(DoorOpening, SuccessUsesTheCurrentFractionForBothHingeDirections) {
       EXPECT_NEAR(p.task.fraction(p.world), part, 1e-12);
       const Evaluation e = p.task.evaluate(p.world);
       EXPECT_EQ(e.success, success) << part << ": not latched";
-      EXPECT_EQ(e.lacks, success ? "" : "the door is not open far enough");
+      EXPECT_EQ(e.missing, success ? "" : "the door is not open far enough");
       EXPECT_EQ(e.reward, success ? 1 : 0);
     }
   }
@@ -75,10 +75,10 @@ TEST(DoorOpening, RobotStartsWithoutCollisionOnEitherSideOfTheDoor) {
   int pushes = 0;
   for (int episode = 0; episode < 30; ++episode) {
     p.start(episode);
-    EXPECT_EQ(p.task.start_fault(p.world), "");
+    EXPECT_EQ(p.task.start_error(p.world), "");
     const Pose base = p.task.robot().base_pose(p.world);
-    const Vec3 way = opening_direction(p.model, p.data.get(), p.task.door(0));
-    const double side = dot(base.p - leaf_middle(p.model, p.data.get(), p.task.door(0)), way);
+    const Vec3 direction = opening_direction(p.model, p.data.get(), p.task.door(0));
+    const double side = dot(base.p - leaf_middle(p.model, p.data.get(), p.task.door(0)), direction);
     EXPECT_EQ(p.task.push(0), side < 0) << episode;
     EXPECT_EQ(p.task.description(0), side < 0 ? "Push the door open" : "Pull the door open");
     EXPECT_GT(std::abs(side), 0.9);
@@ -164,7 +164,7 @@ TEST(DoorOpening, TheSuiteHasEachToolPoseOnce) {
 
 TEST(DoorOpening, SceneWithoutADoorIsRejected) {
   DoorOpeningTask task(task_cfg("rby1", "table"));
-  Scene scene(task.whole_scene_cfg());
+  Scene scene(task.scene_cfg_with_robot());
   try {
     task.initialize(scene.model(), 1);
     FAIL();

@@ -16,7 +16,7 @@ constexpr int kStateLength = 1000;
 int handle_geom(const mjModel* m, int handle) {
   int fallback = -1;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!is_below(m, m->geom_bodyid[g], handle)) continue;
+    if (!is_descendant_or_self(m, m->geom_bodyid[g], handle)) continue;
     if (m->geom_group[g] < 3) return g;
     if (fallback < 0) fallback = g;
   }

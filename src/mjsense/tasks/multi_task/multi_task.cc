@@ -92,8 +92,8 @@ Evaluation MultiTask::any(int world, std::span<const Evaluation> of_children,
     over = over || of_children[i].terminal;
   }
   success_[world] = success ? 1 : 0;
-  Evaluation all = judge(world, reward, success, over);
-  if (!success) all.lacks = of_children[0].lacks;
+  Evaluation all = make_evaluation(world, reward, success, over);
+  if (!success) all.missing = of_children[0].missing;
   return all;
 }
 

@@ -28,8 +28,8 @@ class MultiTask final : public Task {
   void bind(const std::shared_ptr<Simulation>& simulation) override {
     children_[0]->bind(simulation);
   }
-  std::string start_fault(const World& world) const override {
-    return children_[0]->start_fault(world);
+  std::string start_error(const World& world) const override {
+    return children_[0]->start_error(world);
   }
 
   void begin(const World& world) override;

@@ -42,7 +42,7 @@ std::unique_ptr<MultiTask> door_or_pick() {
 
 TEST(MultiTask, AnySuccessCountsAndTheRewardIsTheMaximum) {
   const auto task = door_or_pick();
-  Scene scene(task->whole_scene_cfg());
+  Scene scene(task->scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task->initialize(model, 2);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
@@ -98,7 +98,7 @@ struct Counting final : Policy {
 
 TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
   const auto task = door_or_pick();
-  Scene scene(task->whole_scene_cfg());
+  Scene scene(task->scene_cfg_with_robot());
   task->initialize(scene.model(), 1);
   Counting policy, other;
   task->register_policy(policy);
@@ -130,7 +130,7 @@ TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
 
 TEST(MultiTask, CombinesRolesSensorsAndLacks) {
   const auto task = door_or_pick();
-  Scene scene(task->whole_scene_cfg());
+  Scene scene(task->scene_cfg_with_robot());
   task->initialize(scene.model(), 1);
   std::vector<std::string> roles, sensors, expected;
   for (const TaskObject& object : task->objects(0)) roles.push_back(object.role);
@@ -163,7 +163,7 @@ TEST(MultiTask, FirstTaskSamplesTheSameEpisodeAsAlone) {
       children.push_back(std::make_unique<PickTask>(cfg("table")));
       task = std::make_unique<MultiTask>("multi_task", cfg("table"), std::move(children));
     }
-    Scene scene(task->whole_scene_cfg());
+    Scene scene(task->scene_cfg_with_robot());
     task->initialize(scene.model(), 1);
     const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
     task->sample(0, 3, state_row(data.get()));
@@ -177,7 +177,7 @@ TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
   children.push_back(std::make_unique<NavToObjTask>(cfg("floor")));
   children.push_back(std::make_unique<PickTask>(cfg("floor")));
   MultiTask task("multi_task", cfg("floor"), std::move(children));
-  Scene scene(task.whole_scene_cfg());
+  Scene scene(task.scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task.initialize(model, 1);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
@@ -215,7 +215,7 @@ TEST(MultiTask, TaskThatChangesTheSceneMustBeFirst) {
   children.push_back(std::make_unique<PickTask>(cfg("kitchen")));
   children.push_back(std::make_unique<OpeningTask>(cfg("kitchen"), OpeningKind::kOpen));
   MultiTask task("pick+open", cfg("kitchen"), std::move(children));
-  Scene scene(task.whole_scene_cfg());
+  Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
   try {

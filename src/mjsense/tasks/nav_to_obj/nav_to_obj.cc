@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scenes/object_texts.h"
+#include "mjsense/scenes/referring_expressions.h"
 #include "mjsense/scenes/robot_floor.h"
 
 namespace mjsense {
@@ -37,7 +37,7 @@ void NavToObjTask::find_camera() {
   for (const std::string& name : names) {
     const int id = mj_name2id(model(), mjOBJ_CAMERA, (robot().prefix() + name).c_str());
     if (id < 0) continue;
-    sight_ = Sight(model(), id, cfg.image_width, cfg.image_height);
+    line_of_sight_ = LineOfSight(model(), id, cfg.image_width, cfg.image_height);
     return;
   }
   throw ValueError(fmt::format("task 'nav_to_obj': robot '{}' has no camera, such as '{}'",
@@ -47,8 +47,8 @@ void NavToObjTask::find_camera() {
 void NavToObjTask::initialize_task() {
   ObjectTask::initialize_task();
   if (scene().objects().empty())
-    throw ValueError(
-        fmt::format("{} has no object to drive to: no graspable body with a free joint", place()));
+    throw ValueError(fmt::format(
+        "{} has no object to drive to: no graspable body with a free joint", context()));
   find_camera();
   points_.clear();
   for (const SceneObject& object : scene().objects())
@@ -58,9 +58,9 @@ void NavToObjTask::initialize_task() {
   if (driving_base(robot()) >= 0) {
     const RestingRobot rest(model(), robot());
     const Footprint footprint = rest.footprint();
-    const Occupancy floor =
+    const OccupancyGrid floor =
         rest.occupancy(footprint.height(), [this](int geom) { return scene().elsewhere(geom); });
-    routes_ = std::make_unique<BaseRoutes>(floor, footprint);
+    routes_ = std::make_unique<BasePlanner>(floor, footprint);
     for (int row = 0; row < floor.rows(); row += 2) {
       for (int column = 0; column < floor.columns(); column += 2) {
         if (floor.clearance(floor.x(column), floor.y(row)) > 0.3)
@@ -123,23 +123,23 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
     const BasePose from{x, y, rng.uniform(-pi, pi)};
     if (attempt < kStarts / 2 && distance(x, y) < kFarStart) continue;
     if (!routes_->free(from)) continue;
-    const auto way = routes_->find(
+    const auto path = routes_->find(
         from, [&](const BasePose& p) { return distance(p.x, p.y) < kArrived; },
         [&](double px, double py) { return std::max(0.0, distance(px, py) - kArrived); });
-    if (!way.empty()) return Pose{{x, y, placed.p.z}, axis_angle({0, 0, 1}, from.yaw)};
+    if (!path.empty()) return Pose{{x, y, placed.p.z}, axis_angle({0, 0, 1}, from.yaw)};
   }
   return {};
 }
 
 // An object behind furniture may be close to a path without being visible from any point of it.
-std::string NavToObjTask::start_fault(const World& world) const {
-  const std::string fault = ObjectTask::start_fault(world);
+std::string NavToObjTask::start_error(const World& world) const {
+  const std::string fault = ObjectTask::start_error(world);
   if (!fault.empty()) return fault;
   if (!alone(world.id, targets_[world.id]))
     return fmt::format(
         "{} has several objects named '{}', none of which has a unique text: give them different "
         "texts",
-        place(), object(world.id).name);
+        context(), object(world.id).name);
   if (!routes_) return "";
   const Pose base = robot().base_pose(world), camera = inverse(base) * camera_pose(world);
   const Vec3 ahead = rotate(base.q, {1, 0, 0});
@@ -165,7 +165,7 @@ double NavToObjTask::distance(const World& world, double x, double y) const {
 bool NavToObjTask::sees(const World& world, const Pose& camera) const {
   const int index = targets_[world.id];
   const auto with = [&](std::span<const Vec3> points) {
-    return sight_.sees(world.model, world.data, camera, object(world.id).body, points);
+    return line_of_sight_.sees(world.model, world.data, camera, object(world.id).body, points);
   };
   const double size = scene().size(world.id, index);
   if (size == 1) return with(points_[index]);
@@ -174,20 +174,20 @@ bool NavToObjTask::sees(const World& world, const Pose& camera) const {
   return with(points);
 }
 
-NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {
+NavToObjTask::Assessment NavToObjTask::assessment(const World& world) const {
   const Vec3 base = robot().base_pose(world).p;
-  Judgement out{distance(world, base.x, base.y), 0};
+  Assessment out{distance(world, base.x, base.y), 0};
   if (out.distance < kReach && sees(world, camera_pose(world)))
     out.reward = 1 - out.distance / kReach;
   return out;
 }
 
 Evaluation NavToObjTask::evaluate(const World& world) const {
-  const Judgement now = judgement(world);
-  return judge_by(world.id, now.reward,
-                  now.reward > 0          ? ""
-                  : now.distance < kReach ? "the camera does not see the object"
-                                          : "the object is too far away");
+  const Assessment now = assessment(world);
+  return make_evaluation_from(world.id, now.reward,
+                              now.reward > 0          ? ""
+                              : now.distance < kReach ? "the camera does not see the object"
+                                                      : "the object is too far away");
 }
 
 std::string NavToObjTask::description(int world) const {
@@ -195,11 +195,11 @@ std::string NavToObjTask::description(int world) const {
 }
 
 Task::Referrals NavToObjTask::referrals(int world) const {
-  return {{"object_name", referrals_of(scene().objects()[targets_[world]])}};
+  return {{"object_name", referring_expressions(scene().objects()[targets_[world]])}};
 }
 
 void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
-  const Judgement now = judgement(world);
+  const Assessment now = assessment(world);
   json.key("position_error").value(now.distance);
   json.key("success").value(now.reward > 0);
 }

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/scenes/base_route.h"
+#include "mjsense/scenes/base_planner.h"
 #include "mjsense/scenes/object_task.h"
-#include "mjsense/tasks/nav_to_obj/sight.h"
+#include "mjsense/tasks/nav_to_obj/line_of_sight.h"
 
 namespace mjsense {
 
@@ -27,7 +27,7 @@ class NavToObjTask final : public ObjectTask {
 
   // Also rejects starts in which several objects have the target's text, or in which the target is
   // not visible from any base pose that the robot can drive to.
-  std::string start_fault(const World& world) const override;
+  std::string start_error(const World& world) const override;
   // Reward: 1 - d / 1.5 m if the camera sees the target, else 0; success: reward > 0.
   Evaluation evaluate(const World& world) const override;
 
@@ -41,8 +41,8 @@ class NavToObjTask final : public ObjectTask {
   double distance(const World& world, double x, double y) const;
   // Whether the target is visible from the camera pose X_WC.
   bool sees(const World& world, const Pose& camera) const;
-  Pose camera_pose(const World& world) const { return sight_.pose(world.data); }
-  const BaseRoutes* routes() const { return routes_.get(); }
+  Pose camera_pose(const World& world) const { return line_of_sight_.pose(world.data); }
+  const BasePlanner* routes() const { return routes_.get(); }
 
  protected:
   void initialize_task() override;
@@ -51,10 +51,10 @@ class NavToObjTask final : public ObjectTask {
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
-  struct Judgement {
+  struct Assessment {
     double distance = 0, reward = 0;
   };
-  Judgement judgement(const World& world) const;
+  Assessment assessment(const World& world) const;
   void find_camera();
   void set_target(int world, int target);
   // Whether the text of this object is unique among the objects of the episode.
@@ -62,9 +62,9 @@ class NavToObjTask final : public ObjectTask {
   std::optional<Pose> start_place(int world, const Pose& placed, const StateRow& state,
                                   Rng& rng) const;
 
-  Sight sight_;
+  LineOfSight line_of_sight_;
   std::vector<std::vector<Vec3>> points_;          // surface points of each object, body frame
-  std::unique_ptr<BaseRoutes> routes_;             // null if the base cannot drive
+  std::unique_ptr<BasePlanner> routes_;            // null if the base cannot drive
   std::vector<std::pair<double, double>> places_;  // possible start positions on the floor, m
   std::vector<int> targets_;                       // [B], index of a scene object
 };

@@ -43,15 +43,15 @@ TEST_F(Nav, RewardDecreasesWithTheDistanceOfTheVisibleObject) {
   int tested = 0;
   for (int episode = 0; episode < 16 && tested < 3; ++episode) {
     start(episode);
-    EXPECT_EQ(task.evaluate(world).lacks, "the object is too far away");
+    EXPECT_EQ(task.evaluate(world).missing, "the object is too far away");
     if (!stand(1.25, 0)) continue;
     const Evaluation e = task.evaluate(world);
     EXPECT_NEAR(e.reward, 1 - 1.25 / 1.5, 1e-6);
     EXPECT_TRUE(e.success);
-    EXPECT_EQ(e.lacks, "");
+    EXPECT_EQ(e.missing, "");
     ASSERT_TRUE(stand(1.25, 3.14159265));
     EXPECT_EQ(task.evaluate(world).reward, 0) << "behind its back";
-    EXPECT_EQ(task.evaluate(world).lacks, "the camera does not see the object");
+    EXPECT_EQ(task.evaluate(world).missing, "the camera does not see the object");
     ++tested;
   }
   EXPECT_EQ(tested, 3);
@@ -60,11 +60,11 @@ TEST_F(Nav, RewardDecreasesWithTheDistanceOfTheVisibleObject) {
 // A start is rejected if the target is not visible from any base pose.
 TEST_F(Nav, StartWithoutAViewOfTheTargetIsRejected) {
   start(0);
-  EXPECT_EQ(task.start_fault(world), "");
+  EXPECT_EQ(task.start_error(world), "");
   const int body = task.objects(0)[0].body;
   data->qpos[model->jnt_qposadr[model->body_jntadr[body]] + 2] = 10;  // above the ceiling
   mj_forward(model, data.get());
-  EXPECT_EQ(task.start_fault(world), "task 'nav_to_obj': robot 'rby1' cannot see the " +
+  EXPECT_EQ(task.start_error(world), "task 'nav_to_obj': robot 'rby1' cannot see the " +
                                          task.objects(0)[0].name +
                                          " in scene 'floor' from any base pose that it can reach");
 }
@@ -97,7 +97,7 @@ TEST_F(Nav, TargetHasAUniqueName) {
     start(episode);
     const TaskObject& target = task.objects(0)[0];
     EXPECT_EQ(task.description(0), "Navigate to the " + target.name);
-    EXPECT_EQ(task.start_fault(world), "");
+    EXPECT_EQ(task.start_error(world), "");
     named.insert(target.name);
     std::map<std::string, int> there;  // present objects by the last part of their body names
     for (int body = 1; body < model->nbody; ++body) {

@@ -12,11 +12,11 @@
 namespace mjsense {
 namespace {
 
-constexpr double kLeastTravel = 0.05,
-                 kLeastSwing = 0.3;   // m, rad: smaller ranges are buttons or knobs
-constexpr double kLeastLever = 0.08;  // m, minimum distance of the handle from the hinge
-constexpr double kThick = 0.062;      // m, maximum thickness that a gripper can enclose
-constexpr double kLeastLength = 0.012, kMostLength = 0.8;  // m, length of a handle
+constexpr double kMinTravel = 0.05,
+                 kMinSwing = 0.3;   // m, rad: smaller ranges are buttons or knobs
+constexpr double kMinLever = 0.08;  // m, minimum distance of the handle from the hinge
+constexpr double kThick = 0.062;    // m, maximum thickness that a gripper can enclose
+constexpr double kMinLength = 0.012, kMaxLength = 0.8;  // m, length of a handle
 constexpr double kProtrusion = 0.0008;  // m, minimum protrusion beyond all other parts
 
 // Words in body names and their categories.
@@ -73,7 +73,7 @@ std::vector<Part> parts_of(const mjModel* m, int root) {
   for (int g = 0; g < m->ngeom; ++g) {
     if (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0) continue;
     const int body = m->geom_bodyid[g];
-    if (!is_below(m, body, root)) continue;
+    if (!is_descendant_or_self(m, body, root)) continue;
     const std::optional<Pose> pose = rigid_pose(m, body, root);
     if (!pose) continue;
     const double* aabb = m->geom_aabb + 6 * g;
@@ -100,7 +100,7 @@ Vec3 axis_of(const Pose& pose, int i) {
 }
 
 // Half the extent of a part along a unit vector.
-double half_along(const Part& part, Vec3 direction) {
+double half_length(const Part& part, Vec3 direction) {
   double sum = 0;
   for (int i = 0; i < 3; ++i) sum += std::abs(dot(direction, axis_of(part.pose, i))) * part.half[i];
   return sum;
@@ -116,7 +116,7 @@ bool is_bar(const Part& part, int& longest) {
     if (i != longest && 2 * part.half[i] > kThick) return false;
   }
   const double length = 2 * part.half[longest];
-  return length >= kLeastLength && length <= kMostLength;
+  return length >= kMinLength && length <= kMaxLength;
 }
 
 // Distance by which a part protrudes beyond all others along one axis of the body (m).
@@ -142,20 +142,21 @@ std::optional<Handle> find_handle(const std::vector<Part>& parts) {
       for (int sign = -1; sign <= 1; sign += 2) {
         const Vec3 outward{axis == 0 ? double(sign) : 0, axis == 1 ? double(sign) : 0,
                            axis == 2 ? double(sign) : 0};
-        Vec3 along = axis_of(part.pose, longest);
+        Vec3 direction = axis_of(part.pose, longest);
         // A bar must be perpendicular to the direction in which it protrudes. A knob has no long
         // side.
-        if (std::abs(dot(along, outward)) > 0.5) {
+        if (std::abs(dot(direction, outward)) > 0.5) {
           const int other = (longest + 1) % 3;
-          along = axis_of(part.pose, other);
+          direction = axis_of(part.pose, other);
           if (2 * part.half[longest] > kThick) continue;
         }
         const double out = protrusion(parts, part, axis, sign);
         if (out <= furthest) continue;
         furthest = out;
-        Handle handle{part.geom, part.pose.p, along, half_along(part, along), outward, 0, 0};
-        handle.half_across = half_along(part, normalized(cross(along, outward)));
-        handle.half_outward = half_along(part, outward);
+        Handle handle{part.geom, part.pose.p, direction, half_length(part, direction),
+                      outward,   0,           0};
+        handle.half_across = half_length(part, normalized(cross(direction, outward)));
+        handle.half_outward = half_length(part, outward);
         best = handle;
       }
     }
@@ -234,7 +235,7 @@ std::vector<Articulation> find_articulations(const mjModel* m, std::string_view 
     one.slide = slide;
     one.low = m->jnt_range[2 * j];
     one.high = m->jnt_range[2 * j + 1];
-    if (one.range() < (slide ? kLeastTravel : kLeastSwing)) continue;
+    if (one.range() < (slide ? kMinTravel : kMinSwing)) continue;
     const bool low_is_closed = std::abs(one.low) <= std::abs(one.high);
     one.closed = std::clamp(0.0, one.low, one.high);
     one.open = low_is_closed ? one.high : one.low;
@@ -244,7 +245,7 @@ std::vector<Articulation> find_articulations(const mjModel* m, std::string_view 
     if (!slide) {
       const Vec3 lever = one.handle.middle - vec3(m->jnt_pos + 3 * j),
                  axis = vec3(m->jnt_axis + 3 * j);
-      if (norm(lever - dot(lever, axis) * axis) < kLeastLever) continue;
+      if (norm(lever - dot(lever, axis) * axis) < kMinLever) continue;
     }
     one.name = name;
     one.category = category_of(m, body, slide);

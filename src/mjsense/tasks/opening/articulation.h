@@ -18,8 +18,8 @@ namespace mjsense {
 struct Handle {
   int geom = -1;
   Vec3 middle;
-  Vec3 along;                                // unit vector along the longest extent
-  double half_along = 0;                     // m
+  Vec3 direction;                            // unit vector along the longest extent
+  double half_length = 0;                    // m
   Vec3 outward;                              // unit vector away from the front that it is fixed to
   double half_across = 0, half_outward = 0;  // m, perpendicular to both axes; along `outward`
 };

@@ -74,7 +74,7 @@ std::vector<Pose> BaseSearch::search(const Articulation& one, double from, doubl
       if (floats) base = before(body, one, distance, aside, turn);
     }
     const HandleReach::Start there = placed(empty_, base);
-    if (!reach_.stands_free(there)) continue;
+    if (!reach_.is_collision_free(there)) continue;
     if (reach_.find(there, one, from, to, cfg_.grasps, driving)) found.push_back(base);
   }
   return found;

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "mjsense/tasks/opening/reach.h"
+#include "mjsense/tasks/opening/handle_reach.h"
 
 namespace mjsense {
 

@@ -59,7 +59,7 @@ std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model
     for (int a = 0; a < static_cast<int>(groups.size()) && !on_arm; ++a) {
       if (groups[a].kind != GroupKind::kArm || groups[a].leaf_site < 0) continue;
       on_arm = groups[a].leaf_site == groups[g].leaf_site ||
-               is_below(model, groups[g].root_body, groups[a].root_body);
+               is_descendant_or_self(model, groups[g].root_body, groups[a].root_body);
       if (on_arm) hands.push_back({a, g, closing_turn(groups[g], model)});
     }
     if (!on_arm && floats) hands.push_back({g, g, closing_turn(groups[g], model)});
@@ -70,13 +70,13 @@ std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model
 std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
                                                double max_opening) {
   std::vector<HandleGrasp> grasps;
-  const Vec3 along = rotate(body.q, handle.along), outward = rotate(body.q, handle.outward);
+  const Vec3 along = rotate(body.q, handle.direction), outward = rotate(body.q, handle.outward);
   const Vec3 middle = body * handle.middle;
-  const bool knob = handle.half_along < 0.03;
+  const bool knob = handle.half_length < 0.03;
   for (int side = 0; side < (knob ? 2 : 1); ++side) {
     // The fingers close perpendicular to the bar. A knob may also be grasped along it.
     const Vec3 bar = side == 0 ? along : normalized(cross(along, outward));
-    const double across = side == 0 ? handle.half_across : handle.half_along;
+    const double across = side == 0 ? handle.half_across : handle.half_length;
     if (2 * across + 2 * kSideGap > max_opening) continue;
     for (double turn : kTurns) {
       for (double tilt : kTilts) {
@@ -87,7 +87,7 @@ std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose&
           approach = rotate(axis_angle(close, turn), approach);
           for (int flip = -1; flip <= 1; flip += 2) {
             const Vec3 y = static_cast<double>(flip) * close;
-            const Vec3 position = middle + (place * handle.half_along) * bar;
+            const Vec3 position = middle + (place * handle.half_length) * bar;
             const double cost =
                 std::abs(tilt) + 1.2 * std::abs(turn) + 0.3 * std::abs(place) + 0.1 * side;
             grasps.push_back(

@@ -33,7 +33,7 @@ void OpeningTask::initialize_task() {
   articulations_ = find_articulations(model(), robot_entity() + "/");
   if (articulations_.empty())
     throw ValueError(fmt::format(
-        "{} has nothing to open: no hinge or slide joint with a range and a handle", place()));
+        "{} has nothing to open: no hinge or slide joint with a range and a handle", context()));
   reach_ = std::make_unique<HandleReach>(model(), robot());
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(call_mujoco(mj_makeData, model()),
                                                                mj_deleteData);
@@ -57,7 +57,7 @@ std::optional<OpeningTask::Found> OpeningTask::find_base(const Articulation& one
   const double to = aim(one);
   // Base placements are searched once, for the middle of the range of start positions.
   const double middle =
-      kind_ == OpeningKind::kOpen ? one.closed : one.at(0.5 * (kLeastStart + kMostStart));
+      kind_ == OpeningKind::kOpen ? one.closed : one.at(0.5 * (kMinStart + kMaxStart));
   BasePlaces places = bases_->places(one, middle, to);
   while (!places.at.empty()) {
     const auto k = rng.below(static_cast<std::uint32_t>(places.at.size()));
@@ -68,7 +68,8 @@ std::optional<OpeningTask::Found> OpeningTask::find_base(const Articulation& one
     const Pose moved{place.p + move, normalized(axis_angle({0, 0, 1}, turn) * place.q)};
     for (const Pose& base : {moved, place}) {
       const HandleReach::Start there = bases_->placed(start, base);
-      if (reach_->stands_free(there) && reach_->find(there, one, from, to, kTries, places.driving))
+      if (reach_->is_collision_free(there) &&
+          reach_->find(there, one, from, to, kTries, places.driving))
         return Found{base, places.driving};
     }
   }
@@ -108,7 +109,7 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
   for (int index : order) {
     const Articulation& one = articulations_[index];
     const double from =
-        kind_ == OpeningKind::kOpen ? one.closed : one.at(rng.uniform(kLeastStart, kMostStart));
+        kind_ == OpeningKind::kOpen ? one.closed : one.at(rng.uniform(kMinStart, kMaxStart));
     base = find_base(one, from, reach_->start_of(here, state), rng);
     if (!base && index != order.back()) continue;
     target.index = index;
@@ -133,7 +134,7 @@ void OpeningTask::begin(const World& world) {
       start(world.id);
 }
 
-std::string OpeningTask::start_fault(const World& world) const {
+std::string OpeningTask::start_error(const World& world) const {
   const std::string fault = scene().fault(world);
   if (!fault.empty()) return fault;
   const Target& target = targets_[world.id];
@@ -147,12 +148,12 @@ std::string OpeningTask::start_fault(const World& world) const {
 double OpeningTask::reward(const World& world) const {
   const Articulation& target = articulations_[targets_[world.id].index];
   if (kind_ == OpeningKind::kClose) return 1 - target.fraction(world.data->qpos[target.qpos]);
-  double most = 0;
+  double maximum = 0;
   for (const Articulation& one : articulations_) {
     if (one.category == target.category)
-      most = std::max(most, one.fraction(world.data->qpos[one.qpos]));
+      maximum = std::max(maximum, one.fraction(world.data->qpos[one.qpos]));
   }
-  return most;
+  return maximum;
 }
 
 bool OpeningTask::succeeded(double reward) const {
@@ -161,10 +162,10 @@ bool OpeningTask::succeeded(double reward) const {
 
 Evaluation OpeningTask::evaluate(const World& world) const {
   const double reward = this->reward(world);
-  return judge_by(world.id, reward,
-                  succeeded(reward)             ? ""
-                  : kind_ == OpeningKind::kOpen ? "it is not open far enough"
-                                                : "it is not closed far enough");
+  return make_evaluation_from(world.id, reward,
+                              succeeded(reward)             ? ""
+                              : kind_ == OpeningKind::kOpen ? "it is not open far enough"
+                                                            : "it is not closed far enough");
 }
 
 std::string OpeningTask::description(int world) const {

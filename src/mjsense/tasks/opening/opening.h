@@ -9,7 +9,7 @@
 #include "mjsense/scenes/object_task.h"
 #include "mjsense/tasks/opening/articulation.h"
 #include "mjsense/tasks/opening/base_search.h"
-#include "mjsense/tasks/opening/reach.h"
+#include "mjsense/tasks/opening/handle_reach.h"
 
 namespace mjsense {
 
@@ -21,7 +21,7 @@ class OpeningTask final : public ObjectTask {
   // Fractions of the range: success of `close`, and the range of its start. The success threshold
   // of `open` depends on the robot (RobotCfg::opened).
   static constexpr double kClosed = 0.85;
-  static constexpr double kLeastStart = 0.35, kMostStart = 0.65;
+  static constexpr double kMinStart = 0.35, kMaxStart = 0.65;
 
   // Plays in cfg.scene; the default scene is a kitchen.
   OpeningTask(TaskCfg cfg, OpeningKind kind);
@@ -29,7 +29,7 @@ class OpeningTask final : public ObjectTask {
   std::string_view type() const override { return kind_ == OpeningKind::kOpen ? "open" : "close"; }
   // Rejects starts in which an object penetrates another one, or in which the target is unreachable
   // from every base placement.
-  std::string start_fault(const World& world) const override;
+  std::string start_error(const World& world) const override;
 
   void begin(const World& world) override;
   // Reward of `open`: the maximum of |q| / range over all articulations of the target's category.

@@ -36,7 +36,7 @@ TaskCfg franka(const std::string& scene = "") {
 
 struct Stage {
   Stage(TaskCfg cfg, OpeningKind kind, int worlds = 3)
-      : task(std::move(cfg), kind), scene(task.whole_scene_cfg()), model(scene.model()) {
+      : task(std::move(cfg), kind), scene(task.scene_cfg_with_robot()), model(scene.model()) {
     task.initialize(model, worlds);
     data.reset(mj_makeData(model));
   }
@@ -94,10 +94,10 @@ TEST(Articulations, BarInFrontOfThePanelIsTheHandle) {
   EXPECT_EQ(one.category, "drawer");
   EXPECT_EQ(one.handle.geom, 1);
   EXPECT_NEAR(norm(one.handle.middle - Vec3{-.05, 0, .02}), 0, 1e-6);
-  EXPECT_NEAR(std::abs(one.handle.along.y), 1, 1e-6);
+  EXPECT_NEAR(std::abs(one.handle.direction.y), 1, 1e-6);
   EXPECT_NEAR(one.handle.outward.x, -1, 1e-9);
   EXPECT_NEAR(one.handle.half_across, .008, 1e-4);
-  EXPECT_NEAR(one.handle.half_along, .078, 1e-3);
+  EXPECT_NEAR(one.handle.half_length, .078, 1e-3);
 }
 
 TEST(Articulations, BodiesThatDoNotOpenAreSkipped) {
@@ -202,7 +202,7 @@ TEST(Opening, StartsAreFeasibleAndDiffer) {
   std::set<double> places;
   for (int episode = 0; episode < 20; ++episode) {
     const World w = stage.start(0, episode);
-    EXPECT_EQ(stage.task.start_fault(w), "");
+    EXPECT_EQ(stage.task.start_error(w), "");
     for (int i = 0; i < stage.data->ncon; ++i)
       EXPECT_GT(stage.data->contact[i].dist, -0.002) << episode;
     const Evaluation e = stage.task.evaluate(w);
@@ -225,7 +225,7 @@ TEST(Opening, OpenCountsEveryArticulationOfTheCategory) {
     stage.data->qpos[one.qpos] = one.at(0.149);
     const bool counts = one.category == target.category;
     EXPECT_NEAR(stage.task.evaluate(w).reward, counts ? 0.149 : 0, 1e-12) << one.name;
-    EXPECT_EQ(stage.task.evaluate(w).lacks, "it is not open far enough");
+    EXPECT_EQ(stage.task.evaluate(w).missing, "it is not open far enough");
     stage.data->qpos[one.qpos] = one.at(0.1501);
     EXPECT_EQ(stage.task.evaluate(w).success, counts) << one.name;
     EXPECT_EQ(stage.info(w)["success"], counts);
@@ -251,7 +251,7 @@ TEST(Opening, CloseCountsOnlyTheTarget) {
     EXPECT_NEAR(stage.task.evaluate(w).reward, 0.851, 1e-12);
     EXPECT_TRUE(stage.task.evaluate(w).success);
     stage.data->qpos[target.qpos] = target.at(0.151);
-    EXPECT_EQ(stage.task.evaluate(w).lacks, "it is not closed far enough");
+    EXPECT_EQ(stage.task.evaluate(w).missing, "it is not closed far enough");
     EXPECT_THAT(stage.task.description(1), HasSubstr("Close the " + target.text));
     // The success threshold of `close` corresponds to the pose in obj_end.
     stage.data->qpos[target.qpos] = target.at(0.15);
@@ -271,16 +271,17 @@ TEST(Opening, RobotDoesNotStartInsideFurniture) {
   const auto start = stage.task.reach().start_of(w);
   const BaseSearch search(stage.task.robot(), stage.task.reach(), start,
                           stage.task.robot().base_pose(w));
-  EXPECT_TRUE(stage.task.reach().stands_free(start));
+  EXPECT_TRUE(stage.task.reach().is_collision_free(start));
   const auto at = [&](double x) { return search.placed(start, {{x, 0, 0}, {}}); };
-  EXPECT_FALSE(stage.task.reach().stands_free(at(0.1)));  // the pedestal penetrates the fronts
-  EXPECT_TRUE(stage.task.reach().stands_free(at(-0.9)));
+  EXPECT_FALSE(
+      stage.task.reach().is_collision_free(at(0.1)));  // the pedestal penetrates the fronts
+  EXPECT_TRUE(stage.task.reach().is_collision_free(at(-0.9)));
   // The pedestal penetrates a wall.
   const int wall = resolve(stage.model, mjOBJ_GEOM, "room/wall_x0", "test");
   const double inside =
       stage.model->geom_pos[3 * wall] + stage.model->geom_size[3 * wall + 2];  // its face
-  EXPECT_FALSE(stage.task.reach().stands_free(at(inside + 0.2)));
-  EXPECT_TRUE(stage.task.reach().stands_free(at(inside + 0.3)));
+  EXPECT_FALSE(stage.task.reach().is_collision_free(at(inside + 0.2)));
+  EXPECT_TRUE(stage.task.reach().is_collision_free(at(inside + 0.3)));
 }
 
 // The arm is interpolated linearly in joint space between the points of the path. The gripper must
@@ -297,24 +298,25 @@ TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
     const Articulation& one = stage.task.target(0);
     const double from = stage.data->qpos[one.qpos], to = stage.task.aim(one);
     HandleReach::Start start = reach.start_of(w);
-    const auto way = reach.find(start, one, from, to, 12, false);
-    if (!way) continue;  // a start without a path is rejected and sampled again
+    const auto path = reach.find(start, one, from, to, 12, false);
+    if (!path) continue;  // a start without a path is rejected and sampled again
     ++found;
-    const int arm = way->hand.arm;
+    const int arm = path->hand.arm;
     const Pose base = robot.base_pose(w);
-    for (std::size_t k = 1; k < way->along.size(); ++k) {
-      RobotValues between = way->along[k];
+    for (std::size_t k = 1; k < path->motion_joints.size(); ++k) {
+      RobotValues between = path->motion_joints[k];
       for (int i = 0; i < between[arm].size; ++i)
-        between[arm].values[i] = 0.5 * (between[arm].values[i] + way->along[k - 1][arm].values[i]);
+        between[arm].values[i] =
+            0.5 * (between[arm].values[i] + path->motion_joints[k - 1][arm].values[i]);
       const double part =
-          (static_cast<double>(k) - 0.5) / (static_cast<double>(way->along.size()) - 1);
-      const Pose handle = reach.body_pose(start, one, std::lerp(from, to, part)) * way->on_body;
+          (static_cast<double>(k) - 0.5) / (static_cast<double>(path->motion_joints.size()) - 1);
+      const Pose handle = reach.body_pose(start, one, std::lerp(from, to, part)) * path->on_body;
       EXPECT_LT(norm((base * robot.fk(arm, between)).p - handle.p), 0.01) << episode << ", " << k;
     }
     const auto& qpos = robot.groups()[arm].qpos;
     for (std::size_t i = 0; i < qpos.size(); ++i)
-      start.qpos[qpos[i]] = way->go.back()[arm].values[i] + rng.uniform(-0.02, 0.02);
-    EXPECT_TRUE(reach.again(start, one, from, to, *way)) << episode;
+      start.qpos[qpos[i]] = path->approach_joints.back()[arm].values[i] + rng.uniform(-0.02, 0.02);
+    EXPECT_TRUE(reach.again(start, one, from, to, *path)) << episode;
   }
   EXPECT_GE(found, 45);
 }
@@ -331,22 +333,22 @@ TEST(Opening, FloatingGripperMovesOnAScrew) {
   EXPECT_FALSE(reach.drives());
   for (int episode = 0; episode < 6; ++episode) {
     const World w = stage.start(0, episode);
-    ASSERT_EQ(stage.task.start_fault(w), "");
+    ASSERT_EQ(stage.task.start_error(w), "");
     const Articulation& one = stage.task.target(0);
     const double from = w.data->qpos[one.qpos], to = stage.task.aim(one);
     const auto start = reach.start_of(w);
-    EXPECT_TRUE(reach.stands_free(start));
-    const auto way = reach.find(start, one, from, to, 40, false);
-    ASSERT_TRUE(way) << episode;
+    EXPECT_TRUE(reach.is_collision_free(start));
+    const auto path = reach.find(start, one, from, to, 40, false);
+    ASSERT_TRUE(path) << episode;
     const Pose tool =
         stage.task.robot().base_pose(w) * stage.task.robot().tcp_pose(w, reach.hands()[0].arm);
-    EXPECT_NEAR(norm(way->there.front().p - tool.p), 0, 1e-9);
-    EXPECT_NEAR(norm(way->grasp.p - way->there.back().p), 0.04, 1e-9) << "of the pregrasp";
+    EXPECT_NEAR(norm(path->approach.front().p - tool.p), 0, 1e-9);
+    EXPECT_NEAR(norm(path->grasp.p - path->approach.back().p), 0.04, 1e-9) << "of the pregrasp";
     const Pose body = reach.body_pose(start, one, from), later = reach.body_pose(start, one, to);
-    const Pose in_it = inverse(body) * way->grasp, then = inverse(later) * way->end;
+    const Pose in_it = inverse(body) * path->grasp, then = inverse(later) * path->end;
     EXPECT_NEAR(norm(in_it.p - then.p), 0, 1e-9);
     // A screw motion between the two poses keeps the tool on the handle halfway, too.
-    const Pose half = way->grasp * exp6(0.5 * log6(inverse(way->grasp) * way->end));
+    const Pose half = path->grasp * exp6(0.5 * log6(inverse(path->grasp) * path->end));
     const Pose between = inverse(reach.body_pose(start, one, 0.5 * (from + to))) * half;
     EXPECT_NEAR(norm(in_it.p - between.p), 0, 1e-9);
     EXPECT_NEAR(angle_between(in_it.q, between.q), 0, 1e-6);
@@ -360,7 +362,7 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
   const mjModel* m = stage.model;
   mjData* d = w.data;
   const HandleReach& reach = stage.task.reach();
-  EXPECT_TRUE(reach.stands_free(reach.start_of(w)));
+  EXPECT_TRUE(reach.is_collision_free(reach.start_of(w)));
   const int hand = stage.task.robot().groups()[reach.hands()[0].gripper].root_body;
   const auto touches = [&](int g) { return m->geom_contype[g] || m->geom_conaffinity[g]; };
   const int base = m->body_weldid[stage.task.robot().base_body()];
@@ -371,7 +373,7 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
   };
   int moved = 0, pad = -1;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (is_below(m, m->geom_bodyid[g], hand) && touches(g)) pad = g;
+    if (is_descendant_or_self(m, m->geom_bodyid[g], hand) && touches(g)) pad = g;
   }
   for (const Articulation& one : stage.task.articulations()) {
     const int top = m->body_parentid[one.body];
@@ -381,14 +383,14 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
     std::vector<double> pos(m->body_pos, m->body_pos + 3 * m->nbody);
     other.body_pos = pos.data();
     const auto nearest = [&] {
-      double least = 1;
+      double minimum = 1;
       for (int a = 0; a < m->ngeom; ++a) {
         for (int b = 0; b < m->ngeom && of_arm(a); ++b) {
-          if (is_below(m, m->geom_bodyid[b], top) && touches(b))
-            least = std::min(least, mj_geomDistance(m, d, a, b, 1, nullptr));
+          if (is_descendant_or_self(m, m->geom_bodyid[b], top) && touches(b))
+            minimum = std::min(minimum, mj_geomDistance(m, d, a, b, 1, nullptr));
         }
       }
-      return least;
+      return minimum;
     };
     mj_kinematics(m, d);
     // Moves the handle towards a pad.
@@ -405,7 +407,7 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
       (gap(0.5 * (low + high)) > 0.005 ? low : high) = 0.5 * (low + high);
     if (std::abs(gap(low) - 0.005) > 1e-3) continue;  // another geom is closer
     const auto near = reach.start_of(World{.id = 0, .model = &other, .data = d});
-    EXPECT_FALSE(reach.stands_free(near)) << one.name;
+    EXPECT_FALSE(reach.is_collision_free(near)) << one.name;
     EXPECT_NEAR(norm(reach.body_pose(near, one, one.closed).p - vec3(d->xpos + 3 * one.body)), 0,
                 1e-9);
     ++moved;

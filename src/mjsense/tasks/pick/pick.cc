@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scenes/object_texts.h"
-#include "mjsense/tasks/pick_and_place/support.h"
+#include "mjsense/scenes/referring_expressions.h"
+#include "mjsense/tasks/pick_and_place/support_check.h"
 
 namespace mjsense {
 namespace {
@@ -26,16 +26,16 @@ PickTask::PickTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
 
 void PickTask::initialize_task() {
   ObjectTask::initialize_task();
-  things_ = scene().things();
+  things_ = scene().pickup_objects();
   if (things_.empty())
     throw ValueError(
-        fmt::format("{} has no object to pick up: no graspable body with a free joint", place()));
+        fmt::format("{} has no object to pick up: no graspable body with a free joint", context()));
   objects_.clear();
   for (const SceneObject& object : scene().objects())
     objects_.push_back({object.body, object.kind, object.shape});
   targets_.assign(num_worlds(), 0);
   begin_with(objects_[0].body, scene().objects()[0].text);
-  standing_ = Standing(model(), robot(), scene());
+  standing_ = BasePlacementSearch(model(), robot(), scene());
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
@@ -65,7 +65,7 @@ void PickTask::set_target(int world, int target) {
 // True if the first contact that supports the object from below is with a body other than the
 // robot. A supporting contact is below the middle of the object, with a normal within 80 degrees of
 // up.
-bool PickTask::borne_by_others(const World& world, int body) const {
+bool PickTask::supported_by_others(const World& world, int body) const {
   const mjModel* m = world.model;
   const double middle = world_box(world, body).center().z;
   const double steep = std::cos(80.0 / 180.0 * pi);
@@ -83,7 +83,7 @@ bool PickTask::borne_by_others(const World& world, int body) const {
 }
 
 // The unmet condition of success; "" if only the robot holds the object in the air.
-std::string_view PickTask::lacks(const World& world) const {
+std::string_view PickTask::missing(const World& world) const {
   const int body = object(world.id).body;
   if (world.data->xpos[3 * body + 2] - start(world.id).p.z < kLift)
     return "the object is not lifted";
@@ -105,14 +105,14 @@ std::string_view PickTask::lacks(const World& world) const {
 Evaluation PickTask::evaluate(const World& world) const {
   const int body = object(world.id).body;
   const double height = world.data->xpos[3 * body + 2] - start(world.id).p.z;
-  const double reward = borne_by_others(world, body) ? 0.0 : std::clamp(height, 0.0, 1000.0);
-  return judge_by(world.id, reward, lacks(world));
+  const double reward = supported_by_others(world, body) ? 0.0 : std::clamp(height, 0.0, 1000.0);
+  return make_evaluation_from(world.id, reward, missing(world));
 }
 
 std::string PickTask::description(int world) const { return "Pick up the " + object(world).name; }
 
 Task::Referrals PickTask::referrals(int world) const {
-  return {{"pickup_obj_name", referrals_of(scene().objects()[targets_[world]])}};
+  return {{"pickup_obj_name", referring_expressions(scene().objects()[targets_[world]])}};
 }
 
 std::optional<Pose> PickTask::goal_pose(int world, std::string_view role) const {
@@ -128,7 +128,7 @@ void PickTask::write_info(const World& world, JsonWriter& json) const {
   json.key("position_error").value(norm(vec3(world.data->xpos + 3 * body) - goal));
   json.key("rotation_error")
       .value(angle_between(start(world.id).q, quat(world.data->xquat + 4 * body)));
-  json.key("success").value(lacks(world).empty());
+  json.key("success").value(missing(world).empty());
 }
 
 std::vector<std::pair<std::string, std::string>> PickTask::scene_info(int world) const {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "mjsense/episode/grasp_scene.h"
+#include "mjsense/scenes/base_placement_search.h"
 #include "mjsense/scenes/object_task.h"
-#include "mjsense/scenes/standing.h"
 
 namespace mjsense {
 
@@ -49,10 +49,10 @@ class PickTask final : public ObjectTask, public GraspScene {
 
  private:
   void set_target(int world, int target);
-  bool borne_by_others(const World& world, int body) const;
-  std::string_view lacks(const World& world) const;
+  bool supported_by_others(const World& world, int body) const;
+  std::string_view missing(const World& world) const;
 
-  Standing standing_;
+  BasePlacementSearch standing_;
   std::vector<GraspObject> objects_;
   std::vector<int> things_;   // indices in objects_ of possible targets
   std::vector<int> targets_;  // [B], index in objects_

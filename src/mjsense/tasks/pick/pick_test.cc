@@ -41,7 +41,7 @@ struct Pick : testing::Test {
   double* object_qpos() { return data->qpos + model->jnt_qposadr[model->body_jntadr[body()]]; }
 
   PickTask task{franka()};
-  Scene scene{task.whole_scene_cfg()};
+  Scene scene{task.scene_cfg_with_robot()};
   const mjModel* model = scene.model();
   std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
   World w;
@@ -157,7 +157,7 @@ TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
   }
   ASSERT_TRUE(touching);
   EXPECT_FALSE(task.evaluate(w).success);
-  EXPECT_EQ(task.evaluate(w).lacks, "something other than the robot touches the object");
+  EXPECT_EQ(task.evaluate(w).missing, "something other than the robot touches the object");
   write_vec(before, q);
   mj_forward(model, data.get());
   EXPECT_TRUE(task.evaluate(w).success);
@@ -176,13 +176,13 @@ TEST_F(Pick, SuccessStartsAtALiftOfOneCentimetre) {
     object_qpos()[2] = z + up;
     mj_forward(model, data.get());
     EXPECT_EQ(task.evaluate(w).success, success) << up;
-    EXPECT_EQ(task.evaluate(w).lacks, success ? "" : "the object is not lifted");
+    EXPECT_EQ(task.evaluate(w).missing, success ? "" : "the object is not lifted");
   }
 }
 
 // The target has 7 cm of free space around it for an open gripper; other objects are 2 cm apart.
 TEST_F(Pick, TargetHasFreeSpaceAroundIt) {
-  double least_target = 1, least_other = 1;
+  double min_target = 1, min_other = 1;
   int tight = 0;
   constexpr int kEpisodes = 200;
   for (int episode = 0; episode < kEpisodes; ++episode) {
@@ -208,32 +208,31 @@ TEST_F(Pick, TargetHasFreeSpaceAroundIt) {
         const double *p = data->xpos + 3 * objects[a].body, *q = data->xpos + 3 * objects[b].body;
         const double gap = std::hypot(p[0] - q[0], p[1] - q[1]) - radius[a] - radius[b];
         const bool of_target = static_cast<int>(a) == target || static_cast<int>(b) == target;
-        (of_target ? least_target : least_other) =
-            std::min(of_target ? least_target : least_other, gap);
+        (of_target ? min_target : min_other) = std::min(of_target ? min_target : min_other, gap);
         if (of_target) here = std::min(here, gap);
       }
     tight += here < 0.07 - 1e-9;
   }
   EXPECT_EQ(tight, 0);
-  EXPECT_GE(least_target, 0.07 - 1e-9);
-  EXPECT_LT(least_target, 0.08);  // the required distance is not larger
-  EXPECT_GE(least_other, 0.02 - 1e-9);
-  EXPECT_LT(least_other, 0.03);
+  EXPECT_GE(min_target, 0.07 - 1e-9);
+  EXPECT_LT(min_target, 0.08);  // the required distance is not larger
+  EXPECT_GE(min_other, 0.02 - 1e-9);
+  EXPECT_LT(min_other, 0.03);
 }
 
 // Blocks rest on each of their three kinds of faces equally often.
 TEST_F(Pick, BlocksRestOnEveryKindOfFace) {
-  int ways[3] = {};
+  int paths[3] = {};
   for (int episode = 0; episode < 150; ++episode) {
     start(0, episode);
     for (const auto& object : task.all_objects()) {
       if (object.kind != "red_block") continue;
       const Quat q = quat(data->xquat + 4 * object.body);
       const double up[3] = {rotate(q, {1, 0, 0}).z, rotate(q, {0, 1, 0}).z, rotate(q, {0, 0, 1}).z};
-      for (int k = 0; k < 3; ++k) ways[k] += std::abs(up[k]) > 0.99;
+      for (int k = 0; k < 3; ++k) paths[k] += std::abs(up[k]) > 0.99;
     }
   }
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(ways[k], 50, 25) << k;
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(paths[k], 50, 25) << k;
 }
 
 TEST_F(Pick, EndsAtTheHorizonOrWithADoneAction) {

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/tasks/pick_and_place/support.h"
+#include "mjsense/tasks/pick_and_place/support_check.h"
 
 namespace mjsense {
 namespace {
@@ -56,16 +56,16 @@ std::string_view PickAndPlaceTask::name() const {
 
 void PickAndPlaceTask::initialize_task() {
   SceneTask::initialize_task();
-  const std::string place = this->place();
-  if (scene().things().empty())
+  const std::string context = this->context();
+  if (scene().pickup_objects().empty())
     throw ValueError(
-        fmt::format("{} has no object to pick up: no graspable body with a free joint", place));
+        fmt::format("{} has no object to pick up: no graspable body with a free joint", context));
   if (kind_ == PlaceKind::kNextTo) {
     if (scene().objects().size() < 2)
-      throw ValueError(fmt::format("{} has only one object; at least two are needed", place));
+      throw ValueError(fmt::format("{} has only one object; at least two are needed", context));
   } else if (scene().receptacles().empty()) {
     throw ValueError(
-        fmt::format("{} has no receptacle: none of its objects has receptacle = true", place));
+        fmt::format("{} has no receptacle: none of its objects has receptacle = true", context));
   }
   objects_.clear();
   for (const SceneObject& object : scene().objects())
@@ -74,7 +74,7 @@ void PickAndPlaceTask::initialize_task() {
     Rng any(0, 0, 0, 0);
     if (choose(0, any).empty())
       throw ValueError(fmt::format(
-          "{} {}", place,
+          "{} {}", context,
           kind_ == PlaceKind::kColor
               ? "does not have two receptacles of the same kind (other_texts) with different colors"
               : "has no receptacle that is a box (text or other_texts)"));
@@ -85,7 +85,7 @@ void PickAndPlaceTask::initialize_task() {
     episode.objects[1].role = kReceptacle;
     episode.supported.reserve(static_cast<std::size_t>(std::max(cfg().horizon, 0)) + 2);
   }
-  standing_ = Standing(model(), robot(), scene());
+  standing_ = BasePlacementSearch(model(), robot(), scene());
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
@@ -96,7 +96,7 @@ std::vector<int> PickAndPlaceTask::choose(int world, Rng& rng) const {
     return of[rng.below(static_cast<std::uint32_t>(of.size()))];
   };
   const auto objects = scene().objects();
-  const int target = scene().draw(world, scene().things(), robot(), rng);
+  const int target = scene().draw(world, scene().pickup_objects(), robot(), rng);
   std::vector<int> where;
   const auto rivals = [&](int r) {
     std::vector<int> found;
@@ -145,12 +145,12 @@ void PickAndPlaceTask::begin(const World& world) {
   episode.start = pose_of(world, episode.objects[0].body);
   episode.receptacle_start = pose_of(world, episode.objects[1].body);
   episode.supported.clear();
-  episode.judgement = {};
+  episode.assessment = {};
 }
 
-const PickAndPlaceTask::Judgement& PickAndPlaceTask::judge_now(const World& world) const {
+const PickAndPlaceTask::Assessment& PickAndPlaceTask::assess(const World& world) const {
   Episode& episode = episodes_[world.id];
-  Judgement& now = episode.judgement;
+  Assessment& now = episode.assessment;
   if (now.step == episode_step(world.id)) return now;
   now = {};
   now.step = episode_step(world.id);
@@ -178,44 +178,44 @@ const PickAndPlaceTask::Judgement& PickAndPlaceTask::judge_now(const World& worl
   // about this axis is not tilt.
   const Vec3 up = rotate(conjugate(episode.receptacle_start.q), {0, 0, 1});
   now.tilted = std::acos(std::clamp(rotate(of_receptacle.q, up).z, -1.0, 1.0));
-  now.lacks = kind_ == PlaceKind::kNextTo ? lacks_beside(world, now) : lacks_within(now);
+  now.missing = kind_ == PlaceKind::kNextTo ? missing_beside(world, now) : missing_within(now);
   return now;
 }
 
-std::string_view PickAndPlaceTask::lacks_within(const Judgement& now) {
+std::string_view PickAndPlaceTask::missing_within(const Assessment& now) {
   if (!now.supported && !now.carried_forward) return "the receptacle does not carry the object";
   if (now.robot_contact) return "the robot touches the object";
   if (norm(now.moved) > kMoved) return "the receptacle has moved";
   return now.tilted > kTurned ? "the receptacle is tilted" : "";
 }
 
-std::string_view PickAndPlaceTask::lacks_beside(const World& world, const Judgement& now) const {
+std::string_view PickAndPlaceTask::missing_beside(const World& world, const Assessment& now) const {
   const Episode& episode = episodes_[world.id];
   const int object = episode.objects[0].body, other = episode.objects[1].body;
   const WorldBox a = world_box(world, object), b = world_box(world, other);
   const double gap = gap_from_above(a, b);
   if (gap < 0 || gap > kBeside) return "the object is not next to the other one";
   if (norm(now.moved) > kMovedBeside || now.turned > kTurned) return "the other object has moved";
-  const int under = bearer(world, object), under_other = bearer(world, other);
+  const int under = supporting_body(world, object), under_other = supporting_body(world, other);
   const bool together = under >= 0 && under_other >= 0 ? under == under_other
                                                        : std::abs(a.low.z - b.low.z) <= kSameHeight;
   return together ? "" : "the two objects are not on the same support";
 }
 
-std::string PickAndPlaceTask::start_fault(const World& world) const {
-  const std::string fault = SceneTask::start_fault(world);
+std::string PickAndPlaceTask::start_error(const World& world) const {
+  const std::string fault = SceneTask::start_error(world);
   if (!fault.empty() || kind_ != PlaceKind::kNextTo) return fault;
   const auto& objects = episodes_[world.id].objects;
   const double gap =
       gap_from_above(world_box(world, objects[0].body), world_box(world, objects[1].body));
   if (gap < 0 || gap > kBeside) return "";
-  return fmt::format("{}: the {} is already next to the {}", place(), objects[0].name,
+  return fmt::format("{}: the {} is already next to the {}", context(), objects[0].name,
                      objects[1].name);
 }
 
 Evaluation PickAndPlaceTask::evaluate(const World& world) const {
-  const Judgement& now = judge_now(world);
-  return judge_by(world.id, std::exp(-now.position_error), now.lacks);
+  const Assessment& now = assess(world);
+  return make_evaluation_from(world.id, std::exp(-now.position_error), now.missing);
 }
 
 void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<Vec3>& out) const {
@@ -238,10 +238,11 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
                              [&](Vec3 p) { return std::hypot(p.x - base.x, p.y - base.y); });
     // Remove placements beyond the edge of the supporting surface, such as on the robot's pedestal
     // next to the table: there the two objects would not be on the same surface.
-    const int carrier = bearer(world, body);
+    const int carrier = supporting_body(world, body);
     const Vec3 half = 0.5 * (object.high - object.low);
     std::erase_if(out, [&](Vec3 p) {
-      return carrier >= 0 && !is_carried_all_over(world, p, half, carrier, episode.objects[0].body);
+      return carrier >= 0 &&
+             !is_supported_over_whole_area(world, p, half, carrier, episode.objects[0].body);
     });
     return;
   }
@@ -268,7 +269,7 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
   out.push_back({c.x, c.y, box.high.z});
 }
 
-std::string PickAndPlaceTask::place_text(int world) const {
+std::string PickAndPlaceTask::place_description(int world) const {
   const Episode& episode = episodes_[world];
   const SceneObject& object = scene().objects()[episode.receptacle];
   if (kind_ == PlaceKind::kColor) return object.color + " " + noun(object);
@@ -277,7 +278,7 @@ std::string PickAndPlaceTask::place_text(int world) const {
 
 std::string PickAndPlaceTask::description(int world) const {
   const std::string& name = episodes_[world].objects[0].name;
-  const std::string where = place_text(world);
+  const std::string where = place_description(world);
   switch (kind_) {
     case PlaceKind::kNextTo:
       return fmt::format("Pick up the {} and place it next to the {}", name, where);
@@ -301,7 +302,7 @@ Task::Referrals PickAndPlaceTask::referrals(int world) const {
   Referrals all{referral("pickup_name", episode.target),
                 referral("place_name", episode.receptacle)};
   // The color distinguishes the receptacle from others, so only the text with the color is valid.
-  if (kind_ == PlaceKind::kColor) all[1].second = {{place_text(world), 1.0}};
+  if (kind_ == PlaceKind::kColor) all[1].second = {{place_description(world), 1.0}};
   return all;
 }
 
@@ -320,7 +321,7 @@ std::optional<Pose> PickAndPlaceTask::goal_pose(int world, std::string_view role
 }
 
 void PickAndPlaceTask::write_info(const World& world, JsonWriter& json) const {
-  const Judgement& now = judge_now(world);
+  const Assessment& now = assess(world);
   json.key("carry_forward_pos_diff").value(now.pos_diff);
   json.key("carry_forward_rot_diff").value(now.rot_diff);
   json.key("episode_step").value(episode_step(world.id));
@@ -330,7 +331,7 @@ void PickAndPlaceTask::write_info(const World& world, JsonWriter& json) const {
   json.key("receptacle_rot_displacement").value(now.turned);
   json.key("receptacle_tilt_displacement").value(now.tilted);
   json.key("robot_contact").value(now.robot_contact);
-  json.key("success").value(now.lacks.empty());
+  json.key("success").value(now.missing.empty());
   json.key("supported_by_carry_forward").value(now.carried_forward);
   json.key("supported_by_receptacle").value(now.supported);
 }

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "mjsense/episode/grasp_scene.h"
+#include "mjsense/scenes/base_placement_search.h"
 #include "mjsense/scenes/scene_task.h"
-#include "mjsense/scenes/standing.h"
 
 namespace mjsense {
 
@@ -30,7 +30,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
 
   // Rejects starts in which an object penetrates another one, or in which the object is already
   // next to the other object (kNextTo).
-  std::string start_fault(const World& world) const override;
+  std::string start_error(const World& world) const override;
   void begin(const World& world) override;
   // Reward: exp(-d), with d the distance (m) from the object to the center of the receptacle's box.
   Evaluation evaluate(const World& world) const override;
@@ -67,10 +67,10 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
 
  private:
   // Evaluation of one observation.
-  struct Judgement {
+  struct Assessment {
     int step = -1;  // of the episode
     bool supported = false, carried_forward = false, robot_contact = false;
-    std::string_view lacks;             // unmet condition of success; "" if none
+    std::string_view missing;           // unmet condition of success; "" if none
     double pos_diff = 0, rot_diff = 0;  // m, rad, to the nearest earlier supported pose
     double position_error = 0;
     Vec3 moved;  // displacement of the receptacle, m
@@ -81,17 +81,17 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
     std::array<TaskObject, 2> objects;
     Pose start, receptacle_start;
     std::vector<Pose> supported;  // X_RO of all earlier supported observations
-    Judgement judgement;
+    Assessment assessment;
   };
-  const Judgement& judge_now(const World& world) const;
-  static std::string_view lacks_within(const Judgement& now);
-  std::string_view lacks_beside(const World& world, const Judgement& now) const;
+  const Assessment& assess(const World& world) const;
+  static std::string_view missing_within(const Assessment& now);
+  std::string_view missing_beside(const World& world, const Assessment& now) const;
   std::vector<int> choose(int world, Rng& rng) const;
-  std::string place_text(int world) const;
+  std::string place_description(int world) const;
   Referrals::value_type referral(const char* key, int object) const;
 
   PlaceKind kind_;
-  Standing standing_;
+  BasePlacementSearch standing_;
   std::vector<GraspObject> objects_;
   mutable std::vector<Episode> episodes_;  // [B]; evaluated once per observation
   int robot_root_ = -1;

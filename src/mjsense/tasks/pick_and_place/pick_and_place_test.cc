@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/tasks/pick_and_place/support.h"
+#include "mjsense/tasks/pick_and_place/support_check.h"
 
 namespace mjsense {
 namespace {
@@ -21,7 +21,7 @@ using testing::StartsWith;
 // A task whose objects a test can move.
 struct Table {
   explicit Table(PlaceKind kind, const char* scene_name = "") : task(kind, cfg(scene_name)) {
-    scene = std::make_unique<Scene>(task.whole_scene_cfg());
+    scene = std::make_unique<Scene>(task.scene_cfg_with_robot());
     task.initialize(scene->model(), 3);
     data.reset(mj_makeData(scene->model()));
   }
@@ -105,7 +105,7 @@ TEST(PickAndPlace, StartsAreReachableAndWithoutCollision) {
   Table table(PlaceKind::kInOrOn);
   for (int episode = 0; episode < 30; ++episode) {
     table.start(0, episode);
-    EXPECT_EQ(table.task.start_fault(table.world), "") << episode;
+    EXPECT_EQ(table.task.start_error(table.world), "") << episode;
     for (int k = 0; k < 2; ++k) {
       EXPECT_GT(table.pose(k).p.x, 0.41);
       EXPECT_LT(table.pose(k).p.x, 0.67);
@@ -121,13 +121,13 @@ TEST(PickAndPlace, ObjectInTheBowlIsSuccessOnTheTableIsNot) {
   table.start_with("red bowl");
   Evaluation e = table.task.evaluate(table.world);
   EXPECT_FALSE(e.success);
-  EXPECT_EQ(e.lacks, "the receptacle does not carry the object");
+  EXPECT_EQ(e.missing, "the receptacle does not carry the object");
   const Vec3 middle = world_box(table.world, table.body(1)).center();
   EXPECT_NEAR(e.reward, std::exp(-norm(table.pose(0).p - middle)), 1e-12);
   table.drop();
   e = table.look();
   EXPECT_TRUE(e.success) << table.task.description(0);
-  EXPECT_EQ(e.lacks, "");
+  EXPECT_EQ(e.missing, "");
   EXPECT_GT(e.reward, 0.93);
 }
 
@@ -144,10 +144,10 @@ TEST(PickAndPlace, ReceptacleMayMoveALittleAndTurnButNotTilt) {
     return table.look();
   };
   EXPECT_TRUE(both({{0.09, 0, 0}, {}}).success);
-  EXPECT_EQ(both({{0.11, 0, 0}, {}}).lacks, "the receptacle has moved");
+  EXPECT_EQ(both({{0.11, 0, 0}, {}}).missing, "the receptacle has moved");
   EXPECT_TRUE(both({{0, 0, 0}, axis_angle({0, 0, 1}, 1.5)}).success);
   EXPECT_TRUE(both({{0, 0, 0.05}, axis_angle({1, 0, 0}, 0.7)}).success);
-  EXPECT_EQ(both({{0, 0, 0.05}, axis_angle({1, 0, 0}, 0.85)}).lacks, "the receptacle is tilted");
+  EXPECT_EQ(both({{0, 0, 0.05}, axis_angle({1, 0, 0}, 0.85)}).missing, "the receptacle is tilted");
   EXPECT_NEAR(table.info()["receptacle_tilt_displacement"].get<double>(), 0.85, 0.02);
 }
 
@@ -197,7 +197,7 @@ TEST(PickAndPlace, NextToRequiresTheSameSupport) {
     at.p.z = start.p.z;
     table.put(0, at);
     table.settle(50);
-    return table.look().lacks;
+    return table.look().missing;
   };
   EXPECT_EQ(beside(0.03), "");
   EXPECT_EQ(beside(0.055), "");
@@ -238,7 +238,7 @@ TEST(PickAndPlace, StartThatIsAlreadySolvedIsRejected) {
   int there = 0;
   for (int episode = 0; episode < 60; ++episode) {
     table.start(0, episode);
-    const std::string fault = table.task.start_fault(table.world);
+    const std::string fault = table.task.start_error(table.world);
     const bool success = table.task.evaluate(table.world).success;
     there += success ? 1 : 0;
     if (!success) continue;

@@ -96,7 +96,8 @@ class MotionQuality {
     const auto gripper = [&](int geom) {
       for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
         const MoveGroup& group = robot_->groups()[g];
-        if (group.kind == GroupKind::kGripper && is_below(m, m->geom_bodyid[geom], group.root_body))
+        if (group.kind == GroupKind::kGripper &&
+            is_descendant_or_self(m, m->geom_bodyid[geom], group.root_body))
           return static_cast<int>(g);
       }
       return -1;

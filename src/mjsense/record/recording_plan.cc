@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/record/recording_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/model_checksums.h"
+#include "mjsense/record/molmospaces.h"
+#include "mjsense/record/recording_description.h"
+#include "mjsense/record/yuv.h"
+
+namespace mjsense {
+namespace {
+
+// About 128 KiB: large enough for gzip and the file system to be efficient, small enough for the
+// buffers of many worlds to fit in the cache.
+constexpr std::size_t kChunkBytes = 1 << 17;
+constexpr std::int64_t kMaxChunkRows = 512;
+
+// Datasets that the recorder itself writes into every episode.
+constexpr const char* kOwnPaths[] = {"rewards",    "success",   "fail",
+                                     "terminated", "truncated", "obs_scene"};
+
+void check_path(const std::string& sensor, const std::string& stream) {
+  std::size_t start = 0;
+  while (true) {
+    const std::size_t end = std::min(stream.find('/', start), stream.size());
+    const std::string part = stream.substr(start, end - start);
+    if (part.empty() || part == "." || part == ".." || part.find('\0') != std::string::npos) {
+      throw ValueError(fmt::format(
+          "sensor '{}': its stream '{}' cannot be stored: a name between slashes is empty or a dot",
+          sensor, stream));
+    }
+    if (end == stream.size()) return;
+    start = end + 1;
+  }
+}
+
+std::string flat(std::string name) {
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
+void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& field,
+                std::vector<VideoStream>& videos) {
+  const SensorSpec& spec = field.spec;
+  const bool rgb = spec.storage == Storage::kRgbVideo;
+  const bool right =
+      rgb ? spec.dtype == DType::kUint8 && spec.shape.rank() == 3 && spec.shape[2] == 3
+          : spec.dtype == DType::kFloat32 && spec.shape.rank() == 2;
+  if (!right || spec.shape.size() == 0) {
+    throw ValueError(fmt::format("sensor '{}': stream '{}' is {}{}, but {} is {}", sensor.name(),
+                                 spec.name, dtype_name(spec.dtype), spec.shape.str(),
+                                 rgb ? "an RGB video" : "a depth video",
+                                 rgb ? "uint8 (height, width, 3)" : "float32 (height, width)"));
+  }
+  VideoStream video{&sensor,
+                    &field,
+                    rgb ? VideoKind::kRgb : VideoKind::kDepth16,
+                    flat(spec.name),
+                    flat(spec.name),
+                    rgb ? ".mp4" : ".mkv",
+                    static_cast<int>(spec.shape[1]),
+                    static_cast<int>(spec.shape[0])};
+  if (!rgb && cfg.video.molmospaces_depth) {
+    // MolmoSpaces' loaders expect their encoding under the camera's depth name; mjsense's lossless
+    // video is stored in addition to it.
+    VideoStream lossy = video;
+    lossy.kind = VideoKind::kDepthRedGreen;
+    lossy.extension = ".mp4";
+    videos.push_back(lossy);
+    video.key += "_16bit";
+  }
+  videos.push_back(video);
+}
+
+// The field "present/mug" that belongs to the float field "actors/mug" of the same sensor, or null.
+const Field* presence_of(const Sensor& sensor, const Field& field) {
+  constexpr std::string_view kActors = "actors/";
+  if (!field.name.starts_with(kActors) || field.spec.dtype != DType::kFloat32) return nullptr;
+  const std::string flag = "present/" + field.name.substr(kActors.size());
+  const auto found = std::ranges::find(sensor.fields(), flag, &Field::name);
+  return found != sensor.fields().end() && found->spec.dtype == DType::kBool ? &*found : nullptr;
+}
+
+// Two datasets cannot have the same path, and a dataset cannot be a group.
+void check_paths(const std::map<std::string, std::string>& owners) {
+  for (const auto& [path, owner] : owners) {
+    for (std::size_t slash = path.find('/'); slash != std::string::npos;
+         slash = path.find('/', slash + 1)) {
+      if (const auto above = owners.find(path.substr(0, slash)); above != owners.end()) {
+        throw ValueError(fmt::format("{} is stored as '{}', inside '{}' of {}; rename one of them",
+                                     owner, path, above->first, above->second));
+      }
+    }
+  }
+}
+
+std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
+                        const nlohmann::json& streams) {
+  nlohmann::json settings;
+  try {
+    settings = nlohmann::json::parse(cfg.settings);
+  } catch (const nlohmann::json::exception&) {
+    throw ValueError(fmt::format("recording: settings is not JSON text: {:.80}", cfg.settings));
+  }
+  nlohmann::json j{{"format", 1},
+                   {"house", cfg.house},
+                   {"episodes", cfg.episodes},
+                   {"batches", batches_of(cfg.episodes, cfg.batches).count},
+                   {"fps", cfg.fps.str()},
+                   {"gzip", cfg.gzip},
+                   {"streams", streams},
+                   {"settings", settings},
+                   {"versions", {{"mjsense", MJSENSE_VERSION}, {"mujoco", mj_versionString()}}}};
+  if (!cfg.archive_name.empty()) j["model_archive"] = cfg.archive_name;
+  if (cfg.model) j["model"] = model_checksums(*cfg.model);
+  if (!plan.videos.empty()) {
+    const VideoCfg& v = cfg.video;
+    j["video"] = {{"crf", v.crf},
+                  {"preset", v.preset},
+                  {"keyint", v.keyint},
+                  {"threads", v.threads},
+                  {"depth_unit", v.depth_unit},
+                  {"molmospaces_depth", v.molmospaces_depth}};
+  }
+  return j.dump();
+}
+
+}  // namespace
+
+Fps Fps::from_period_ms(std::int64_t policy_dt_ms) {
+  if (policy_dt_ms <= 0)
+    throw ValueError(fmt::format("policy_dt_ms is {}, expected a positive number", policy_dt_ms));
+  const std::int64_t common = std::gcd<std::int64_t>(1000, policy_dt_ms);
+  return {1000 / common, policy_dt_ms / common};
+}
+
+std::string Fps::str() const {
+  return den == 1 ? fmt::format("{}", num) : fmt::format("{}/{}", num, den);
+}
+
+std::size_t VideoStream::frame_bytes() const {
+  if (kind == VideoKind::kRgb) return yuv420_bytes(width, height);
+  return static_cast<std::size_t>(width) * height * (kind == VideoKind::kDepth16 ? 2 : 3);
+}
+
+std::int64_t chunk_rows(std::size_t row_bytes) {
+  return std::clamp<std::int64_t>(
+      static_cast<std::int64_t>(kChunkBytes / std::max<std::size_t>(1, row_bytes)), 1,
+      kMaxChunkRows);
+}
+
+std::string_view ArrayStream::kind() const { return text ? "json" : sensor->kind(); }
+
+std::size_t ArrayStream::row_bytes() const { return spec.shape.size() * dtype_size(spec.dtype); }
+
+std::size_t ArrayStream::kept_bytes() const { return text ? text->row_bytes() : row_bytes(); }
+
+RecordingPlan plan_recording(const RecordingCfg& cfg) {
+  RecordingPlan plan;
+  nlohmann::json streams = nlohmann::json::array();  // in the order of the suite
+  std::map<std::string, std::string> owners;         // path -> "sensor 'x'"
+  const auto claim = [&](const std::string& path, const std::string& owner) {
+    const auto [at, fresh] = owners.emplace(path, owner);
+    if (!fresh)
+      throw ValueError(fmt::format("{} and {} would both be stored as '{}'; rename one of them",
+                                   at->second, owner, path));
+  };
+  for (const char* own : kOwnPaths) claim(own, "the recorder");
+  for (const char* group : standard_groups()) claim(group, "the layout");
+  for (const Sensor* sensor : cfg.sensors) {
+    if (sensor == nullptr) throw ValueError("recording: a sensor of the suite is null");
+    if (sensor->fields().empty()) {
+      throw ValueError(
+          fmt::format("sensor '{}' has no fields: initialize it before recording", sensor->name()));
+    }
+    const std::string owner = fmt::format("sensor '{}'", sensor->name());
+    const auto add_array = [&](ArrayStream stream) {
+      stream.sensor = sensor;
+      stream.path = path_of(stream.spec.name);
+      stream.chunk_rows = chunk_rows(stream.row_bytes());
+      stream.shuffled = stream.path.starts_with(kReplayGroup);
+      claim(stream.path, owner);
+      plan.arrays.push_back(std::move(stream));
+    };
+    const auto note = [&](const SensorSpec& spec) {
+      check_path(sensor->name(), spec.name);
+      streams.push_back(
+          fmt::format("{} {}{}", spec.name, dtype_name(spec.dtype), spec.shape.str()));
+    };
+    for (const Field& field : sensor->fields()) {
+      if (field.data.shape().rank() == 0 || field.data.shape()[0] < cfg.num_worlds) {
+        throw ValueError(
+            fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {} worlds",
+                        sensor->name(), field.spec.name, field.data.shape().str(), cfg.num_worlds));
+      }
+    }
+    if (const auto text = text_of(*sensor)) {
+      note(*text);
+      add_array({.spec = *text, .text = std::make_shared<JsonRows>(*sensor, text->str_max_len)});
+      continue;
+    }
+    for (const Field& field : sensor->fields()) {
+      note(field.spec);
+      if (field.spec.storage == Storage::kArray) {
+        add_array({.spec = field.spec, .field = &field, .present = presence_of(*sensor, field)});
+      } else {
+        const std::size_t first = plan.videos.size();
+        add_videos(cfg, *sensor, field, plan.videos);
+        for (std::size_t i = first; i < plan.videos.size(); ++i)
+          claim("obs/sensor_data/" + plan.videos[i].key, owner);
+      }
+    }
+  }
+  for (const char* group : standard_groups()) owners.erase(group);
+  check_paths(owners);
+  plan.fingerprint = fingerprint(cfg, plan, streams);
+  return plan;
+}
+
+Batches batches_of(int episodes, int batches) {
+  if (episodes <= 0)
+    throw ValueError(fmt::format("recording: episodes is {}, expected at least 1", episodes));
+  if (batches < 0 || batches > episodes) {
+    throw ValueError(fmt::format(
+        "recording: {} batches for {} episodes, expected 1 to {} (0: about 4 episodes each)",
+        batches, episodes, episodes));
+  }
+  if (batches == 0)
+    batches = std::max(
+        // Like Python's round(): half to even.
+        1, static_cast<int>(std::nearbyint(episodes / 4.0)));
+  return {episodes, batches};
+}
+
+std::int64_t Batches::first(int batch) const {
+  return std::int64_t{batch} * (episodes / count) + std::min(batch, episodes % count);
+}
+
+std::vector<int> batch_sizes(int episodes, int batches) {
+  const Batches all = batches_of(episodes, batches);
+  std::vector<int> sizes;
+  for (int b = 0; b < all.count; ++b) sizes.push_back(all.size(b));
+  return sizes;
+}
+
+std::string batch_file(int batch, int batches) {
+  return fmt::format("trajectories_batch_{}_of_{}.h5", batch + 1, batches);
+}
+
+std::string video_file(std::string_view stem, std::string_view extension, int index, int batch,
+                       int batches) {
+  return fmt::format("episode_{:08d}_{}_batch_{}_of_{}{}", index, stem, batch + 1, batches,
+                     extension);
+}
+
+std::string video_file(const VideoStream& video, int index, int batch, int batches) {
+  return video_file(video.stem, video.extension, index, batch, batches);
+}
+
+std::string spec_json(std::string_view sensor, std::string_view kind, const SensorSpec& spec) {
+  constexpr const char* kStorage[] = {"array", "rgb_video", "depth_video"};
+  nlohmann::json j{
+      {"name", spec.name},
+      {"sensor", sensor},
+      {"kind", kind},
+      {"dtype", dtype_name(spec.dtype)},
+      {"shape", std::vector<std::int64_t>(spec.shape.dims().begin(), spec.shape.dims().end())},
+      {"is_dict", spec.is_dict},
+      {"storage", kStorage[static_cast<int>(spec.storage)]}};
+  if (std::isfinite(spec.low)) j["low"] = spec.low;
+  if (std::isfinite(spec.high)) j["high"] = spec.high;
+  if (spec.is_dict) j["str_max_len"] = spec.str_max_len;
+  return j.dump();
+}
+
+std::string fingerprint_difference(const std::string& was, const std::string& now) {
+  if (was == now) return "";
+  const nlohmann::json a = parse_description(was), b = parse_description(now);
+  if (!a.is_object() || !b.is_object()) return "its description cannot be read";
+  const nlohmann::json difference = nlohmann::json::diff(a, b);
+  if (difference.empty()) return "";
+  // A changed setting may also have changed the model and the streams, so it is reported first.
+  constexpr std::string_view kConsequences[] = {"/model", "/streams"};
+  const auto is_consequence = [&](const nlohmann::json& change) {
+    const auto& path = change["path"].get_ref<const std::string&>();
+    return std::ranges::any_of(kConsequences, [&](auto start) { return path.starts_with(start); });
+  };
+  const auto named = std::ranges::find_if_not(difference, is_consequence);
+  const nlohmann::json::json_pointer at(
+      (named == difference.end() ? difference.front() : *named)["path"].get<std::string>());
+  const auto text = [&](const nlohmann::json& j) {
+    return j.contains(at) ? j[at].dump() : std::string("absent");
+  };
+  return fmt::format("'{}' was {:.100} and is now {:.100}", at.to_string().substr(1), text(a),
+                     text(b));
+}
+
+}  // namespace mjsense

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shell of a room: floor, ceiling, walls, skirting boards, lamp and window.
+#include <fmt/format.h>
+
+#include "mjsense/scenes/generators/room_writer.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kWall = 0.1;  // m thick
+constexpr double kSkirtingHigh = 0.09, kSkirtingThick = 0.012;
+
+void skirting(RoomWriter& room, const ShellCfg& s, Vec3 middle, Vec3 half) {
+  room.box("", s.skirting, middle, half, "contype=\"0\" conaffinity=\"0\"");
+}
+
+// The wall at y1 with a window: four pieces around the opening, frame, sill, and the sky behind it.
+void window_wall(RoomWriter& room, const ShellCfg& s) {
+  const double left = s.window_x - s.window_wide / 2, right = s.window_x + s.window_wide / 2;
+  const double top = s.sill + s.window_high, y = s.y1;
+  const auto piece = [&](const char* name, double x0, double x1, double z0, double z1) {
+    room.slab(name, s.wall, Facing::kMinusY, {(x0 + x1) / 2, y, (z0 + z1) / 2}, x1 - x0, z1 - z0,
+              kWall);
+  };
+  piece("wall_y1", s.x0, left, 0, s.height);
+  piece("wall_y1_right", right, s.x1, 0, s.height);
+  piece("wall_y1_below", left, right, 0, s.sill);
+  piece("wall_y1_above", left, right, top, s.height);
+  const double bar = 0.025, depth = 0.03, at = y + 0.05;
+  const Vec3 middle{s.window_x, at, s.sill + s.window_high / 2};
+  for (int side = -1; side <= 1; ++side) {
+    room.box("", s.skirting, middle + Vec3{side * (s.window_wide / 2 - bar), 0, 0},
+             {bar, depth, s.window_high / 2});
+    if (side == 0) continue;
+    room.box("", s.skirting, middle + Vec3{0, 0, side * (s.window_high / 2 - bar)},
+             {s.window_wide / 2, depth, bar});
+  }
+  room.box("window_sill", s.skirting, {s.window_x, y - 0.06, s.sill - 0.015},
+           {s.window_wide / 2 + 0.05, 0.08, 0.015});
+}
+
+}  // namespace
+
+void write_shell(RoomWriter& room, const ShellCfg& s) {
+  const double x = (s.x0 + s.x1) / 2, y = (s.y0 + s.y1) / 2, wide = s.x1 - s.x0, deep = s.y1 - s.y0;
+  room.add(
+      fmt::format("<geom name=\"floor\" type=\"plane\" pos=\"{} {} 0\" size=\"{} {} 0.1\" "
+                  "material=\"{}\" contype=\"0\" conaffinity=\"3\"/>",
+                  x, y, wide / 2 + kWall, deep / 2 + kWall, s.floor));
+  room.slab("ceiling", s.ceiling, Facing::kDown, {x, y, s.height}, wide, deep, kWall);
+  const double mid = s.height / 2;
+  room.slab("wall_x0", s.wall, Facing::kPlusX, {s.x0, y, mid}, deep, s.height, kWall);
+  room.slab("wall_x1", s.wall, Facing::kMinusX, {s.x1, y, mid}, deep, s.height, kWall);
+  room.slab("wall_y0", s.wall, Facing::kPlusY, {x, s.y0, mid}, wide, s.height, kWall);
+  if (s.window_wide > 0) {
+    window_wall(room, s);
+  } else {
+    room.slab("wall_y1", s.wall, Facing::kMinusY, {x, s.y1, mid}, wide, s.height, kWall);
+  }
+  const double t = kSkirtingThick / 2, h = kSkirtingHigh / 2;
+  skirting(room, s, {s.x0 + t, y, h}, {t, deep / 2, h});
+  skirting(room, s, {s.x1 - t, y, h}, {t, deep / 2, h});
+  skirting(room, s, {x, s.y0 + t, h}, {wide / 2, t, h});
+  skirting(room, s, {x, s.y1 - t, h}, {wide / 2, t, h});
+
+  // The lamp below the ceiling casts shadows. Daylight from the window casts none, like light from
+  // a whole sky.
+  room.box("", "lamp_glass", {x, y, s.height - 0.02}, {0.22, 0.22, 0.02},
+           "contype=\"0\" conaffinity=\"0\"");
+  room.add(
+      fmt::format("<light name=\"lamp\" type=\"point\" pos=\"{} {} {}\" diffuse=\"0.52 0.50 "
+                  "0.47\" specular=\"0.25 0.25 0.25\" attenuation=\"1 0 0\" castshadow=\"true\"/>",
+                  x, y, s.height - 0.16));
+  const double window = s.window_wide > 0 ? s.window_x : x;
+  room.add(
+      fmt::format("<light name=\"daylight\" type=\"point\" pos=\"{} {} {}\" diffuse=\"0.30 0.32 "
+                  "0.35\" specular=\"0.1 0.1 0.1\" attenuation=\"1 0 0\" castshadow=\"false\"/>",
+                  window, s.y1 - 0.15, s.sill + 0.6));
+}
+
+}  // namespace mjsense
