@@ -8,7 +8,7 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, cast
 
-from mjsense import _core, _mujoco
+from mjsense import _core, _mujoco, _spec
 from mjsense._arguments import KnownAttributes
 
 if TYPE_CHECKING:
@@ -65,6 +65,8 @@ class EntityCfg(Config):
 class SceneFileCfg(Config):
     name: str
     models: Callable[[], Any] | None
+    _mjs_scene: Callable[[], tuple[Any, ...]]
+    """Called by C++ if there are ``models``. Set when the scene is used, see ``_parts.scene_of``."""
 
     def __post_init__(self) -> None:
         if not (self.models is None or callable(self.models)):
@@ -72,12 +74,6 @@ class SceneFileCfg(Config):
                 f"SceneFileCfg '{self.name}': models must be a function that makes a mjsense.SceneCfg, not {self.models!r}"
             )
         super().__post_init__()
-
-    def _mjs_scene(self) -> tuple[Any, ...]:
-        from mjsense.scene import prepared
-
-        assert self.models is not None
-        return prepared(self.models(), "models()")
 
 
 class SceneCfg(Config):
@@ -108,7 +104,7 @@ class SceneCfg(Config):
 
     def _base_spec(self) -> Any:
         """The spec in which the scene is built."""
-        return _mujoco.new_spec(None if self.base is None else str(self.base))
+        return _spec.new_spec(None if self.base is None else str(self.base))
 
 
 class SensorCfg(Config):

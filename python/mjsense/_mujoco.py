@@ -135,18 +135,6 @@ def source_of(spec: mujoco.MjSpec) -> tuple[str, Any]:
     return "xml", copy.to_xml()
 
 
-def new_spec(base: str | None) -> Any:
-    """An empty spec, or that of XML text or of a file."""
-    if _libmujoco.shared is None:
-        from mjsense._spec import MjSpecView
-
-        return MjSpecView(_core.Spec(base))
-    spec = _libmujoco.shared.MjSpec
-    if base is None:
-        return spec()
-    return spec.from_string(base) if base.lstrip().startswith("<") else spec.from_file(base)
-
-
 class _Memory:
     """Memory that NumPy arrays share; keeps its owner alive."""
 

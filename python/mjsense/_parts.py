@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from mjsense._members import member
 from mjsense.configs import SceneCfg, SceneFileCfg
 from mjsense.policy import Policy, policy_of
 from mjsense.robot import Robot, robot_of
+from mjsense.scene import prepared
 from mjsense.task import Task, task_of
 
 Tasks = str | Task | type[Task] | Callable[[], Task]
@@ -98,4 +100,6 @@ def scene_of(scene: Scenes) -> tuple[str, SceneFileCfg | None]:
         return str(scene), None
     if not isinstance(scene, SceneFileCfg):
         scene = SceneFileCfg(name=getattr(scene, "__name__", type(scene).__name__).strip("<>"), models=scene)
+    if scene.models is not None:
+        scene._mjs_scene = partial(prepared, scene.models, "models()")
     return scene.name, scene

@@ -171,3 +171,13 @@ class MjSpecView(_Owner):
     def delete(self, element: MjsView) -> None:
         """Removes an element."""
         _core.spec_delete(self._address, element._element)
+
+
+def new_spec(base: str | None) -> Any:
+    """An empty spec, or that of XML text or of a file."""
+    if _libmujoco.shared is None:
+        return MjSpecView(_core.Spec(base))
+    spec = _libmujoco.shared.MjSpec
+    if base is None:
+        return spec()
+    return spec.from_string(base) if base.lstrip().startswith("<") else spec.from_file(base)

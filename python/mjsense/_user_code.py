@@ -7,12 +7,9 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from mjsense.sensor import Sensor
 
 
 class SensorError(RuntimeError):
@@ -87,9 +84,9 @@ class Dice:
 class named:
     """Adds the sensor, world and method to errors of user code and keeps the traceback."""
 
-    def __init__(self, sensor: Sensor, method: str, world: int | None = None) -> None:
+    def __init__(self, uuid: str, method: str, world: int | None = None) -> None:
         world_text = "" if world is None else f", world {world}"
-        self.context = f"sensor '{sensor.uuid}'{world_text}: {method}()"
+        self.context = f"sensor '{uuid}'{world_text}: {method}()"
 
     def __enter__(self) -> None: ...
 

@@ -257,9 +257,10 @@ class Scene(KnownAttributes):
         return self._core.tile_origins()
 
 
-def prepared(cfg: Any, context: str) -> tuple[Any, ...]:
-    """Arguments from which C++ builds the scene of a rollout: the configuration, its spec, its sensors, the final edit, and the
-    Scene."""
+def prepared(make: Callable[[], Any], context: str) -> tuple[Any, ...]:
+    """Arguments from which C++ builds the scene of a rollout: the configuration that ``make`` returns, its spec, its sensors, the
+    final edit, and the Scene."""
+    cfg = make()
     if not isinstance(cfg, SceneCfg):
         raise TypeError(f"{context} must return a mjsense.SceneCfg, not {cfg!r}")
     scene: Scene = Scene.__new__(Scene)

@@ -257,7 +257,7 @@ class Sensor(Generic[T]):
         if function is None:
             return
         wanted = len(required(function))
-        with named(self, method):
+        with named(self.uuid, method):
             if method == "edit_spec" and wanted == 2:
                 function(first, owner._entities_of_spec())
             elif method == "initialize" and wanted == 4:
@@ -273,13 +273,13 @@ class Sensor(Generic[T]):
                     self._mjs_faults.pop(world, None)
                     dice.seed(world)
                     try:
-                        with named(self, "reset", world):
+                        with named(self.uuid, "reset", world):
                             if reset is not None:
                                 reset()
                     except SensorError as error:
                         self._mjs_faults[world] = error
             return
-        with named(self, "reset"):
+        with named(self.uuid, "reset"):
             if not takes(self.reset, 1):
                 self.reset()
             else:
@@ -288,7 +288,7 @@ class Sensor(Generic[T]):
     def _mjs_draw(self, shapes: DebugShapes) -> None:
         if not _overrides(self, "debug_vis"):
             raise ValueError(f"sensor '{self.uuid}' has nothing to draw: write debug_vis(visualizer)")
-        with named(self, "debug_vis"):
+        with named(self.uuid, "debug_vis"):
             (self._mjs_instances[shapes.env_idx] if self._mjs_instances else self).debug_vis(shapes)
 
     def _mjs_updates(self) -> bool:
@@ -299,7 +299,7 @@ class Sensor(Generic[T]):
         if self._mjs_sim_ref is None:
             return []
         if self._mjs_instances is None or self._mjs_is_shared():
-            with named(self, "update"):
+            with named(self.uuid, "update"):
                 self._mjs_original().update(*((dt, world_ids) if takes(self._mjs_original().update, 2) else (dt,)))
             return []
         faults = []
@@ -308,7 +308,7 @@ class Sensor(Generic[T]):
                 env.current_batch_index = world
                 dice.seed(world)
                 try:
-                    with named(self, "update", world):
+                    with named(self.uuid, "update", world):
                         self._mjs_instances[world].update(dt)
                 except SensorError as error:
                     faults.append((world, error))
@@ -338,7 +338,7 @@ class Sensor(Generic[T]):
                 try:
                     if world in self._mjs_faults:
                         raise self._mjs_faults.pop(world)
-                    with named(self, "get_observation", world):
+                    with named(self.uuid, "get_observation", world):
                         value = observe(self._mjs_instances[world], env, env.task, world)
                         self._mjs_put(world, value)
                 except SensorError as error:
@@ -365,7 +365,7 @@ class Sensor(Generic[T]):
 
     def _mjs_compute_batch(self, world_ids: list[int]) -> list[tuple[int, SensorError]]:
         sim = self.simulation
-        with named(self, "compute"):
+        with named(self.uuid, "compute"):
             some = takes(self.compute, 2)
             compute: Any = self.compute
             value = compute(sim, list(world_ids)) if some else compute(sim)
@@ -391,7 +391,7 @@ class Sensor(Generic[T]):
         faults = []
         for world in world_ids:
             try:
-                with named(self, "compute", world):
+                with named(self.uuid, "compute", world):
                     self._mjs_write_json(world, values[of.index(world)])
             except SensorError as error:
                 faults.append((world, error))
@@ -492,7 +492,7 @@ class ForeignSensor(Sensor):
     def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
         if not self._mjs_is_shared():
             return super()._mjs_reset(world_ids, seeds)
-        with named(self, "reset"):
+        with named(self.uuid, "reset"):
             self.original.reset(world_ids)
 
     def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:

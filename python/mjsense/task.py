@@ -12,6 +12,7 @@ import numpy as np
 from mjsense import _core, _gymnasium, _mujoco
 from mjsense._arguments import checked
 from mjsense.errors import UnknownNameError
+from mjsense.scene import prepared
 
 if TYPE_CHECKING:
     import mujoco
@@ -162,9 +163,7 @@ class Task:
         }
 
     def _mjs_scene(self) -> tuple[Any, ...]:
-        from mjsense.scene import prepared
-
-        return prepared(self.scene(), "scene()")
+        return prepared(self.scene, "scene()")
 
     def _mjs_bind(self, sim: Simulation, layout: list[tuple[str, list[float], list[float]]]) -> None:
         taken = getattr(self, "sim", None)
