@@ -276,6 +276,7 @@ def test_flags_say_what_they_do(mjsense):
     (["record", "door"], ["door_opening"]),
     (["record", "--robot", "fra"], ["franka", "franka_hand"]),
     (["record", "--meshes", ""], ["auto", "shapes", "real"]),
+    (["scan", "--ray-alignment", ""], ["base", "yaw", "world"]),
     (["record", "pick", "--term"], ["--terminate-upon-success"]),
     (["record", "--out", ""], []),  # the shell completes file names
     (["inspect", ""], []),
