@@ -286,6 +286,14 @@ def test_completion(mjsense, words, expected):
     assert mjsense("complete", "--", *words).stdout.split() == expected
 
 
+@pytest.mark.parametrize("command", ("tasks", "robots", "scenes"))
+def test_lists_are_text_or_json(mjsense, command):
+    text, listed = mjsense(command).stdout, json.loads(mjsense(command, "--json").stdout)
+    assert len(listed) > 1 and not text.startswith("[")
+    for one in listed:
+        assert one["name"] in text and one["description"].split()[0] in text
+
+
 def test_completion_in_bash(mjsense):
     """As bash does it: the script is sourced, the function is called with the words, and leaves what it found in COMPREPLY."""
     script = '''source <("$1" completion bash); PATH="$2:$PATH"; COMP_WORDS=(mjsense record --policy p); COMP_CWORD=3; _mjsense
