@@ -225,7 +225,12 @@ def test_sensors_of_a_task(mjsense):
 def test_verify_inspect_repair(mjsense):
     mjsense("record", "pick", "--size", "64x48", "--horizon", 4, "--keep-failures", "-q", "--out", "data")
     assert json.loads(mjsense("verify", "data", "--json").stdout)
-    assert json.loads(mjsense("inspect", "data", "--json", "--sheet", "sheet.png").stdout)
+    inspected = json.loads(mjsense("inspect", "data", "--json", "--sheet", "sheet.png").stdout)
+    numbers = [stream for stream in inspected["streams"] if stream["count"]]
+    assert len(numbers) > 10 and any(stream["min"] < stream["mean"] < stream["max"] for stream in numbers)
+    for stream in numbers:
+        slack = 1e-9 * max(1, abs(stream["mean"]))
+        assert stream["min"] <= stream["mean"] + slack and stream["mean"] <= stream["max"] + slack, stream
     assert (mjsense.folder / "sheet.png").read_bytes().startswith(b"\x89PNG")
     mjsense("repair", "data")
     for wrong in (["--sheet", "no/x.png"], ["--sheet", "data"], ["--sheet", ""], ["--sheet", "x.png", "--ffmpeg", "/no/ffmpeg"],
