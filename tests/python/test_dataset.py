@@ -11,9 +11,9 @@ from fractions import Fraction
 import h5py
 import numpy as np
 import pytest
+from mjsense.dataset import video
 
 import mjsense as mjs
-from mjsense.dataset import video
 
 SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
 
@@ -201,7 +201,7 @@ def test_windows(root):
                              "obs/sensor_data/wrist_camera_is_pad", "actions/joint_pos/arm", "actions/joint_pos/arm_is_pad",
                              "actions/joint_pos/gripper", "actions/joint_pos/gripper_is_pad", "actions/joint_pos/given/arm",
                              "actions/joint_pos/given/gripper", "episode_index", "frame_index", "index", "timestamp", "task"}  # fmt: skip
-    with pytest.raises(ValueError, match=r"delta_timestamps\['rewards'\]: 0.1 s is no multiple of 1/fps = 0.066000 s"):
+    with pytest.raises(ValueError, match=r"delta_timestamps\['rewards'\]: 0.1 s is not a multiple of 1/fps = 0.066000 s"):
         mjs.Dataset(root, delta_timestamps={"rewards": [0.1]})
     assert mjs.Dataset(root, delta_timestamps={"rewards": [0.1]}, tolerance_s=0.04)[0]["rewards"].shape == (1,)
 
@@ -217,7 +217,7 @@ def test_filters_and_names(root, dataset):
     assert set(mjs.Dataset(root, streams=["obs/sensor_data/*_depth"]).streams) == {
         f"obs/sensor_data/{c}_depth" for c in ("wrist_camera", "exo_camera_1")
     }
-    with pytest.raises(IndexError, match="3 is not in .* which has 3 episodes"):
+    with pytest.raises(IndexError, match=r"3 is not in .* which has 3 episodes"):
         mjs.Dataset(root, episodes=[3])
     with pytest.raises(KeyError, match="No stream, group or pattern 'tcp_pose'; did you mean 'obs/extra/tcp_pose'"):
         mjs.Dataset(root, streams=["tcp_pose"])

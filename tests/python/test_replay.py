@@ -131,7 +131,7 @@ def test_without_data_for_replay(tmp_path):
     assert dataset[3]["obs/agent/qpos/arm"].shape == (7,) and len(dataset) == 6
     for use in (lambda: mjs.check_replay(dataset), lambda: dataset.episodes[0].states, lambda: dataset.episodes[0].model(),
                 lambda: next(mjs.replay(tmp_path))):  # fmt: skip
-        with pytest.raises(ValueError, match="has no data for replay. Record it again without --no-replay"):
+        with pytest.raises(ValueError, match=r"has no data for replay\. Record it again without --no-replay"):
             use()
 
 

@@ -275,6 +275,6 @@ def _steps(name: str, seconds: Sequence[float], fps: Fraction, tolerance_s: floa
     steps = [round(float(s) * float(fps)) for s in seconds]
     off = [s for s, n in zip(seconds, steps) if abs(float(s) - n / float(fps)) > tolerance_s]
     if off:
-        raise ValueError(f"delta_timestamps['{name}']: {off[0]} s is no multiple of 1/fps = {float(1 / fps):.6f} s within {tolerance_s} s; "
+        raise ValueError(f"delta_timestamps['{name}']: {off[0]} s is not a multiple of 1/fps = {float(1 / fps):.6f} s within {tolerance_s} s; "
                          f"use n / dataset.fps, such as {float(round(off[0] * float(fps)) / fps):.6f}")  # fmt: skip
     return steps

@@ -238,7 +238,7 @@ class Episode:
             elif _is_json(dataset):
                 for leaf, values in self._decode(name, dataset).items():
                     unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
-                    streams[leaf] = Stream(leaf, values.dtype, values.shape[1:], **{**about, "unit": unit}, kind="json")
+                    streams[leaf] = Stream(leaf, values.dtype, values.shape[1:], unit, about["frame"], about["description"], "json")
                     if mask := given_name(leaf):
                         streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
             else:

@@ -50,7 +50,7 @@ def inputs_of(episode: Episode) -> ReplayInputs:
                 f"{_where(episode)} has no data for replay. Record it again without --no-replay (replay=False); "
                 "recordings of versions without replay lack parts of the state."
             )
-        arrays = {name: group[name][:] if name in group else None for name in ("state", "written", "ctrl", "mocap", "held")}
+        arrays: dict[str, Any] = {name: group[name][:] if name in group else None for name in ("state", "written", "ctrl", "mocap", "held")}
     if arrays["held"] is None:
         arrays["held"] = np.zeros(0, np.int32)
     result = ReplayInputs(**arrays)

@@ -6,11 +6,11 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ _SKIP = 16  # frames that are decoded rather than skipped by a seek
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What is known of a video before it is opened."""
+    """Data of a video that the HDF5 file states."""
 
     path: Path
     frames: int
@@ -121,7 +121,7 @@ class FrameReader:
     def _decode_av(self, info: VideoInfo, index: int) -> Any:
         decoder = self._decoders.get(info.path, lambda: (_AvDecoder(info), 1))
         found = None
-        # Frames stay in the codec's format, which is half as large as rgb; only those that are asked for are converted.
+        # Frames stay in the codec's format, which is half as large as rgb; only requested ones are converted.
         for number, frame in decoder.frames_until(index):
             self._cache.add((info.path, number), frame, sum(plane.buffer_size for plane in frame.planes))
             found = frame if number == index else None
@@ -159,7 +159,7 @@ class FrameReader:
         return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
 
 
-class Video(Sequence[np.ndarray]):
+class Video:
     """Frames of one camera in one episode, decoded when they are indexed: ``video[3]``, ``video[-1]``, ``video[10:20]``.
 
     A frame is uint8 [H, W, 3] for rgb and float32 [H, W] in metres for depth; a slice has one more dimension in front.
@@ -192,10 +192,6 @@ class Video(Sequence[np.ndarray]):
     def __len__(self) -> int:
         return self._info.frames
 
-    @overload
-    def __getitem__(self, index: int) -> np.ndarray: ...
-    @overload
-    def __getitem__(self, index: slice) -> np.ndarray: ...
     def __getitem__(self, index: int | slice) -> np.ndarray:
         if isinstance(index, slice):
             frames = np.empty((len(range(*index.indices(len(self)))), *self._info.shape), self.dtype)
