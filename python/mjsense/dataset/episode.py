@@ -234,7 +234,7 @@ class Episode:
                 if name in videos:
                     info = videos[name]
                     dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
-                    streams[name] = Stream(name, dtype, info.shape, **about, kind="video")
+                    streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
             elif _is_json(dataset):
                 for leaf, values in self._decode(name, dataset).items():
                     unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
