@@ -228,9 +228,11 @@ def test_filters_and_names(root, dataset):
     assert "63 observations" in repr(dataset) and "obs/agent/qpos/arm: float64 [7] [rad or m]" in repr(dataset)
 
 
-def test_a_move_group_that_only_some_episodes_command(tmp_path, root):
-    """The first and the last episode define a sample; other leaves cause a warning, and are in the sample if they are named."""
+def test_a_move_group_that_only_some_episodes_command(tmp_path, root, monkeypatch):
+    """A few episodes define a sample; other leaves cause a warning, and are in the sample if they are named."""
     import shutil
+
+    from mjsense.dataset import dataset as module
 
     shutil.copytree(root / "house_0", tmp_path / "house_0")
     for i, path in enumerate(sorted((tmp_path / "house_0").glob("*.h5"))):
@@ -240,9 +242,13 @@ def test_a_move_group_that_only_some_episodes_command(tmp_path, root):
                 rows = file["traj_1/actions/joint_pos"]
                 row = b'{"arm":[0,0,0,0,0,0,0],"base":[1.5,2.5,3.5],"gripper":[1.0]}'
                 rows[4] = np.frombuffer(row.ljust(2000, b"\0"), np.uint8)
+    every = mjs.Dataset(tmp_path)
+    assert every[25]["actions/joint_pos/base"].tolist() == [1.5, 2.5, 3.5] and every[25]["actions/joint_pos/given/base"]
+    assert not every[0]["actions/joint_pos/given/base"] and every[0]["actions/joint_pos/base"].tolist() == [0, 0, 0]
+    monkeypatch.setattr(module, "_PROBED", 2)
     dataset = mjs.Dataset(tmp_path, streams=["actions/joint_pos"])
     assert "actions/joint_pos/base" not in dataset.streams
-    with pytest.warns(UserWarning, match="Episode 1 .* has actions/joint_pos/base, which the first and the last episode lack"):
+    with pytest.warns(UserWarning, match="Episode 1 .* has actions/joint_pos/base, which the first, the last and other"):
         dataset[25]
     named = mjs.Dataset(tmp_path, streams=["actions/joint_pos/base", "rewards"])
     assert named[25]["actions/joint_pos/base"].tolist() == [1.5, 2.5, 3.5] and named[0]["actions/joint_pos/base"].tolist() == [0, 0, 0]

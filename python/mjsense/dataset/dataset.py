@@ -20,6 +20,9 @@ from mjsense.dataset.files import entries_of
 from mjsense.errors import UnknownNameError
 
 
+_PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
+
+
 class Dataset:
     """Observations of a recording by number: ``len(dataset)``, ``dataset[i]``. See docs/datasets.md.
 
@@ -120,13 +123,13 @@ class Dataset:
             raise IndexError(f"index {index} is out of range: {self.root} has {len(self)} observations")
         episode, t = self._place(i)
         sample: dict[str, Any] = {}
-        arrays = episode.load(self._arrays)
+        arrays = episode._load(self._arrays)
         for name in self._arrays:
             rows, _ = self._rows(name, episode, t)
             sample[name] = self._values(name, arrays.get(name), rows)
         for name in self._large:
             rows, single = self._rows(name, episode, t)
-            values = episode.large_rows(name, rows if isinstance(rows, list) else [rows])
+            values = episode._large_rows(name, rows if isinstance(rows, list) else [rows])
             sample[name] = values[0] if single else values
         for name in self._videos:
             rows, single = self._rows(name, episode, t)
@@ -171,7 +174,7 @@ class Dataset:
         masks = {name: mask for name in arrays if (mask := given_name(name))}
         parts: dict[str, list[np.ndarray]] = {name: [] for name in arrays}
         for episode in self.episodes:
-            loaded = episode.load([*arrays, *masks.values()])
+            loaded = episode._load([*arrays, *masks.values()])
             for name in arrays:
                 if name in loaded:
                     parts[name].append(loaded[name][loaded[masks[name]]] if name in masks else loaded[name])
@@ -191,8 +194,7 @@ class Dataset:
         return first.fps
 
     def _expand_all(self, names: Iterable[str], known: dict[str, Stream]) -> list[str]:
-        """Streams that names, groups and patterns stand for. A name that the first and the last episode lack is looked up in all; ``known``
-        receives it."""
+        """Streams that names, groups and patterns stand for. An unknown name is looked up in all episodes; ``known`` receives it."""
         result: list[str] = []
         for name in names:
             try:
@@ -206,11 +208,14 @@ class Dataset:
         return result
 
     def _known_streams(self) -> dict[str, Stream]:
-        """Streams that all recordings have. JSON leaves are those of the first and the last episode of each recording."""
+        """Streams that all recordings have. JSON leaves are those of up to 16 episodes of each recording, the first and the last included."""
         groups: dict[int, list[Episode]] = {}
         for episode in self.episodes:
             groups.setdefault(episode._entry.recording, []).append(episode)
-        tables = [{**ends[-1].streams, **ends[0].streams} for ends in groups.values()]
+        tables: list[dict[str, Stream]] = []
+        for group in groups.values():
+            probed = np.unique(np.linspace(0, len(group) - 1, min(_PROBED, len(group))).astype(int))
+            tables.append({name: stream for k in reversed(probed) for name, stream in group[k].streams.items()})
         return {name: stream for name, stream in tables[0].items() if all(name in table for table in tables)}
 
     def _place(self, i: int) -> tuple[Episode, int]:

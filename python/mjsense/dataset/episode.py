@@ -177,14 +177,14 @@ class Episode:
         """All rows of a stream; of a group (``actions/joint_pos``, ``env_states/actors``) a dict of its streams."""
         if name.startswith(VIDEOS):
             return self.video(name)[:]
-        if found := self.load([name]):
+        if found := self._load([name]):
             return found[name].copy()
         inside = [stream for stream in self.streams if stream.startswith(f"{name}/")]
         if not inside:
-            raise self.unknown(name)
+            raise self._unknown(name)
         if any(self.streams[stream].kind == "video" for stream in inside):
             raise KeyError(f"'{name}' is the group of the videos; name one of {', '.join(inside)}")
-        return {stream[len(name) + 1 :]: values.copy() for stream, values in self.load(inside).items()}
+        return {stream[len(name) + 1 :]: values.copy() for stream, values in self._load(inside).items()}
 
     def video(self, camera: str) -> Video:
         """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
@@ -206,7 +206,7 @@ class Episode:
             text = file[self.trajectory]["obs_scene"][()] if "obs_scene" in file[self.trajectory] else b"{}"
         return json.loads(text_of(text)), 16 * len(text)
 
-    def unknown(self, name: str) -> UnknownNameError:
+    def _unknown(self, name: str) -> UnknownNameError:
         near = difflib.get_close_matches(name, [*self.streams, *{stream.rsplit("/", 1)[0] for stream in self.streams}], 3)
         hint = f"; similar: {', '.join(near)}" if near else ""
         return UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no stream '{name}'{hint}")
@@ -259,11 +259,11 @@ class Episode:
                 self._store.rows.add((self.index, mask), given, given.nbytes)
         if self._store.leaves is not None and (new := result.keys() - self._store.leaves):
             self._store.leaves |= new
-            warnings.warn(f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first and the last episode lack; samples "
-                          "contain only streams of those; name it in streams= to get it", stacklevel=2)  # fmt: skip
+            warnings.warn(f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first, the last and other examined episodes "
+                          "lack; samples leave it out unless streams= names it", stacklevel=2)  # fmt: skip
         return result
 
-    def load(self, names: list[str]) -> dict[str, np.ndarray]:
+    def _load(self, names: list[str]) -> dict[str, np.ndarray]:
         """Whole arrays of streams that are not videos. Streams that this episode does not have are left out."""
         cache, found = self._store.rows, {}
         for name in names:
@@ -292,7 +292,7 @@ class Episode:
                         cache.add((self.index, name), found[name], found[name].nbytes)
         return {name: found[name] for name in names if name in found}
 
-    def large_rows(self, name: str, rows: list[int]) -> np.ndarray:
+    def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:
         """Rows of a stream whose rows are too large to keep all of them."""
         with open_h5(self.path) as file:
             dataset = file[self.trajectory][name]
