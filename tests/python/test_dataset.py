@@ -327,3 +327,26 @@ def test_torch_loads_batches(root):
     dataset = mjs.Dataset(root, streams=["obs/sensor_data/wrist_camera", "obs/agent/qpos", "actions/joint_pos", "success"])
     batch = next(iter(data.DataLoader(dataset, batch_size=8, shuffle=True, num_workers=2)))
     assert batch["obs/agent/qpos/arm"].shape == (8, 7) and len(batch["task"]) == 8
+
+
+def test_files_without_attributes(tmp_path, root):
+    """As MolmoSpaces writes them: no attributes, no names of videos."""
+    import shutil
+
+    shutil.copytree(root / "house_10", tmp_path / "house_10")
+    with h5py.File(next(tmp_path.glob("house_10/*.h5")), "a") as file:
+
+        def strip(name, item):
+            for key in list(item.attrs):
+                del item.attrs[key]
+
+        strip("", file)
+        file.visititems(strip)
+        del file["traj_0/obs/sensor_data"], file["traj_0/replay"]
+    dataset = mjs.Dataset(tmp_path)
+    ours = mjs.Dataset(root, episodes=[2])
+    assert dataset.fps == ours.fps and dataset.episodes[0].outcome == "no success" and dataset.episodes[0].seed is None
+    assert dataset.streams.keys() == {n for n in ours.streams if not n.startswith("obs/sensor_data/")}
+    np.testing.assert_array_equal(dataset[5]["obs/agent/qpos/arm"], ours[5]["obs/agent/qpos/arm"])
+    with pytest.raises(KeyError, match="it has no videos"):
+        dataset.episodes[0].video("wrist_camera")

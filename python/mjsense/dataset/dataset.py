@@ -19,7 +19,6 @@ from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, g
 from mjsense.dataset.files import entries_of
 from mjsense.errors import UnknownNameError
 
-
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
 
 

@@ -242,7 +242,7 @@ class Episode:
                     if mask := given_name(leaf):
                         streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
             else:
-                streams[name] = Stream(name, dataset.dtype, dataset.shape[1:], **about)
+                streams[name] = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
 
         with open_h5(self.path) as file:
             file[self.trajectory].visititems(visit)
