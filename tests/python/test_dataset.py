@@ -217,7 +217,7 @@ def test_filters_and_names(root, dataset):
     assert set(mjs.Dataset(root, streams=["obs/sensor_data/*_depth"]).streams) == {
         f"obs/sensor_data/{c}_depth" for c in ("wrist_camera", "exo_camera_1")
     }
-    with pytest.raises(IndexError, match=r"3 is not in .* which has 3 episodes"):
+    with pytest.raises(ValueError, match=r"3 is not in .* which has 3 episodes"):
         mjs.Dataset(root, episodes=[3])
     with pytest.raises(KeyError, match="No stream, group or pattern 'tcp_pose'; did you mean 'obs/extra/tcp_pose'"):
         mjs.Dataset(root, streams=["tcp_pose"])

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._arguments import checked
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
 from mjsense.dataset.files import entries_of
@@ -22,6 +23,7 @@ from mjsense.errors import UnknownNameError
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
 
 
+@checked
 class Dataset:
     """Observations of a recording by number: ``len(dataset)``, ``dataset[i]``. See docs/datasets.md.
 
@@ -64,7 +66,7 @@ class Dataset:
         if episodes is not None:
             wanted = [int(i) for i in episodes]
             if wrong := [i for i in wanted if not 0 <= i < len(chosen)]:
-                raise IndexError(f"episodes: {wrong[0]} is not in {self.root}, which has {len(chosen)} episodes")
+                raise ValueError(f"episodes: {wrong[0]} is not in {self.root}, which has {len(chosen)} episodes")
             chosen = [chosen[i] for i in wanted]
         if outcome is not None:
             chosen = [episode for episode in chosen if _matches(episode.outcome, outcome)]
@@ -151,9 +153,12 @@ class Dataset:
     def index_of(self, episode: int, frame: int = 0) -> int:
         """Number of an observation: ``frame`` of the episode at position ``episode`` in the recording."""
         if episode not in self._position:
-            raise IndexError(f"episode {episode} is not in this data set")
+            raise ValueError(f"episode {episode} is not in this data set")
         k = self._position[episode]
-        return self._ends[k] - self.episodes[k].length + range(self.episodes[k].length)[frame]
+        length = self.episodes[k].length
+        if not -length <= frame < length:
+            raise ValueError(f"frame {frame} is not in episode {episode}, which has {length} observations")
+        return self._ends[k] - length + frame % length
 
     def stats(self, streams: Iterable[str] | None = None, *, frames: int = 200) -> dict[str, dict[str, np.ndarray]]:
         """min, max, mean, std, count, q01, q10, q50, q90 and q99 of each stream over all observations.
@@ -165,6 +170,8 @@ class Dataset:
             streams: Names, groups or patterns; by default the streams of this data set.
             frames: Maximum number of frames of each camera, evenly spaced; of a depth image at most about 20,000 pixels count.
         """
+        if frames < 1:
+            raise ValueError(f"frames is {frames}; it must be at least 1")
         if not self.episodes:
             return {}
         known = dict(self.streams) if streams is None else self._known_streams()

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
+from mjsense._arguments import checked
 from mjsense.dataset import json_rows, playback
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
@@ -85,6 +86,7 @@ class Store:
         """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
 
 
+@checked
 class Episode:
     """An episode of a recording: its attributes, whole arrays (``episode["obs/extra/tcp_pose"]``), videos, and replay."""
 
@@ -311,6 +313,8 @@ class Episode:
 
     def set_state(self, model: mujoco.MjModel, data: mujoco.MjData, t: int) -> None:
         """Sets ``data`` to the state at observation ``t`` and computes everything that depends on it. Does not step."""
+        if not -self.length <= t < self.length:
+            raise ValueError(f"t is {t}; episode {self.index} has {self.length} observations")
         playback.set_state(model, data, playback.inputs_of(self).state[t])
 
     def replay(

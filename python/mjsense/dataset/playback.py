@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import mujoco
 import numpy as np
 
+from mjsense._arguments import checked
 from mjsense.dataset.files import open_h5
 
 if TYPE_CHECKING:
@@ -171,6 +172,7 @@ def _dataset(root: str | Path | Dataset, episodes: Sequence[int] | None) -> Data
     return Dataset(root, episodes=episodes)
 
 
+@checked
 def replay(
     root: str | Path | Dataset, *, from_: Literal["states", "actions"] = "states", episodes: Sequence[int] | None = None
 ) -> Iterator[tuple[Episode, int, mujoco.MjData]]:
@@ -307,6 +309,7 @@ def check_episode(episode: Episode) -> EpisodeCheck:
     return EpisodeCheck(episode.index, episode.length - 1, **found)
 
 
+@checked
 def check_replay(root: str | Path | Dataset, *, episodes: Sequence[int] | None = None) -> ReplayReport:
     """Replays episodes in plain MuJoCo, stepwise from each recorded state and open loop from the first one, and compares all states bit
     for bit with the recorded ones. The report names the first deviation of each by step, part of the state, and joint, body or actuator.

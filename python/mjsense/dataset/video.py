@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._arguments import checked
 from mjsense.dataset.cache import Cache
 from mjsense.ffmpeg import use_installed_ffmpeg
 
@@ -159,6 +160,7 @@ class FrameReader:
         return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
 
 
+@checked
 class Video:
     """Frames of one camera in one episode, decoded when they are indexed: ``video[3]``, ``video[-1]``, ``video[10:20]``.
 
