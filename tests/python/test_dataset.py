@@ -139,21 +139,23 @@ def test_frames_are_those_of_ffmpeg(root, decoder):
         episode.video("wrist")
 
 
-def test_every_frame_of_a_long_video(tmp_path, decoder):
+@pytest.mark.parametrize("encoding", ["rgb", "depth16"])
+def test_every_frame_of_a_long_video(tmp_path, decoder, encoding):
     """Several key frames, B-frames, random order, and a cache that holds few frames."""
     from mjsense.dataset.cache import Cache
 
-    path = tmp_path / "long.mp4"
-    command = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=32x24:rate=500/33", "-frames:v", "400", "-c:v", "libx264", "-g", "90"]
-    subprocess.run([*command, "-bf", "3", "-pix_fmt", "yuv420p", path], check=True)
-    expected = decode(path, "rgb24", (24, 32, 3))
+    rgb = encoding == "rgb"
+    path = tmp_path / ("long.mp4" if rgb else "long.mkv")
+    codec = ["-c:v", "libx264", "-g", "90", "-bf", "3", "-pix_fmt", "yuv420p"] if rgb else ["-c:v", "ffv1", "-g", "1", "-pix_fmt", "gray16le"]
+    source = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=32x24:rate=500/33", "-frames:v", "400"]
+    subprocess.run([*source, *codec, path], check=True)
+    expected = decode(path, "rgb24", (24, 32, 3)) if rgb else decode(path, "gray16le", (24, 32)) * np.float32(0.0002)
     reader = video.FrameReader(Cache(150_000))
-    frames = mjs.Video(video.VideoInfo(path, 400, 32, 24, "rgb", 0, Fraction(500, 33)), reader)
-    indices = [*np.random.default_rng(0).permutation(400)[:16], 89, 90, 88, 179, 180, 399, 0, *range(200, 212)]
-    for t in indices:
+    frames = mjs.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
+    for t in [*np.random.default_rng(0).permutation(400)[:16], 89, 90, 88, 179, 180, 399, 0, *range(200, 212)]:
         np.testing.assert_array_equal(frames[int(t)], expected[t], err_msg=str(t))
     with pytest.raises(RuntimeError, match="has no frame 400"):
-        mjs.Video(video.VideoInfo(path, 401, 32, 24, "rgb", 0, Fraction(500, 33)), reader)[400]
+        mjs.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
 
 
 def test_lossless_depth_is_what_the_sensor_measured(tmp_path):

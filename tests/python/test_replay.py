@@ -78,6 +78,9 @@ def test_states_and_actions(pick):
     data = mujoco.MjData(model)
     episode.set_state(model, data, 7)
     np.testing.assert_array_equal(data.xpos, tool["states"][7])
+    state = np.empty(episode.states.shape[1])
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    np.testing.assert_array_equal(state, episode.states[7])
     assert next(episode.replay(model=model, data=data))[1] is data
     with pytest.raises(ValueError, match="from_ is 'ctrl'; it must be 'states' or 'actions'"):
         episode.replay("ctrl")

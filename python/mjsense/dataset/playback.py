@@ -99,7 +99,6 @@ def model_of(episode: Episode) -> mujoco.MjModel:
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray) -> None:
     mujoco.mj_setState(model, data, state, _STATE)
     mujoco.mj_forward(model, data)
-    mujoco.mj_setState(model, data, state, _STATE)  # mj_forward overwrites the solver's warm start
 
 
 def _get_state(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

@@ -69,30 +69,17 @@ class _AvDecoder:
         self._frames = self._container.decode(self._stream)
         self._next = 0
 
-    def _seek(self, index: int) -> None:
-        self._container.seek(round(index / self._fps / self._stream.time_base), stream=self._stream)
-        self._frames = self._container.decode(self._stream)
-        self._next = -1
-
     def frames_until(self, index: int) -> Iterator[tuple[int, Any]]:
         """Decoded frames up to the frame ``index``, with their numbers: from the current position or from the key frame before it."""
-        back = None if self._next <= index < self._next + _SKIP else 0
-        while True:
-            if back is not None:
-                self._seek(max(0, index - back))
-            for frame in self._frames:
-                number = round(frame.pts * self._stream.time_base * self._fps)
-                if self._next < 0 and number > index:
-                    break  # containers are indexed by decoding time, so that a seek can end at a later key frame
-                self._next = number + 1
-                yield number, frame
-                if number >= index:
-                    return
-            else:
+        if not self._next <= index < self._next + _SKIP:
+            self._container.seek(round(index / self._fps / self._stream.time_base), stream=self._stream)
+            self._frames = self._container.decode(self._stream)
+        for frame in self._frames:
+            number = round(frame.pts * self._stream.time_base * self._fps)
+            self._next = number + 1
+            yield number, frame
+            if number >= index:
                 return
-            if back is None or back >= index:
-                return
-            back = 2 * back + _SKIP
 
 
 def _have_av() -> bool:
