@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import mujoco
 import numpy as np
 
 from mjsense._arguments import checked
@@ -21,6 +20,9 @@ from mjsense.dataset.cache import Cache
 from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
 from mjsense.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    import mujoco
 
 VIDEOS = "obs/sensor_data/"
 REPLAY = "replay/"

@@ -10,17 +10,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import mujoco
 import numpy as np
 
+from mjsense import _libmujoco
 from mjsense._arguments import checked
 from mjsense.dataset.files import open_h5
 
 if TYPE_CHECKING:
+    import mujoco
+
     from mjsense.dataset.dataset import Dataset
     from mjsense.dataset.episode import Episode
+else:
+    mujoco = _libmujoco.shared
 
-_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if _libmujoco.shared else 0
 _MODEL_FILE = "model.xml"
 
 
@@ -59,6 +63,11 @@ def inputs_of(episode: Episode) -> ReplayInputs:
     return result
 
 
+def _require_mujoco() -> None:
+    if _libmujoco.shared is None:
+        raise RuntimeError(f"replay needs the series of MuJoCo that mjsense records with: {_libmujoco.explain()}")
+
+
 def _archived_model(episode: Episode) -> mujoco.MjModel:
     name = episode._recording.get("model_archive")
     if not name:
@@ -81,6 +90,7 @@ def _archived_model(episode: Episode) -> mujoco.MjModel:
 
 
 def model_of(episode: Episode) -> mujoco.MjModel:
+    _require_mujoco()
     model = copy.deepcopy(_archived_model(episode))
     with open_h5(episode.path) as file:
         for name, dataset in file[episode.trajectory].get("replay/model", {}).items():
@@ -97,6 +107,7 @@ def model_of(episode: Episode) -> mujoco.MjModel:
 
 
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray) -> None:
+    _require_mujoco()
     mujoco.mj_setState(model, data, state, _STATE)
     mujoco.mj_forward(model, data)
 
