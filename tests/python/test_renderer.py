@@ -260,6 +260,16 @@ def test_decoration_geoms_are_drawn_and_not_segmented():
         np.testing.assert_array_equal(after["segmentation"], before["segmentation"])
 
 
+def test_a_negative_alpha_hides_a_site():
+    model, data = load(SHAPES)
+    visible = image_of(model, data, "view")
+    model.site_rgba[:, 3] = 0
+    hidden = image_of(model, data, "view")
+    assert (visible != hidden).any()
+    model.site_rgba[:, 3] = -0.5
+    np.testing.assert_array_equal(image_of(model, data, "view"), hidden)
+
+
 def test_groups_and_free_and_tracking_cameras():
     model, data = load(SHAPES)
     option = mujoco.MjvOption()
