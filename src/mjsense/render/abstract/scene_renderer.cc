@@ -146,7 +146,7 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
           "geom {} of the scene (object type {}, id {}) has a label, and labels are not "
           "drawn; remove it, or set scene_option.label to mjLABEL_NONE",
           i, geom.objtype, geom.objid));
-    add(geom, scene);
+    add(geom, scene, all);
   }
   // A segment belongs to the last geom that has its id, which matters for decoration geoms that
   // users add without an id of their own.
@@ -157,7 +157,7 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
   }
 }
 
-void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
+void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool colored) {
   DrawnGeom out{};
   std::copy_n(geom.rgba, 4, out.rgba);
   out.rgba[3] = std::max(out.rgba[3], 0.0f);  // some programs hide elements with a negative alpha
@@ -179,7 +179,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
       std::copy_n(model_->mat_texrepeat + 2 * geom.matid, 2, out.material.repeat);
       out.material.uniform = model_->mat_texuniform[geom.matid] != 0;
     }
-    out.texture = assets_.texture(texture);
+    if (colored) out.texture = assets_.texture(texture);
   }
   RayGeom& shape = out.shape;
   shape.type = geom.type;

@@ -68,7 +68,7 @@ class SceneRenderer {
   struct Decoration;
 
   void read(const SceneMemory& scene, bool all);
-  void add(const AbstractGeom& geom, const SceneMemory& scene);
+  void add(const AbstractGeom& geom, const SceneMemory& scene, bool colored);
   void add_triangles(DrawnGeom drawn, ShapeTriangles triangles);
   void add_lines(const AbstractGeom& geom, DrawnGeom drawn);
   void add_flex(const AbstractGeom& geom, DrawnGeom drawn, const SceneMemory& scene);
