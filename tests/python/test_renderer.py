@@ -262,6 +262,7 @@ def test_decoration_geoms_are_drawn_and_not_segmented():
 
 def test_a_negative_alpha_hides_a_site():
     model, data = load(SHAPES)
+    model.light_castshadow[:] = 0  # hidden sites cast shadows
     visible = image_of(model, data, "view")
     model.site_rgba[:, 3] = 0
     hidden = image_of(model, data, "view")

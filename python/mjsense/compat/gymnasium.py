@@ -89,6 +89,7 @@ def use(env: Any) -> Any:
             return get_viewer(render_mode)
         viewer = renderer._viewers.get("mjsense")
         if viewer is None:
+            assert renderer.width is not None and renderer.height is not None
             viewer = Viewer(renderer.model, renderer.data, renderer.width, renderer.height, renderer.max_geom, renderer._vopt)
             renderer.viewer = renderer._viewers["mjsense"] = viewer
             renderer._set_cam_config()

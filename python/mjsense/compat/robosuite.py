@@ -13,7 +13,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import robosuite.environments.base as base
+import robosuite.environments.base as base  # pyright: ignore[reportMissingImports]
 
 from mjsense.compat._opengl import depth_buffer
 from mjsense.renderer import Renderer

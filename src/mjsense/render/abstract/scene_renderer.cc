@@ -140,7 +140,6 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
                       "finite",
                       i, geom.objtype, geom.objid));
     if (!all && geom.segid < 0) continue;
-    if (all && geom.rgba[3] <= 0 && geom.category == mjCAT_DECOR) continue;  // without a shadow
     if (all && geom.label)
       throw ValueError(fmt::format(
           "geom {} of the scene (object type {}, id {}) has a label, and labels are not "
@@ -160,7 +159,8 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
 void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool colored) {
   DrawnGeom out{};
   std::copy_n(geom.rgba, 4, out.rgba);
-  out.rgba[3] = std::max(out.rgba[3], 0.0f);  // some programs hide elements with a negative alpha
+  // Some programs hide elements with a negative alpha. Depth and segmentation show all elements.
+  out.rgba[3] = colored ? std::max(out.rgba[3], 0.0f) : 1;
   out.object = geom.objtype;
   out.object_id = geom.segid;
   out.casts =

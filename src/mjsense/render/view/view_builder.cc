@@ -99,7 +99,7 @@ void ViewBuilder::add_shape(const RayGeom& source, int id, const float* rgba,
   g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
   place(source, position, rotation, g);
   const Texture* texture = shape(g);
-  const bool sight = find_window(view_, g);
+  const bool sight = find_window(view_, g) && rgba[3] > 0;
   if (!sight && !view_.shadows) return;
   set_surface(source, rgba, material, texture, g);
   Order order{sight ? g.transparent : 2, g.nearest, index};
