@@ -411,6 +411,23 @@ def test_visual_flags_do_what_they_do_in_opengl(opengl, flag):
     assert 10 * np.log10(255**2 / error) > 31.5
 
 
+@pytest.mark.parametrize(
+    ("light", "region"),
+    [('type="directional"', 'shadowclip=".4"'), ('type="spot" cutoff="40" exponent="1"', 'shadowscale=".4"')],
+    ids=["directional", "spot"],
+)
+def test_shadows_end_where_they_end_in_opengl(opengl, light, region):
+    boxes = "".join(
+        f'<geom type="box" size=".05 .05 .2" pos="{0.3 * x} {0.3 * y} .3"/>' for x in range(-5, 6) for y in range(-5, 6)
+    )
+    model, data = (
+        load(f"""<mujoco><visual><map {region}/><headlight diffuse=".2 .2 .2"/></visual><statistic extent="2" center="0 0 0"/>
+        <worldbody><light pos=".2 0 2" dir=".2 .1 -1" {light}/><camera pos="0 -2 2.5" xyaxes="1 0 0 0 .8 .6"/>
+        <geom type="plane" size="3 3 .1"/>{boxes}</worldbody></mujoco>""")
+    )
+    compare(both(model, data, 0), 30)
+
+
 @pytest.mark.parametrize("skin", [0, 1])
 def test_flexes_look_as_in_opengl(opengl, skin):
     option = mujoco.MjvOption()

@@ -445,6 +445,29 @@ void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
   drawn_.push_back(drawn);
 }
 
+// The square that MuJoCo's shadow map covers. Its first axis is perpendicular to the light's and to -x
+// or y.
+static void limit_shadows(const SceneSettings& settings, float cutoff, ViewLight& light) {
+  const float* d = light.dir;
+  float up[3] = {0, -d[2], d[1]};
+  float length = up[1] * up[1] + up[2] * up[2];
+  if (length <= 0.01f) {
+    const float other[3] = {-d[2], 0, d[0]};
+    std::copy_n(other, 3, up);
+    length = up[0] * up[0] + up[2] * up[2];
+  }
+  for (int k = 0; k < 3; ++k) light.square[0][k] = up[k] / std::sqrt(length);
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    light.square[1][k] = d[i] * light.square[0][j] - d[j] * light.square[0][i];
+  }
+  light.square_limit = settings.shadow_clip;
+  if (light.kind != LightKind::kDirectional) {
+    const double fovy = std::min(2.0 * cutoff * settings.shadow_scale, 160.0);
+    light.square_limit = static_cast<float>(std::tan(fovy * std::numbers::pi / 360));
+  }
+}
+
 // As in OpenGL, only the first lights are used, and lights of other types than spot and directional
 // have no effect.
 void SceneRenderer::read_lights(const SceneMemory& scene) {
@@ -466,6 +489,7 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
     std::copy_n(light.diffuse, 3, out.diffuse);
     std::copy_n(light.specular, 3, out.specular);
     out.attenuation[0] = 1;
+    if (out.shadows) limit_shadows(settings_, light.cutoff, out);
     if (directional) continue;
     std::copy_n(light.attenuation, 3, out.attenuation);
     out.exponent = light.exponent;

@@ -271,6 +271,13 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     const double from[3] = {light.pos[0], light.pos[1], light.pos[2]};
     const double to[3] = {light.dir[0], light.dir[1], light.dir[2]};
     place_light(from, to, position, rotation, view_.lights[i]);
+    for (int axis = 0; axis < 2; ++axis) {
+      double in_camera[3];
+      const double in_world[3] = {scene.lights[i].square[axis][0], scene.lights[i].square[axis][1],
+                                  scene.lights[i].square[axis][2]};
+      rotate_back(rotation, in_world, in_camera);
+      std::copy_n(in_camera, 3, view_.lights[i].square[axis]);
+    }
   }
   if (view_.shadows) light_space_.fill(view_);
   view_.sky_distance = 0;
