@@ -265,7 +265,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   }
   sort_geoms(rotation);
   view_.num_lights = static_cast<int>(scene.lights.size());
-  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;
+  view_.global_ambient = scene.lights.empty() ? 0.3f : 0.0f;
   for (int i = 0; i < view_.num_lights; ++i) {
     const ViewLight& light = view_.lights[i] = scene.lights[i];
     const double from[3] = {light.pos[0], light.pos[1], light.pos[2]};
