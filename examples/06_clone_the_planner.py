@@ -4,16 +4,14 @@
 Minutes on two cores, without a picture: it sees the joints, and where its object is in the frame of its tool. The scene is the plain
 table, and grasps come from above: what is easiest to learn.
 
-    pip install "mjsense[torch]" h5py
+    pip install "mjsense[torch,dataset]"
     python examples/06_clone_the_planner.py [recorded episodes] [episodes to judge] [passes over the data]
 """
 
-import json
 import sys
 import tempfile
 import time
 
-import h5py
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 
@@ -51,27 +49,19 @@ def target_of(actors, start):
     return np.linalg.norm(actors[:, :, :3] - start[None, :, :3], axis=-1).argmin(0)
 
 
-def rows(dataset, group):
-    """One move group of a dataset of JSON rows."""
-    return np.array([json.loads(bytes(row).rstrip(b"\0"))[group] for row in dataset], np.float32)
-
-
-def demonstrations(files):
+def demonstrations(path):
     """(what was seen ``[N, F]``, joints' moves ``[N, 7]`` rad, whether the hand closes ``[N]``) of all steps of all episodes."""
     seen, moved, closed = [], [], []
-    for path in files:
-        with h5py.File(path) as file:
-            for episode in file.values():
-                actors = np.stack([episode[f"env_states/actors/{name}"] for name in OBJECTS])
-                start = episode["obs/extra/obj_start"][:]
-                target = np.full(len(start), target_of(actors[:, :1], start[:1])[0])
-                qpos, qvel = (episode[f"obs/agent/{name}"] for name in ("qpos", "qvel"))
-                x = features(rows(qpos, "arm"), rows(qpos, "gripper")[:, 0], rows(qvel, "gripper")[:, 0],
-                             episode["obs/extra/tcp_pose"][:], actors, target)  # fmt: skip
-                # Row t of the actions led to observation t.
-                seen.append(x[:-2])
-                moved.append(rows(episode["actions/joint_pos_rel"][1:-1], "arm"))
-                closed.append(rows(episode["actions/joint_pos"][1:-1], "gripper")[:, 0] > CLOSED / 2)
+    for episode in mjs.Dataset(path).episodes:
+        actors = np.stack([episode[f"env_states/actors/{name}"] for name in OBJECTS])
+        start = episode["obs/extra/obj_start"]
+        target = np.full(len(start), target_of(actors[:, :1], start[:1])[0])
+        qpos, qvel = episode["obs/agent/qpos"], episode["obs/agent/qvel"]
+        x = features(qpos["arm"], qpos["gripper"][:, 0], qvel["gripper"][:, 0], episode["obs/extra/tcp_pose"], actors, target)
+        # Row t of the actions led to observation t.
+        seen.append(x[:-2])
+        moved.append(episode["actions/joint_pos_rel/arm"][1:-1].astype(np.float32))
+        closed.append(episode["actions/joint_pos/gripper"][1:-1, 0] > CLOSED / 2)
     return np.concatenate(seen), np.concatenate(moved), np.concatenate(closed)
 
 
@@ -150,7 +140,7 @@ def main(recorded=200, judged=200, passes=120):
         begun = time.perf_counter()
         made = mjs.record("pick", scene="table", policy="top_down_planner", out=out, episodes=recorded, worlds=16, cameras=[])
         print(f"{made.kept} picks recorded in {time.perf_counter() - begun:.0f} s")
-        x, moves, closed = demonstrations(sorted(made.path.glob("*.h5")))
+        x, moves, closed = demonstrations(made.path)
     begun = time.perf_counter()
     net = train(x, moves, closed, passes)
     print(f"trained on {len(x)} steps in {time.perf_counter() - begun:.0f} s")

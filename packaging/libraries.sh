@@ -46,9 +46,9 @@ fetch() {
 build_embree() {
   local src
   src=$(fetch embree libembree-dev)
-  # Rays meet triangles and thick lines; other curves take most of the time that it compiles.
+  # mjsense uses triangles and round linear curves; the other curves take most of the compile time.
   sed -i -E '/vtbl\[Geometry::GTY_/{/GTY_ROUND_LINEAR_CURVE/!d}' "$src"/kernels/geometry/curve_intersector_virtual_*.cpp
-  # What is compiled for AVX alone is compiled for AVX2 instead, and chosen there.
+  # Files compiled for AVX only are compiled for AVX2 instead, and selected on machines with AVX2.
   sed -i 's/SET(ISA_LOWEST_AVX 2)/SET(ISA_LOWEST_AVX 3)/' "$src/CMakeLists.txt"
   sed -i 's/^  IF (${ISA} EQUAL ${AVX})$/  IF (${ISA} EQUAL ${ISA_LOWEST_AVX})/' "$src/kernels/CMakeLists.txt"
   sed -i 's/^#define SELECT_SYMBOL_AVX(features,intersector)$/& if ((features \& AVX2) == AVX2) intersector = avx2::intersector;/' \
@@ -61,14 +61,14 @@ build_embree() {
     -DEMBREE_MAX_ISA=NONE -DEMBREE_ISA_SSE2=ON -DEMBREE_ISA_SSE42=OFF -DEMBREE_ISA_AVX=OFF -DEMBREE_ISA_AVX2=ON \
     -DEMBREE_ISA_AVX512=ON "${unused[@]}" >&2
   cmake --build "$work/embree" -j "$jobs" >&2
-  # One archive, whose parts name each other in circles.
+  # One archive, because its parts depend on each other in cycles.
   { echo "create $lib/libembree.a"; find "$work/embree" -name '*.a' -printf 'addlib %p\n'; printf 'save\nend\n'; } | ar -M
 }
 
 build_fmt() {
   local src
   src=$(fetch fmtlib libfmt-dev)
-  # With the installed headers: what is compiled elsewhere against the shared library is compiled alike.
+  # With the installed headers and the macros of the shared library, so that both are compiled equally.
   g++ -std=c++20 -O2 -fPIC -DFMT_SHARED -DFMT_EXPORT -c "$src/src/format.cc" -o "$work/src/fmt.o"
   ar rcs "$lib/libfmt.a" "$work/src/fmt.o"
 }

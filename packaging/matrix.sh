@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs a wheel with all its extras, and beside each neighbour (packaging/resolve.py names them), into environments of their own, and
-# runs there what is tested with these packages alone. Slow, and torch brings CUDA: 6 GB. usage: packaging/matrix.sh WHEEL [NAME ...]
+# Installs a wheel with all its extras, and with each of the packages in packaging/resolve.py, into separate environments, and runs the
+# tests that need these packages. Slow; torch downloads CUDA, 6 GB. usage: packaging/matrix.sh WHEEL [NAME ...]
 set -euo pipefail
 wheel=$(realpath "$1")
 shift

@@ -50,7 +50,7 @@ mjsense record pick --episodes 2 --worlds 2 --size 64x48 --out data --quiet
 mjsense verify --decode data
 python - <<'EOF'
 import pathlib, h5py
-import mjsense  # beside it, an HDF5 of its own
+import mjsense  # contains a second HDF5 library
 file = next(pathlib.Path("data").rglob("*.h5"))
 with h5py.File(file) as house:
     for name, episode in house.items():

@@ -33,7 +33,7 @@ struct OwnedSpec {
   Address address() const { return address_of(pointer.get()); }
 };
 
-// Fields of mjs structs. Those that are no numbers have a type in words, and no shape.
+// Fields of mjs structs. Fields that are not numbers have a type in words and no shape.
 class SpecFields : public Fields {
  public:
   template <class T>

@@ -20,6 +20,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
+    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -55,6 +56,7 @@ from mjsense.core_sensors import (
     TcpPoseSensor,
 )
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
+from mjsense.dataset import Dataset, Deviation, Episode, EpisodeCheck, ReplayReport, Stream, Video, check_replay, replay
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
@@ -83,13 +85,15 @@ _gymnasium.register_all()
 __all__ = [
     *configs.__all__,
     "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
-    "ContactSensor", "DebugShapes", "EffectSensorCfg", "Entity", "EnvStatesSensor", "FunctionSensor",
+    "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
+    "EpisodeCheck", "FunctionSensor",
     "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
     "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "Robot", "RobotBasePoseSensor", "RobotCamera",
-    "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Task", "TaskEnv",
-    "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError", "WorldState", "effects",
-    "embedded_models", "make", "make_vec", "observations", "policy_names", "record", "register_policy", "register_task",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "ReplayReport", "Robot",
+    "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
+    "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
+    "Video", "WorldState", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names",
+    "record", "register_policy", "register_task", "replay",
     "robot_names", "task_names",
     "__version__",
 ]

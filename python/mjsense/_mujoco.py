@@ -82,15 +82,7 @@ def id2name(model: Any, kind: Obj, index: int) -> str:
     return _core.id2name(model._address, kind, index)
 
 
-WARNINGS = (
-    "mjWARN_INERTIA",
-    "mjWARN_CONTACTFULL",
-    "mjWARN_CNSTRFULL",
-    "mjWARN_BADQPOS",
-    "mjWARN_BADQVEL",
-    "mjWARN_BADQACC",
-    "mjWARN_BADCTRL",
-)
+WARNINGS = ("mjWARN_INERTIA", "mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL", "mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL")
 """Names of mjtWarning."""
 
 
@@ -120,12 +112,7 @@ def source_of(spec: mujoco.MjSpec) -> tuple[str, Any]:
         return "spec", spec
     copy = spec.copy()
     compiler = getattr(copy, "compiler", copy)
-    for elements, folder in (
-        (copy.meshes, "meshdir"),
-        (copy.skins, "meshdir"),
-        (copy.hfields, "meshdir"),
-        (copy.textures, "texturedir"),
-    ):
+    for elements, folder in ((copy.meshes, "meshdir"), (copy.skins, "meshdir"), (copy.hfields, "meshdir"), (copy.textures, "texturedir")):
         for element in elements:
             inside = os.path.join(getattr(compiler, folder, ""), element.file)
             path = os.path.join(copy.modelfiledir, inside)
@@ -250,9 +237,7 @@ class _View(_Struct):
 
     def _missing(self, name: str) -> NoReturn:
         real = type(self).__name__.removesuffix("View")
-        raise AttributeError(
-            f"{type(self).__name__} has no attribute '{name}', and mujoco.{real} of another version may: {_libmujoco.explain()}"
-        )
+        raise AttributeError(f"{type(self).__name__} has no attribute '{name}', and mujoco.{real} of another version may: {_libmujoco.explain()}")
 
     def __getattr__(self, name: str) -> Any:
         if name in _KINDS and _KINDS[name] in self._element_kinds:
@@ -335,9 +320,7 @@ class MjDataView(_View):
     def __init__(self, model: MjModelView) -> None:
         owner = _core.OwnedData.make(model._address)
         super().__init__(owner, _core.data_fields(model._address, owner.address))
-        self.__dict__.update(
-            _address=owner.address, _model=model, _arena=frozenset(_core.arena_fields(model._address, owner.address))
-        )
+        self.__dict__.update(_address=owner.address, _model=model, _arena=frozenset(_core.arena_fields(model._address, owner.address)))
 
     @property
     def model(self) -> MjModelView:

@@ -27,7 +27,7 @@ def _place(struct: Any, name: str, before: int, memory: ctypes.Array[ctypes.c_ui
 
     def bytes_with(value: Any) -> np.ndarray:
         setattr(struct, name, value)
-        return np.frombuffer(memory, np.uint8).copy()
+        return np.ctypeslib.as_array(memory).copy()
 
     old = getattr(struct, name)
     low, high = ("", "x") if isinstance(old, str) else (type(old)(0), type(old)(1))

@@ -77,8 +77,7 @@ def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
 
     columns = ("field", "dtype", "shape", "unit", "frame", "")
     body = "".join(
-        "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in _cells(row)) + "</tr>"
-        for row in rows
+        "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in rows
     )
     shown = "".join(
         f"<figure style='display:inline-block;margin:4px'><img src='{source}'/><figcaption>{html.escape(name)}</figcaption></figure>"

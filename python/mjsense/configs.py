@@ -302,9 +302,9 @@ class CameraSensorCfg(SensorCfg):
     """Width of the image; the resolution in the MJCF is not used. [pixels]"""
     height: int = 120
     """Height of the image; the resolution in the MJCF is not used. [pixels]"""
-    data_types: Sequence[
-        Literal["rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow"]
-    ] = ("rgb",)
+    data_types: Sequence[Literal[
+            "rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow"
+        ]] = ("rgb",)
     """The image types to compute."""
     use_textures: bool = True
     """Draw the textures of materials and the skybox."""

@@ -73,9 +73,7 @@ def _nested(fields: Any) -> Any:
     return fields[""] if "" in fields else nest({name: tuple(name.split("/")) for name in fields}, dict(fields))
 
 
-def _sim_groups(
-    sim: Simulation, context: str, groups: Mapping[str, Sequence[str]] | None
-) -> list[tuple[str, list[int], list[int]]]:
+def _sim_groups(sim: Simulation, context: str, groups: Mapping[str, Sequence[str]] | None) -> list[tuple[str, list[int], list[int]]]:
     """Addresses of the joints of each group. Default groups: those of the robot, or all joints as one group."""
     model = sim.model
     if groups is None and sim._view is not None:
@@ -308,9 +306,7 @@ class ImagePointsSensor(CoreSensor):
     """Up to ten pixels that show each object in each camera: fields ``<object>/<camera>/points`` float32 ``[B, 10, 2]``
     (fractions of the image size; unused entries are NaN) and ``num_points`` int32 ``[B, 1]``."""
 
-    def __init__(
-        self, objects: Mapping[str, str], cameras: Sequence[str], thin: Sequence[str] = (), uuid: str = "object_image_points"
-    ) -> None:
+    def __init__(self, objects: Mapping[str, str], cameras: Sequence[str], thin: Sequence[str] = (), uuid: str = "object_image_points") -> None:
         """
         Args:
             objects: Full names of bodies by object key.
@@ -353,9 +349,7 @@ class GraspStateSensor(CoreSensor):
 
 def _robot(sim: Simulation, sensor: CoreSensor) -> _core.TaskView:
     if sim._view is None:
-        raise ValueError(
-            f"sensor '{sensor.name}' needs a robot, which simulations of recordings and make_vec have: name it yourself"
-        )
+        raise ValueError(f"sensor '{sensor.name}' needs a robot, which simulations of recordings and make_vec have: name it yourself")
     return sim._view
 
 

@@ -90,7 +90,9 @@ class Recorder(KnownAttributes):
         }  # fmt: skip
         handles = [sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle for sensor in chosen]
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
-        self._core = _core.Recorder(simulation._core, handles, str(out), rate.numerator, rate.denominator, text, options)
+        self._core = _core.Recorder(
+            simulation._core, handles, str(out), rate.numerator, rate.denominator, text, options
+        )
         self._num_worlds = simulation.num_worlds
         self.sensors: tuple[Any, ...] = tuple(chosen)
         """The recorded sensors."""
@@ -136,9 +138,7 @@ class Recorder(KnownAttributes):
         def column(name: str, value: Any, dtype: Any) -> list[Any]:
             array = np.asarray(value, dtype)
             if array.shape not in ((), (len(ids),)):
-                raise ValueError(
-                    f"append: {name} has shape {array.shape}, expected one value, or ({len(ids)},) for the worlds {ids}"
-                )
+                raise ValueError(f"append: {name} has shape {array.shape}, expected one value, or ({len(ids)},) for the worlds {ids}")
             return np.broadcast_to(array, (len(ids),)).tolist()
 
         self._core.append(

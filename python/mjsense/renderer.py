@@ -155,6 +155,8 @@ class Renderer:
         settings = {
             "samples": max(1, int(quality.offsamples)),
             "shadows": bool(quality.shadowsize > 0),
+            "shadow_clip": float(model.stat.extent * model.vis.map.shadowclip),
+            "shadow_scale": float(model.vis.map.shadowscale),
             "haze": float(model.vis.map.haze),
             "haze_rgb": tuple(float(x) for x in haze[:3]),
             "line_width": float(model.vis.global_.linewidth),

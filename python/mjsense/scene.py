@@ -68,7 +68,8 @@ class Scene(KnownAttributes):
         self._finish()
 
     def _prepare(self, cfg: SceneCfg) -> tuple[list[Any], Callable[[], None]]:
-        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final edit."""
+        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final edit.
+        """
         cfg.__post_init__()  # it may have been changed after its construction
         self.cfg = cfg
         self.spec = cfg._base_spec()
@@ -224,8 +225,7 @@ class Scene(KnownAttributes):
         for name in self.cfg.entities:
             prefix = name + "/"
             described: dict[str, Any] = {
-                f"{kind}_names": tuple(name[len(prefix) :] for name in found if name.startswith(prefix))
-                for kind, found in names.items()
+                f"{kind}_names": tuple(name[len(prefix) :] for name in found if name.startswith(prefix)) for kind, found in names.items()
             }
             described["fixed_base"] = "mocap_base" in described["body_names"]
             entities[name] = Entity(name, described)

@@ -511,9 +511,7 @@ def as_sensor(thing: Any) -> Any:
         raise TypeError(f"not a sensor but a class: make one, {thing.__name__}(...)")
     if callable(getattr(thing, "get_observation", None)) and isinstance(getattr(thing, "uuid", None), str):
         return ForeignSensor(thing)
-    raise TypeError(
-        f"not a sensor: {thing!r} is not a mjsense.Sensor, nor has it a uuid and get_observation(env, task, batch_index)"
-    )
+    raise TypeError(f"not a sensor: {thing!r} is not a mjsense.Sensor, nor has it a uuid and get_observation(env, task, batch_index)")
 
 
 def _overrides(sensor: Sensor, method: str) -> bool:

@@ -78,9 +78,7 @@ class Simulation(KnownAttributes):
         step_dt: Duration of a control step, s.
     """
 
-    def __init__(
-        self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0
-    ) -> None:
+    def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0) -> None:
         """
         Args:
             scene: The scene. Its sensors belong to this simulation from now on, so that a second simulation needs its own scene.
@@ -209,7 +207,8 @@ class Simulation(KnownAttributes):
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it."""
+        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it.
+        """
         if "state" not in self._views or self._core.closed:
             self._views["state"] = self._core.state()
         return self._views["state"]
@@ -326,15 +325,11 @@ class Simulation(KnownAttributes):
             model, meshes = self.model, self.model.geom_type == _mujoco.Geom.MESH
             fits = np.where(meshes, (values >= 0) & (values < model.nmesh), values == model.geom_dataid)
             if not fits.all():
-                raise ValueError(
-                    f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs"
-                )
+                raise ValueError(f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs")
         if field in _IDS:
             count = getattr(self.model, _IDS[field])
             if (values < -1).any() or (values >= count).any():
-                raise ValueError(
-                    f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none"
-                )
+                raise ValueError(f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none")
         if field.endswith("quat") and values.size and (norms := np.linalg.norm(values, axis=-1)).min() < 1e-12:
             world, *element = np.argwhere(norms < 1e-12)[0].tolist()
             world = np.arange(self.num_worlds)[rows][world]

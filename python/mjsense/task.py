@@ -197,9 +197,7 @@ class Task:
         if isinstance(found, Mapping):
             unknown = set(found) - {"reward", "success", "terminated", "info"}
             if unknown or "reward" not in found or "success" not in found:
-                raise ValueError(
-                    f"returned a dict of {sorted(found)}; it needs reward and success, and may have terminated and info"
-                )
+                raise ValueError(f"returned a dict of {sorted(found)}; it needs reward and success, and may have terminated and info")
             reward, success, terminated, info = found["reward"], found["success"], found.get("terminated"), found.get("info")
         elif isinstance(found, tuple) and len(found) == 2:
             reward, success = found
@@ -255,7 +253,8 @@ class Task:
 
 @checked
 class WorldState:
-    """The state of one world at the start of an episode, to be written by the task. Names are those of the model: ``"mug/mug"``."""
+    """The state of one world at the start of an episode, to be written by the task. Names are those of the model: ``"mug/mug"``.
+    """
 
     def __init__(self, sim: Simulation, world: int, episode: int) -> None:
         self._sim = sim
@@ -294,9 +293,7 @@ class WorldState:
         """Orientations of mocap bodies ``[nmocap, 4]`` wxyz, live."""
         return self._sim.mocap_quat[self.id]
 
-    def place(
-        self, body: str, pos: Sequence[float], quat: Sequence[float] = (1, 0, 0, 0), velocity: Sequence[float] | None = None
-    ) -> None:
+    def place(self, body: str, pos: Sequence[float], quat: Sequence[float] = (1, 0, 0, 0), velocity: Sequence[float] | None = None) -> None:
         """Sets the pose of a free or mocap body.
 
         Args:
@@ -337,11 +334,7 @@ class WorldState:
             count = {"body": self.model.nbody, "joint": self.model.njnt}[word]
             names = [_mujoco.id2name(self.model, kind, i) for i in range(count)]
             near = difflib.get_close_matches(name, names, 3)
-            hint = (
-                f"; did you mean {' or '.join(map(repr, near))}?"
-                if near
-                else f"; there are {', '.join(filter(None, names[:12]))}"
-            )
+            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else f"; there are {', '.join(filter(None, names[:12]))}"
             raise UnknownNameError(f"no {word} named '{name}'{hint}")
         return index
 

@@ -43,14 +43,14 @@ OPERATORS = re.compile("|".join(r"(?<![\w:.])" * k[0].isalpha() + re.escape(k) +
 NUMBER = re.compile(r"(?<![\w.'])(\d+\.\d*(?:e-?\d+)?f?|\d+e-?\d+|\d+(?![\w.]))(?![\w'])")
 CONDITION = re.compile(r"^\s*(?:\} else )?if (?:constexpr )?\((.*)\)(?: \{| [^{]*;)$")
 # One whole statement: a call or an assignment, no declaration.
-STATEMENT = re.compile(r"^\s*(?!return\b|throw\b|delete\b|using\b|static\b|case\b|default\b|else\b|const\b|auto\b|static_assert\b|assert\b)"
+STATEMENT = re.compile(r"^\s*(?!\.|->|return\b|throw\b|delete\b|using\b|static\b|case\b|default\b|else\b|const\b|auto\b|static_assert\b|assert\b)"
                        r"[\w\]\[.>*():-]+(?: [-+*/|&]?= [^;]*|\([^;]*\))?;$")
 COMPLETE = re.compile(r"(?:[;{}:)]|\belse)\s*$")  # how the line before a statement ends
 # `i < n` and `i <= n` differ where both are counts. Two measured numbers are hardly ever equal.
 BOUNDARY = {("<", "<="), ("<=", "<"), (">", ">="), (">=", ">")}
 COUNT = re.compile(r"\bfor \(|size\(\)|\bnum_|_num\b|\bcount|(?:[<>]=?) \d+(?![\w.])")
 # What says something about the code or to a person: fields, messages of errors, assertions, size of memory, arrays of a fixed size.
-NEUTRAL = re.compile(r"\bv\(~?\"[^;]*;|\b(?:throw|static_assert|assert|fail|refuse|error|complaint|warn|mju_warning)\b(?: \w+)?\([^;]*;"
+NEUTRAL = re.compile(r"\bv\(~[^;]*;|\b(?:throw|static_assert|assert|fail|refuse|error|complaint|warn|mju_warning)\b(?: \w+)?\([^;]*;"
                      r"|\.(?:reserve|shrink_to_fit)\([^;]*;|(?m:^)[ \t]*(?:const )?\w[\w:]* \w+\[\d+\](?:\[\d+\])*")
 # Objects that a header may be part of. To build a mutant of a header is to build all of them.
 MOST_OBJECTS = 12
@@ -134,7 +134,7 @@ def changes(line: str, code: str, active: str, before: str, python: bool) -> lis
         for new in SWAPS[match[0]]:
             if (match[0].strip(), new.strip()) in BOUNDARY and not COUNT.search(code):
                 continue
-            if new == " - " and '"' in (active[match.start() - 1], active[match.end()]):
+            if new == " - " and "~" in (active[match.start() - 1], active[match.end()]):
                 continue  # joins text
             found.append((f"{match[0].strip()} becomes {new.strip()}", replaced(match, new)))
     for match in NUMBER.finditer(active):

@@ -323,14 +323,14 @@ def main() -> int:
     if options.draw:
         if unknown := set(options.which) - set(ROOMS):
             raise Failure(f"no such room: {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
-        WORK.mkdir(parents=True, exist_ok=True)
-        copy_tree()
-        runner = Runner(options.prefix.split(), options.jobs, options.limit)
-        runner.configure()
         judging, mutants = module("drawn"), drawn(options.which or ROOMS, options.draw, options.seed)
         if options.report:
             print(judging.report(mutants, json.loads(DRAWN.read_text()), ROOMS))
             return 0
+        WORK.mkdir(parents=True, exist_ok=True)
+        copy_tree()
+        runner = Runner(options.prefix.split(), options.jobs, options.limit)
+        runner.configure()
         judge = judging.Judge(runner, ROOT, BUILD, ROOMS, QUICK_PYTESTS)
         judge.baseline(WORK / "times.json")
         part, parts = map(int, options.part.split("/"))

@@ -226,7 +226,12 @@ def test_sensors_of_a_task(mjsense):
 def test_verify_inspect_repair(mjsense):
     mjsense("record", "pick", "--size", "64x48", "--horizon", 4, "--keep-failures", "-q", "--out", "data")
     assert json.loads(mjsense("verify", "data", "--json").stdout)
-    assert json.loads(mjsense("inspect", "data", "--json", "--sheet", "sheet.png").stdout)
+    inspected = json.loads(mjsense("inspect", "data", "--json", "--sheet", "sheet.png").stdout)
+    numbers = [stream for stream in inspected["streams"] if stream["count"]]
+    assert len(numbers) > 10 and any(stream["min"] < stream["mean"] < stream["max"] for stream in numbers)
+    for stream in numbers:
+        slack = 1e-9 * max(1, abs(stream["mean"]))
+        assert stream["min"] <= stream["mean"] + slack and stream["mean"] <= stream["max"] + slack, stream
     assert (mjsense.folder / "sheet.png").read_bytes().startswith(b"\x89PNG")
     mjsense("repair", "data")
     for wrong in (["--sheet", "no/x.png"], ["--sheet", "data"], ["--sheet", ""], ["--sheet", "x.png", "--ffmpeg", "/no/ffmpeg"],
@@ -277,6 +282,7 @@ def test_help_describes_flags(mjsense):
     (["record", "door"], ["door_opening"]),
     (["record", "--robot", "fra"], ["franka", "franka_hand"]),
     (["record", "--meshes", ""], ["auto", "shapes", "real"]),
+    (["scan", "--ray-alignment", ""], ["base", "yaw", "world"]),
     (["record", "pick", "--term"], ["--terminate-upon-success"]),
     (["record", "--out", ""], []),  # the shell completes file names
     (["inspect", ""], []),
@@ -284,6 +290,14 @@ def test_help_describes_flags(mjsense):
 ))  # fmt: skip
 def test_completion(mjsense, words, expected):
     assert mjsense("complete", "--", *words).stdout.split() == expected
+
+
+@pytest.mark.parametrize("command", ("tasks", "robots", "scenes"))
+def test_lists_are_text_or_json(mjsense, command):
+    text, listed = mjsense(command).stdout, json.loads(mjsense(command, "--json").stdout)
+    assert len(listed) > 1 and not text.startswith("[")
+    for one in listed:
+        assert one["name"] in text and one["description"].split()[0] in text
 
 
 def test_completion_in_bash(mjsense):

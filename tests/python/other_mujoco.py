@@ -73,7 +73,7 @@ see(model.geom_friction, model.opt.gravity, model.opt.timestep, model.vis.global
 shared = "mujoco" in sys.modules and sys.modules["mujoco"].mj_versionString().startswith("4.0")
 assert (_libmujoco.shared is not None) == shared, _libmujoco.why_not_shared
 if order != "alone":
-    # Their MuJoCo goes on working, with its own objects.
+    # The MuJoCo of the environment continues to work with its own objects.
     own = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>")
     own_data = mujoco.MjData(own)
     mujoco.mj_step(own, own_data)

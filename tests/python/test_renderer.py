@@ -260,6 +260,17 @@ def test_decoration_geoms_are_drawn_and_not_segmented():
         np.testing.assert_array_equal(after["segmentation"], before["segmentation"])
 
 
+def test_a_negative_alpha_hides_a_site():
+    model, data = load(SHAPES)
+    model.light_castshadow[:] = 0  # hidden sites cast shadows
+    visible = image_of(model, data, "view")
+    model.site_rgba[:, 3] = 0
+    hidden = image_of(model, data, "view")
+    assert (visible != hidden).any()
+    model.site_rgba[:, 3] = -0.5
+    np.testing.assert_array_equal(image_of(model, data, "view"), hidden)
+
+
 def test_groups_and_free_and_tracking_cameras():
     model, data = load(SHAPES)
     option = mujoco.MjvOption()
@@ -398,6 +409,23 @@ def test_visual_flags_do_what_they_do_in_opengl(opengl, flag):
     rgb, _, _ = both(model, data, "view", option)
     error = np.mean((rgb[0].astype(float) - rgb[1]) ** 2)
     assert 10 * np.log10(255**2 / error) > 31.5
+
+
+@pytest.mark.parametrize(
+    ("light", "region"),
+    [('type="directional"', 'shadowclip=".4"'), ('type="spot" cutoff="40" exponent="1"', 'shadowscale=".4"')],
+    ids=["directional", "spot"],
+)
+def test_shadows_end_where_they_end_in_opengl(opengl, light, region):
+    boxes = "".join(
+        f'<geom type="box" size=".05 .05 .2" pos="{0.3 * x} {0.3 * y} .3"/>' for x in range(-5, 6) for y in range(-5, 6)
+    )
+    model, data = (
+        load(f"""<mujoco><visual><map {region}/><headlight diffuse=".2 .2 .2"/></visual><statistic extent="2" center="0 0 0"/>
+        <worldbody><light pos=".2 0 2" dir=".2 .1 -1" {light}/><camera pos="0 -2 2.5" xyaxes="1 0 0 0 .8 .6"/>
+        <geom type="plane" size="3 3 .1"/>{boxes}</worldbody></mujoco>""")
+    )
+    compare(both(model, data, 0), 30)
 
 
 @pytest.mark.parametrize("skin", [0, 1])

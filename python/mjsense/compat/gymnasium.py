@@ -14,9 +14,9 @@ from __future__ import annotations
 from typing import Any
 
 import mujoco
-import numpy as np
 from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer
 
+from mjsense.compat._opengl import depth_buffer
 from mjsense.renderer import Renderer
 
 
@@ -69,14 +69,8 @@ class Viewer(OffScreenViewer):
         if segmentation and color in images:
             images[color] = images[color][..., ::-1]  # Gymnasium puts the type first
         if "depth" in images:
-            images["depth"] = self._depth_buffer(images["depth"])
+            images["depth"] = depth_buffer(images["depth"], self.scn)
         return images[kinds[0]] if len(kinds) == 1 else (images[color], images["depth"])
-
-    def _depth_buffer(self, depth: np.ndarray) -> np.ndarray:
-        camera = self.scn.camera[0]
-        near, far = camera.frustum_near, camera.frustum_far
-        window = depth - near if camera.orthographic else far * (1 - near / depth)
-        return np.clip(window / (far - near), 0, 1).astype(np.float32)
 
 
 def use(env: Any) -> Any:
@@ -95,6 +89,7 @@ def use(env: Any) -> Any:
             return get_viewer(render_mode)
         viewer = renderer._viewers.get("mjsense")
         if viewer is None:
+            assert renderer.width is not None and renderer.height is not None
             viewer = Viewer(renderer.model, renderer.data, renderer.width, renderer.height, renderer.max_geom, renderer._vopt)
             renderer.viewer = renderer._viewers["mjsense"] = viewer
             renderer._set_cam_config()

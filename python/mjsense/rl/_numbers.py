@@ -19,9 +19,7 @@ def checked_env(env: Any, who: str) -> TaskVectorEnv:
     if not isinstance(env, TaskVectorEnv):
         raise TypeError(f"{who}: env must be what mjsense.make_vec() returns, not {env!r}")
     if env.autoreset_mode != AutoresetMode.SAME_STEP:
-        raise ValueError(
-            f"{who}: autoreset_mode is '{env.autoreset_mode.name.lower()}': make_vec(..., autoreset_mode='same_step') is needed"
-        )
+        raise ValueError(f"{who}: autoreset_mode is '{env.autoreset_mode.name.lower()}': make_vec(..., autoreset_mode='same_step') is needed")
     return env
 
 

@@ -12,9 +12,7 @@ import numpy as np
 try:
     from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(
-        f"mjsense.rl.sb3 needs Stable-Baselines3: pip install stable-baselines3 ({error})", name=error.name
-    ) from error
+    raise ModuleNotFoundError(f"mjsense.rl.sb3 needs Stable-Baselines3: pip install stable-baselines3 ({error})", name=error.name) from error
 
 from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
 
@@ -32,9 +30,7 @@ class SB3VecEnv(VecEnv):
             and half the width of the actuators' ranges. Commands are clipped to these ranges.
     """
 
-    def __init__(
-        self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None
-    ) -> None:
+    def __init__(self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None) -> None:
         self.env = checked_env(env, "SB3VecEnv")
         self.numbers = Numbers(self.env, observations)
         """Columns of each stream."""
@@ -80,9 +76,7 @@ class SB3VecEnv(VecEnv):
             last = self._observation(infos["final_obs"][world], 1)
             final = infos["final_info"]
             out[world] = {
-                "terminal_observation": {key: value[0] if key == "state" else value for key, value in last.items()}
-                if self._images
-                else last[0],
+                "terminal_observation": {key: value[0] if key == "state" else value for key, value in last.items()} if self._images else last[0],
                 "TimeLimit.truncated": bool(truncated[world] and not terminated[world]),
                 "episode": {"r": float(self._returns[world]), "l": int(self._lengths[world])},
                 "is_success": bool(final["success"][world]),

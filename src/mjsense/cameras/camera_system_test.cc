@@ -209,6 +209,33 @@ TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
   EXPECT_GT(maximum, 3 * kDeg);
 }
 
+// Every kind of mount moves by at most its noise.
+TEST(CameraSystem, EveryMountStaysWithinItsNoise) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("body", MountKind::kBody), mount("look", MountKind::kLookAt),
+                 mount("fixed", MountKind::kFixed)};
+  for (CameraMountCfg& c : cfg.cameras) {
+    c.pos_noise = {.1, .1, .1};
+    if (c.mount == MountKind::kBody) continue;
+    c.pos = {0, -2, 0};
+    c.target = {0, 0, 1};
+  }
+  Bench bench(cfg);
+  Pose rest[3];
+  double maximum[3] = {0, 0, 0};
+  const char* names[] = {"body", "look", "fixed"};
+  for (int i = 0; i < 3; ++i) rest[i] = bench.pose(names[i]);
+  for (std::uint64_t episode = 0; episode < 60; ++episode) {
+    ASSERT_EQ(bench.place_cameras(1, {episode}), "");
+    for (int i = 0; i < 3; ++i)
+      maximum[i] = std::max(maximum[i], norm(bench.pose(names[i]).p - rest[i].p));
+  }
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_GT(maximum[i], .1) << names[i];
+    EXPECT_LE(maximum[i], .1 * std::sqrt(3)) << names[i];
+  }
+}
+
 TEST(CameraSystem, DrawsDoNotDependOnOtherCameras) {
   CameraSystemCfg one, two;
   CameraMountCfg orbit = mount("exo", MountKind::kOrbit);

@@ -426,6 +426,18 @@ TEST(StepDelay, LagsAreUniformHeldAndShared) {
   }
 }
 
+// Two delays of one sensor draw different lags.
+TEST(StepDelay, LagsDependOnThePositionInTheChain) {
+  Bench first(one(StepDelay(0, 9)), 1);
+  Bench second({std::make_shared<Scale>(PerComponent{1}), std::make_shared<StepDelay>(0, 9)}, 1);
+  int equal = 0;
+  for (int t = 0; t < 100; ++t) {
+    const float x = static_cast<float>(t);
+    equal += first.feed(x, t) == second.feed(x, t);
+  }
+  EXPECT_LT(equal, 50);
+}
+
 // A lag is kept for `update_period` rows. With a phase per world, the worlds change their lags at
 // different rows, otherwise at the same rows.
 TEST(StepDelay, TheUpdatePeriodHasAPhaseForEachWorld) {

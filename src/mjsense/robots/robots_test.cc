@@ -107,6 +107,29 @@ struct EveryRobot : testing::TestWithParam<std::string> {
   Alone alone{GetParam()};
 };
 
+TEST_P(EveryRobot, TheFirstArmAndGripperAreTheDefault) {
+  Alone alone(GetParam());
+  const auto first = [&](GroupKind kind) {
+    const auto& groups = alone.robot->groups();
+    const auto found = std::ranges::find(groups, kind, &MoveGroup::kind);
+    return found == groups.end() ? -1 : static_cast<int>(found - groups.begin());
+  };
+  EXPECT_EQ(alone.robot->arm(), first(GroupKind::kArm));
+  EXPECT_EQ(alone.robot->gripper(), first(GroupKind::kGripper));
+}
+
+// Each value of a command has a range.
+TEST_P(EveryRobot, CommandsHaveRanges) {
+  Alone alone(GetParam());
+  for (const MoveGroup& group : alone.robot->groups()) {
+    const auto size = static_cast<std::size_t>(group.command_size);
+    EXPECT_EQ(group.command_low.size(), size) << group.name;
+    EXPECT_EQ(group.command_high.size(), size) << group.name;
+    for (std::size_t i = 0; i < std::min(size, group.command_high.size()); ++i)
+      EXPECT_LT(group.command_low[i], group.command_high[i]) << group.name << " " << i;
+  }
+}
+
 TEST_P(EveryRobot, TheBaseCanBePlacedAnywhere) {
   Rng rng(1, 0, 0, 0);
   for (int k = 0; k < 20; ++k) {

@@ -2,6 +2,7 @@
 #include "mjsense/scene/physics_options.h"
 
 #include <fmt/format.h>
+#include <mujoco/mjxmacro.h>
 
 #include <algorithm>
 #include <cctype>
@@ -75,37 +76,13 @@ void apply_options(const OptionsCfg& cfg, mjOption& option) {
 
 std::vector<std::string> differing_options(const mjOption& a, const mjOption& b) {
   std::vector<std::string> names;
-  const auto note = [&](const char* name, auto& mine, auto& theirs) {
-    if (!std::equal(std::begin(mine), std::end(mine), std::begin(theirs))) names.emplace_back(name);
-  };
-  const auto note_number = [&](const char* name, auto mine, auto theirs) {
-    if (mine != theirs) names.emplace_back(name);
-  };
-  note_number("timestep", a.timestep, b.timestep);
-  note_number("integrator", a.integrator, b.integrator);
-  note_number("cone", a.cone, b.cone);
-  note_number("solver", a.solver, b.solver);
-  note_number("jacobian", a.jacobian, b.jacobian);
-  note_number("impratio", a.impratio, b.impratio);
-  note_number("iterations", a.iterations, b.iterations);
-  note_number("tolerance", a.tolerance, b.tolerance);
-  note_number("ls_iterations", a.ls_iterations, b.ls_iterations);
-  note_number("ls_tolerance", a.ls_tolerance, b.ls_tolerance);
-  note_number("noslip_iterations", a.noslip_iterations, b.noslip_iterations);
-  note_number("noslip_tolerance", a.noslip_tolerance, b.noslip_tolerance);
-  note_number("ccd_iterations", a.ccd_iterations, b.ccd_iterations);
-  note_number("ccd_tolerance", a.ccd_tolerance, b.ccd_tolerance);
-  note_number("density", a.density, b.density);
-  note_number("viscosity", a.viscosity, b.viscosity);
-  note_number("disableflags", a.disableflags, b.disableflags);
-  note_number("enableflags", a.enableflags, b.enableflags);
-  note("gravity", a.gravity, b.gravity);
-  note("wind", a.wind, b.wind);
-  note("magnetic", a.magnetic, b.magnetic);
-  note_number("o_margin", a.o_margin, b.o_margin);
-  note("o_solref", a.o_solref, b.o_solref);
-  note("o_solimp", a.o_solimp, b.o_solimp);
-  note("o_friction", a.o_friction, b.o_friction);
+#define X(type, name, n) \
+  if (a.name != b.name) names.emplace_back(#name);
+#define XVEC(type, name, n) \
+  if (!std::equal(a.name, a.name + (n), b.name)) names.emplace_back(#name);
+  MJOPTION_FIELDS
+#undef XVEC
+#undef X
   return names;
 }
 

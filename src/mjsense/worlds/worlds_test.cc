@@ -992,7 +992,7 @@ TEST(Worlds, WorldThatFailsEvenWhenResetDoesNotAffectOtherWorlds) {
     EXPECT_THAT(worlds.failures()[0].message,
                 ::testing::AllOf(::testing::HasSubstr("fails even after a reset"),
                                  ::testing::HasSubstr("contact frame")));
-    worlds.visit(all_worlds, hooks);  // reading is no error
+    worlds.visit(all_worlds, hooks);  // reading does not throw
   }
   worlds.forward(all_worlds, hooks);
   EXPECT_EQ(worlds.failures().size(), 1u);

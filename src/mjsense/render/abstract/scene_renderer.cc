@@ -145,7 +145,7 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
           "geom {} of the scene (object type {}, id {}) has a label, and labels are not "
           "drawn; remove it, or set scene_option.label to mjLABEL_NONE",
           i, geom.objtype, geom.objid));
-    add(geom, scene);
+    add(geom, scene, all);
   }
   // A segment belongs to the last geom that has its id, which matters for decoration geoms that
   // users add without an id of their own.
@@ -156,9 +156,11 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
   }
 }
 
-void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
+void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool colored) {
   DrawnGeom out{};
   std::copy_n(geom.rgba, 4, out.rgba);
+  // Some programs hide elements with a negative alpha. Depth and segmentation show all elements.
+  out.rgba[3] = colored ? std::max(out.rgba[3], 0.0f) : 1;
   out.object = geom.objtype;
   out.object_id = geom.segid;
   out.casts =
@@ -177,7 +179,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene) {
       std::copy_n(model_->mat_texrepeat + 2 * geom.matid, 2, out.material.repeat);
       out.material.uniform = model_->mat_texuniform[geom.matid] != 0;
     }
-    out.texture = assets_.texture(texture);
+    if (colored) out.texture = assets_.texture(texture);
   }
   RayGeom& shape = out.shape;
   shape.type = geom.type;
@@ -444,6 +446,29 @@ void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
   drawn_.push_back(drawn);
 }
 
+// The square that MuJoCo's shadow map covers. Its first axis is perpendicular to the light's and to -x
+// or y.
+static void limit_shadows(const SceneSettings& settings, float cutoff, ViewLight& light) {
+  const float* d = light.dir;
+  float up[3] = {0, -d[2], d[1]};
+  float length = up[1] * up[1] + up[2] * up[2];
+  if (length <= 0.01f) {
+    const float other[3] = {-d[2], 0, d[0]};
+    std::copy_n(other, 3, up);
+    length = up[0] * up[0] + up[2] * up[2];
+  }
+  for (int k = 0; k < 3; ++k) light.square[0][k] = up[k] / std::sqrt(length);
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    light.square[1][k] = d[i] * light.square[0][j] - d[j] * light.square[0][i];
+  }
+  light.square_limit = settings.shadow_clip;
+  if (light.kind != LightKind::kDirectional) {
+    const double fovy = std::min(2.0 * cutoff * settings.shadow_scale, 160.0);
+    light.square_limit = static_cast<float>(std::tan(fovy * std::numbers::pi / 360));
+  }
+}
+
 // As in OpenGL, only the first lights are used, and lights of other types than spot and directional
 // have no effect.
 void SceneRenderer::read_lights(const SceneMemory& scene) {
@@ -465,6 +490,7 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
     std::copy_n(light.diffuse, 3, out.diffuse);
     std::copy_n(light.specular, 3, out.specular);
     out.attenuation[0] = 1;
+    if (out.shadows) limit_shadows(settings_, light.cutoff, out);
     if (directional) continue;
     std::copy_n(light.attenuation, 3, out.attenuation);
     out.exponent = light.exponent;

@@ -20,6 +20,7 @@ namespace mjsense {
 struct SceneSettings {
   int samples = 1;  // per pixel of rgb
   bool shadows = true;
+  float shadow_clip = 0, shadow_scale = 0;  // m; relative to a spot light's cutoff
   float haze_width = 0, haze_rgb[3] = {};
   float line_width = 1;             // pixels
   bool projected_textures = false;  // DrawnScene::projected_textures
@@ -68,7 +69,7 @@ class SceneRenderer {
   struct Decoration;
 
   void read(const SceneMemory& scene, bool all);
-  void add(const AbstractGeom& geom, const SceneMemory& scene);
+  void add(const AbstractGeom& geom, const SceneMemory& scene, bool colored);
   void add_triangles(DrawnGeom drawn, ShapeTriangles triangles);
   void add_lines(const AbstractGeom& geom, DrawnGeom drawn);
   void add_flex(const AbstractGeom& geom, DrawnGeom drawn, const SceneMemory& scene);

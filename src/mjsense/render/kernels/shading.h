@@ -159,7 +159,15 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
     store(rays.d[2] + k, term.to_light.z);
     // MuJoCo's directional lights have a position: geoms behind it cast no shadow.
     const Float end = directional ? dot(p - splat(light.pos), splat(light.dir)) : splat(1.0f);
-    reachable |= bits(splat(0.0f) < end) << k;
+    Mask shadowed = splat(0.0f) < end;
+    if (light.square_limit > 0) {
+      const Vec3f from = p - splat(light.pos);
+      const Float u = dot(from, splat(light.square[0])), v = dot(from, splat(light.square[1]));
+      const Float limit =
+          splat(light.square_limit) * (directional ? splat(1.0f) : dot(from, splat(light.dir)));
+      shadowed = shadowed & (max(abs(u), abs(v)) < limit);
+    }
+    reachable |= bits(shadowed) << k;
     store(rays.end + k, end);
   }
   std::uint32_t dark = ~facing;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "mjsense/core/content_cache.h"
@@ -51,21 +52,25 @@ Between between(int i, int size, int half) {
 // drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts the
 // image nor drops its border.
 void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
+  using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
+  using Channels [[gnu::vector_size(16)]] = float;
+  const auto unpacked = [](std::uint32_t texel) {
+    return __builtin_convertvector(std::bit_cast<Bytes>(texel), Channels);
+  };
+  std::vector<Between> columns(w2);
+  for (int x = 0; x < w2; ++x) columns[x] = between(x, width, w2);
   for (int y = 0; y < h2; ++y) {
     const Between v = between(y, height, h2);
     const std::uint32_t *above = src + v.first * width, *below = src + v.second * width;
     for (int x = 0; x < w2; ++x) {
-      const Between u = between(x, width, w2);
-      std::uint32_t texel = 0;
-      for (int shift = 0; shift < 32; shift += 8) {
-        const auto mix = [&](const std::uint32_t* row) {
-          const auto channel = [&](int i) { return static_cast<float>(row[i] >> shift & 255u); };
-          return channel(u.first) + u.weight * (channel(u.second) - channel(u.first));
-        };
-        const float value = mix(above) + v.weight * (mix(below) - mix(above));
-        texel |= static_cast<std::uint32_t>(value + 0.5f) << shift;
-      }
-      dst[y * w2 + x] = texel;
+      const Between& u = columns[x];
+      const auto mix = [&](const std::uint32_t* row) {
+        const Channels first = unpacked(row[u.first]);
+        return first + u.weight * (unpacked(row[u.second]) - first);
+      };
+      const Channels upper = mix(above);
+      const Channels value = upper + v.weight * (mix(below) - upper) + 0.5f;
+      dst[y * w2 + x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(value, Bytes));
     }
   }
 }

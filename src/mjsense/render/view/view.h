@@ -73,6 +73,10 @@ struct ViewLight {
   float ambient[3], diffuse[3], specular[3];
   float attenuation[3];
   float cos_cutoff, exponent;  // for spot lights
+  // Square around the light's axis outside of which there are no shadows, as in MuJoCo's shadow map:
+  // its axes (unit, camera frame), and half its side in m, or for spot lights relative to the
+  // distance along the axis. Not positive: no limit.
+  float square[2][3], square_limit;
 };
 
 // Windows of boxes in a light's image: u and v are within [u0, u1] and [v0, v1], and w is at least

@@ -99,7 +99,7 @@ void ViewBuilder::add_shape(const RayGeom& source, int id, const float* rgba,
   g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
   place(source, position, rotation, g);
   const Texture* texture = shape(g);
-  const bool sight = find_window(view_, g);
+  const bool sight = find_window(view_, g) && rgba[3] > 0;
   if (!sight && !view_.shadows) return;
   set_surface(source, rgba, material, texture, g);
   Order order{sight ? g.transparent : 2, g.nearest, index};
@@ -265,12 +265,19 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   }
   sort_geoms(rotation);
   view_.num_lights = static_cast<int>(scene.lights.size());
-  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;
+  view_.global_ambient = scene.lights.empty() ? 0.3f : 0.0f;
   for (int i = 0; i < view_.num_lights; ++i) {
     const ViewLight& light = view_.lights[i] = scene.lights[i];
     const double from[3] = {light.pos[0], light.pos[1], light.pos[2]};
     const double to[3] = {light.dir[0], light.dir[1], light.dir[2]};
     place_light(from, to, position, rotation, view_.lights[i]);
+    for (int axis = 0; axis < 2; ++axis) {
+      double in_camera[3];
+      const double in_world[3] = {scene.lights[i].square[axis][0], scene.lights[i].square[axis][1],
+                                  scene.lights[i].square[axis][2]};
+      rotate_back(rotation, in_world, in_camera);
+      std::copy_n(in_camera, 3, view_.lights[i].square[axis]);
+    }
   }
   if (view_.shadows) light_space_.fill(view_);
   view_.sky_distance = 0;

@@ -114,12 +114,7 @@ class RayCastSensorCfg(SensorCfg):
         frames = (self.frame,) if isinstance(self.frame, ObjRef) else self.frame
         if not frames:
             raise ValueError(f"sensor '{self.name}': frame is empty: name the bodies, sites or geoms that its rays start from")
-        values = {
-            **vars(self),
-            "frame": tuple(f.native() for f in frames),
-            "pattern": self.pattern.native(),
-            "viz": self.viz.native(),
-        }
+        values = {**vars(self), "frame": tuple(f.native() for f in frames), "pattern": self.pattern.native(), "viz": self.viz.native()}
         return self._native_class(**values)
 
     _native_class = configs.RayCastSensorCfg

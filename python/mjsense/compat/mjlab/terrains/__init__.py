@@ -25,9 +25,7 @@ class SubTerrainCfg:
     flat_patch_sampling: dict[str, Any] | None = None
 
     def native(self) -> configs.SubTerrainCfg:
-        raise NotImplementedError(
-            f"{type(self).__name__} has no counterpart here: see mjsense.SubTerrainCfg for the kinds of tiles"
-        )
+        raise NotImplementedError(f"{type(self).__name__} has no counterpart here: see mjsense.SubTerrainCfg for the kinds of tiles")
 
 
 @dataclass(kw_only=True)
@@ -77,12 +75,7 @@ class HfPyramidSlopedTerrainCfg(SubTerrainCfg):
 
     def native(self) -> configs.SubTerrainCfg:
         return configs.SubTerrainCfg(
-            kind="slope",
-            proportion=self.proportion,
-            inverted=self.inverted,
-            platform_width=self.platform_width,
-            slope=self.slope_range,
-        )
+            kind="slope", proportion=self.proportion, inverted=self.inverted, platform_width=self.platform_width, slope=self.slope_range)
 
 
 @dataclass(kw_only=True)
@@ -117,9 +110,7 @@ class HfWaveTerrainCfg(SubTerrainCfg):
     border_width: float = 0.0
 
     def native(self) -> configs.SubTerrainCfg:
-        return configs.SubTerrainCfg(
-            kind="waves", proportion=self.proportion, amplitude=self.amplitude_range, waves=self.num_waves
-        )
+        return configs.SubTerrainCfg(kind="waves", proportion=self.proportion, amplitude=self.amplitude_range, waves=self.num_waves)
 
 
 @dataclass(kw_only=True)
@@ -167,9 +158,7 @@ class TerrainEntityCfg(EntityCfg):
             return configs.TerrainCfg(daylight=daylight)
         tiles = self.terrain_generator
         if self.terrain_type != "generator" or tiles is None:
-            raise ValueError(
-                f"TerrainEntityCfg: terrain_type is {self.terrain_type!r}: 'plane', or 'generator' with a terrain_generator"
-            )
+            raise ValueError(f"TerrainEntityCfg: terrain_type is {self.terrain_type!r}: 'plane', or 'generator' with a terrain_generator")
         kinds = {name: sub.native() for name, sub in tiles.sub_terrains.items()}
         if tiles.curriculum:  # a column for each
             kinds = {name: configs.replace(kind, proportion=1.0) for name, kind in kinds.items()}

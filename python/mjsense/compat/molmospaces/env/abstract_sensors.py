@@ -21,9 +21,7 @@ class CoreSensor(Sensor):
         """The sensor is omitted if the task does not have it."""
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
-        raise RuntimeError(
-            f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()"
-        )
+        raise RuntimeError(f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()")
 
 
 __all__ = ["Sensor", "SensorSuite"]

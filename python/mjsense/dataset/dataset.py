@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random access to the rows and frames of a recording."""
+
+from __future__ import annotations
+
+import bisect
+import difflib
+import fnmatch
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjsense._arguments import checked
+from mjsense.dataset import statistics
+from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
+from mjsense.dataset.files import entries_of
+from mjsense.errors import UnknownNameError
+
+_PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
+
+
+@checked
+class Dataset:
+    """Observations of a recording by number: ``len(dataset)``, ``dataset[i]``. See docs/datasets.md.
+
+    ``dataset[i]`` is a dict: a NumPy array for every stream, and ``episode_index``, ``frame_index``, ``index``, ``timestamp`` (seconds
+    since the start of the episode) and ``task`` (the instruction). It works with ``torch.utils.data.DataLoader`` and any number of
+    workers, forked or spawned. Row t of ``actions/*`` is the action that led to observation t.
+
+    Args:
+        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
+        episodes: Positions of episodes in the recording; by default all.
+        delta_timestamps: Windows: seconds relative to the observation, by stream or group. The stream becomes ``[n, ...]``, and
+            ``{stream}_is_pad`` says which entries lie outside the episode; those repeat its first or last row.
+        streams: Names of streams, of groups (``"obs/agent/qpos"``, ``"actions"``), or patterns (``"obs/sensor_data/*"``); by default all
+            streams but ``replay/*``.
+        outcome: Only episodes with this outcome: a text, a pattern (``"horizon reached*"``), several of them, or a function of the text.
+        success: Only successful (True) or only failed (False) episodes.
+        houses: Only episodes of these houses.
+        tolerance_s: Maximum difference between an entry of ``delta_timestamps`` and a multiple of the period. [s]
+        cache_mb: Memory for decoded rows and frames of one process, half for each. [MB]
+    """
+
+    def __init__(
+        self,
+        root: str | Path,
+        *,
+        episodes: Iterable[int] | None = None,
+        delta_timestamps: Mapping[str, Sequence[float]] | None = None,
+        streams: Iterable[str] | None = None,
+        outcome: str | Iterable[str] | Callable[[str], bool] | None = None,
+        success: bool | None = None,
+        houses: Iterable[int] | None = None,
+        tolerance_s: float = 1e-4,
+        cache_mb: float = 512,
+    ) -> None:
+        self.root = Path(root)
+        """The folder or file."""
+        entries, recordings = entries_of(self.root)
+        store = Store(recordings, int(cache_mb * 1e6))
+        chosen = [Episode(entry, i, store) for i, entry in enumerate(entries)]
+        if episodes is not None:
+            wanted = [int(i) for i in episodes]
+            if wrong := [i for i in wanted if not 0 <= i < len(chosen)]:
+                raise ValueError(f"episodes: {wrong[0]} is not in {self.root}, which has {len(chosen)} episodes")
+            chosen = [chosen[i] for i in wanted]
+        if outcome is not None:
+            chosen = [episode for episode in chosen if _matches(episode.outcome, outcome)]
+        if success is not None:
+            chosen = [episode for episode in chosen if episode.success == success]
+        if houses is not None:
+            numbers = set(houses)
+            chosen = [episode for episode in chosen if episode.house in numbers]
+        self.episodes: list[Episode] = chosen
+        """The episodes, in the order of houses, files and positions in the file."""
+        self._ends = list(itertools.accumulate(episode.length for episode in chosen))
+        self._position = {episode.index: k for k, episode in enumerate(chosen)}
+        self.streams: dict[str, Stream] = {}
+        """The streams of a sample, by name."""
+        self._fps = Fraction(0)
+        self._windows: dict[str, list[int]] = {}
+        if not chosen:
+            if delta_timestamps or streams:
+                raise ValueError(f"{self.root}: no episode matches; it has {len(entries)} episodes with the outcomes "
+                                 f"{sorted({entry.outcome for entry in entries})}")  # fmt: skip
+            return
+        known = self._known_streams()
+        self._fps = self._common_fps()
+        names = None if streams is None else list(streams)
+        selected = {name for name in known if not name.startswith(REPLAY)} if names is None else set(self._expand_all(names, known))
+        if names is None or not set(names) <= known.keys():
+            store.leaves = set(known)
+        for name, seconds in (delta_timestamps or {}).items():
+            steps = _steps(name, seconds, self._fps, tolerance_s)
+            for stream in self._expand_all([name], known):
+                self._windows[stream] = steps
+                selected.add(stream)
+        for name in list(selected):
+            if (mask := given_name(name)) in known:
+                selected.add(mask)
+                if name in self._windows:
+                    self._windows[mask] = self._windows[name]
+        self.streams = {name: known[name] for name in sorted(selected)}
+        self._arrays = [name for name, stream in self.streams.items() if self._in_memory(stream)]
+        self._large = [name for name, stream in self.streams.items() if stream.kind != "video" and not self._in_memory(stream)]
+        self._videos = [name for name, stream in self.streams.items() if stream.kind == "video"]
+
+    @property
+    def fps(self) -> Fraction:
+        """Observations per second, exactly: ``Fraction(500, 33)``."""
+        return self._fps
+
+    def __len__(self) -> int:
+        return self._ends[-1] if self._ends else 0
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        i = int(index)
+        i = i + len(self) if i < 0 else i
+        if not 0 <= i < len(self):
+            raise IndexError(f"index {index} is out of range: {self.root} has {len(self)} observations")
+        episode, t = self._place(i)
+        sample: dict[str, Any] = {}
+        arrays = episode._load(self._arrays)
+        for name in self._arrays:
+            rows, _ = self._rows(name, episode, t)
+            sample[name] = self._values(name, arrays.get(name), rows)
+        for name in self._large:
+            rows, single = self._rows(name, episode, t)
+            values = episode._large_rows(name, rows if isinstance(rows, list) else [rows])
+            sample[name] = values[0] if single else values
+        for name in self._videos:
+            rows, single = self._rows(name, episode, t)
+            video = episode.video(name)
+            sample[name] = video[rows] if single else np.stack([video[r] for r in rows])
+        for name, steps in self._windows.items():
+            if not _is_mask(name):
+                sample[f"{name}_is_pad"] = np.array([not 0 <= t + step < episode.length for step in steps])
+        sample |= {"episode_index": episode.index, "frame_index": t, "index": i, "timestamp": float(t / self._fps), "task": episode.task}
+        return sample
+
+    def __repr__(self) -> str:
+        outcomes: dict[str, int] = {}
+        for episode in self.episodes:
+            outcomes[episode.outcome] = outcomes.get(episode.outcome, 0) + 1
+        lines = [f"Dataset({str(self.root)!r}): {len(self.episodes)} episodes, {len(self)} observations"]
+        lines += [f"  {count} x {outcome}" for outcome, count in sorted(outcomes.items(), key=lambda item: -item[1])]
+        return "\n".join(lines + [f"  {stream}" for stream in self.streams.values()])
+
+    def index_of(self, episode: int, frame: int = 0) -> int:
+        """Number of an observation: ``frame`` of the episode at position ``episode`` in the recording."""
+        if episode not in self._position:
+            raise ValueError(f"episode {episode} is not in this data set")
+        k = self._position[episode]
+        length = self.episodes[k].length
+        if not -length <= frame < length:
+            raise ValueError(f"frame {frame} is not in episode {episode}, which has {length} observations")
+        return self._ends[k] - length + frame % length
+
+    def stats(self, streams: Iterable[str] | None = None, *, frames: int = 200) -> dict[str, dict[str, np.ndarray]]:
+        """min, max, mean, std, count, q01, q10, q50, q90 and q99 of each stream over all observations.
+
+        NaN is skipped, as are rows of actions that are not given. Images have the shape (3, 1, 1) and the range 0 to 1. Texts and streams
+        with rows of 64 kB or more (segmentation) have no statistics.
+
+        Args:
+            streams: Names, groups or patterns; by default the streams of this data set.
+            frames: Maximum number of frames of each camera, evenly spaced; of a depth image at most about 20,000 pixels count.
+        """
+        if frames < 1:
+            raise ValueError(f"frames is {frames}; it must be at least 1")
+        if not self.episodes:
+            return {}
+        known = dict(self.streams) if streams is None else self._known_streams()
+        names = list(known) if streams is None else self._expand_all(streams, known)
+        arrays = [name for name in names if self._in_memory(known[name]) and known[name].dtype != object and not _is_mask(name)]
+        masks = {name: mask for name in arrays if (mask := given_name(name))}
+        parts: dict[str, list[np.ndarray]] = {name: [] for name in arrays}
+        for episode in self.episodes:
+            loaded = episode._load([*arrays, *masks.values()])
+            for name in arrays:
+                if name in loaded:
+                    parts[name].append(loaded[name][loaded[masks[name]]] if name in masks else loaded[name])
+        result = {name: statistics.of_rows(rows) for name in arrays if parts[name] and len(rows := np.concatenate(parts[name]))}
+        chosen = np.unique(np.linspace(0, len(self) - 1, min(frames, len(self))).astype(int))
+        places = [self._place(int(i)) for i in chosen]
+        for name in (name for name in names if known[name].kind == "video"):
+            pictures = (episode.video(name)[t] for episode, t in places)
+            result[name] = (statistics.of_images if known[name].dtype == np.uint8 else statistics.of_depth)(pictures)
+        return dict(sorted(result.items()))
+
+    def _common_fps(self) -> Fraction:
+        first = self.episodes[0]
+        for episode in {episode._entry.recording: episode for episode in self.episodes}.values():
+            if episode.fps != first.fps:
+                raise ValueError(f"{first.path} has {first.fps} observations per second, {episode.path} has {episode.fps}; choose houses with one rate")
+        return first.fps
+
+    def _expand_all(self, names: Iterable[str], known: dict[str, Stream]) -> list[str]:
+        """Streams that names, groups and patterns stand for. An unknown name is looked up in all episodes; ``known`` receives it."""
+        result: list[str] = []
+        for name in names:
+            try:
+                result += _expand(name, known)
+            except UnknownNameError:
+                leaf = next((e.streams[name] for e in self.episodes if name in e.streams and e.streams[name].kind == "json"), None)
+                if leaf is None:
+                    raise
+                known[name] = leaf
+                result.append(name)
+        return result
+
+    def _known_streams(self) -> dict[str, Stream]:
+        """Streams that all recordings have. JSON leaves are those of up to 16 episodes of each recording, the first and the last included."""
+        groups: dict[int, list[Episode]] = {}
+        for episode in self.episodes:
+            groups.setdefault(episode._entry.recording, []).append(episode)
+        tables: list[dict[str, Stream]] = []
+        for group in groups.values():
+            probed = np.unique(np.linspace(0, len(group) - 1, min(_PROBED, len(group))).astype(int))
+            tables.append({name: stream for k in reversed(probed) for name, stream in group[k].streams.items()})
+        return {name: stream for name, stream in tables[0].items() if all(name in table for table in tables)}
+
+    def _place(self, i: int) -> tuple[Episode, int]:
+        """Episode and row of an observation."""
+        k = bisect.bisect_right(self._ends, i)
+        return self.episodes[k], i - self._ends[k] + self.episodes[k].length
+
+    @staticmethod
+    def _in_memory(stream: Stream) -> bool:
+        return stream.kind != "video" and _row_bytes(stream) < LARGE_ROW
+
+    def _rows(self, name: str, episode: Episode, t: int) -> tuple[Any, bool]:
+        """Row ``t`` and True, or the rows of its window, inside the episode, and False."""
+        steps = self._windows.get(name)
+        if steps is None:
+            return t, True
+        return [min(max(t + step, 0), episode.length - 1) for step in steps], False
+
+    def _values(self, name: str, array: np.ndarray | None, rows: Any) -> Any:
+        stream = self.streams[name]
+        if array is None:  # a JSON leaf that no row of this episode has
+            if stream.kind != "json":
+                raise UnknownNameError(f"{self.root}: an episode has no stream '{name}'; leave it out with streams=")
+            shape = stream.shape if isinstance(rows, int) else (len(rows), *stream.shape)
+            return "" if stream.dtype == object and not shape else np.full(shape, "" if stream.dtype == object else 0, stream.dtype)
+        if array.shape[1:] != stream.shape:
+            raise ValueError(f"{self.root}: '{name}' has the shape {list(array.shape[1:])} in one episode, {list(stream.shape)} in the first")
+        values = array[rows]
+        return values if array.dtype == object else np.array(values)  # a copy: the array is in the cache
+
+
+def _row_bytes(stream: Stream) -> int:
+    return int(np.prod(stream.shape, dtype=np.int64)) * stream.dtype.itemsize
+
+
+def _is_mask(name: str) -> bool:
+    parts = name.split("/")
+    return parts[0] == "actions" and len(parts) > 3 and parts[2] == "given"
+
+
+def _matches(outcome: str, wanted: str | Iterable[str] | Callable[[str], bool]) -> bool:
+    if callable(wanted):
+        return bool(wanted(outcome))
+    return any(outcome == one or fnmatch.fnmatchcase(outcome, one) for one in ([wanted] if isinstance(wanted, str) else wanted))
+
+
+def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
+    """The streams that a name, a group or a pattern stands for."""
+    if name in known:
+        return [name]
+    found = [stream for stream in known if stream.startswith(f"{name}/")] or fnmatch.filter(known, name)
+    if not found:
+        groups = {"/".join(stream.split("/")[:n]) for stream in known for n in range(1, stream.count("/") + 1)}
+        near = difflib.get_close_matches(name, [*known, *groups], 3)
+        same_end = [stream for stream in [*known, *groups] if stream.endswith(f"/{name}")]
+        hint = f"; did you mean {', '.join(repr(n) for n in dict.fromkeys([*same_end, *near]))}?" if near or same_end else ""
+        raise UnknownNameError(f"No stream, group or pattern '{name}'{hint}")
+    return found
+
+
+def _steps(name: str, seconds: Sequence[float], fps: Fraction, tolerance_s: float) -> list[int]:
+    steps = [round(float(s) * float(fps)) for s in seconds]
+    off = [s for s, n in zip(seconds, steps) if abs(float(s) - n / float(fps)) > tolerance_s]
+    if off:
+        raise ValueError(f"delta_timestamps['{name}']: {off[0]} s is not a multiple of 1/fps = {float(1 / fps):.6f} s within {tolerance_s} s; "
+                         f"use n / dataset.fps, such as {float(round(off[0] * float(fps)) / fps):.6f}")  # fmt: skip
+    return steps

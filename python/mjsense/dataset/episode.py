@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One episode of a recording."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from mjsense._arguments import checked
+from mjsense.dataset import json_rows, playback
+from mjsense.dataset.cache import Cache
+from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
+from mjsense.dataset.video import FrameReader, Video, VideoInfo
+from mjsense.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    import mujoco
+
+VIDEOS = "obs/sensor_data/"
+REPLAY = "replay/"
+LARGE_ROW = 1 << 16  # bytes; rows of at least this size (segmentation) are read one by one and not kept
+
+
+@dataclass(frozen=True)
+class Stream:
+    """What is stored in one row of a stream."""
+
+    name: str
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    unit: str
+    frame: str
+    description: str
+    kind: Literal["array", "json", "video"] = "array"
+    """``json``: a leaf of JSON rows, decoded to numbers. ``video``: a frame of a video."""
+
+    def __repr__(self) -> str:
+        about = " ".join(text for text in (f"[{self.unit}]" if self.unit else "", self.frame and f"in {self.frame}", self.description) if text)
+        return f"{self.name}: {self.dtype} {list(self.shape)} {about}".rstrip()
+
+
+def given_name(stream: str) -> str | None:
+    """``actions/joint_pos/given/arm`` of ``actions/joint_pos/arm``, as observations name it; None for other streams."""
+    parts = stream.split("/")
+    return "/".join([*parts[:2], "given", *parts[2:]]) if parts[0] == "actions" and len(parts) > 2 else None
+
+
+def _unit_of(unit: str, leaf: str) -> str:
+    """The unit of one move group in ``"arm: rad; gripper: 0 open .. 255 closed"``."""
+    by_group = dict(part.split(": ", 1) for part in unit.split("; ") if ": " in part)
+    return by_group.get(leaf, "") if by_group else unit
+
+
+def _is_json(dataset: Any) -> bool:
+    encoding = dataset.attrs.get("encoding")
+    if encoding is not None or "spec" in dataset.attrs:
+        return text_of(encoding or "") == "json"
+    # MolmoSpaces' files have no attributes.
+    return dataset.dtype == np.uint8 and dataset.ndim == 2 and len(dataset) > 0 and dataset[0, 0] == ord("{")
+
+
+def _place_of(trajectory: Any, name: str) -> str | None:
+    """The dataset that contains a stream: the stream itself or, for a leaf or a mask, a prefix of its name."""
+    while name:
+        if name in trajectory:
+            return name if hasattr(trajectory[name], "dtype") else None
+        name = name.rpartition("/")[0]
+    return None
+
+
+class Store:
+    """What all episodes of a data set share: the recordings' descriptions and the caches."""
+
+    def __init__(self, recordings: list[dict[str, Any]], cache_bytes: int) -> None:
+        self.recordings = recordings
+        self.rows = Cache(cache_bytes // 2)
+        self.frames = FrameReader(Cache(cache_bytes // 2))
+        self.models = Cache(4)  # one unit per model
+        self.leaves: set[str] | None = None
+        """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
+
+
+@checked
+class Episode:
+    """An episode of a recording: its attributes, whole arrays (``episode["obs/extra/tcp_pose"]``), videos, and replay."""
+
+    def __init__(self, entry: EpisodeEntry, index: int, store: Store) -> None:
+        self._entry, self._store = entry, store
+        self.index = index
+        """Position in the whole recording, whatever the filters of the data set are."""
+
+    @property
+    def path(self) -> Path:
+        """The HDF5 file."""
+        return self._entry.path
+
+    @property
+    def trajectory(self) -> str:
+        """Name of the group in the file: ``traj_0``."""
+        return self._entry.trajectory
+
+    @property
+    def house(self) -> int | None:
+        """Number of the ``house_N`` folder."""
+        return self._entry.house
+
+    @property
+    def number(self) -> int:
+        """Number of the attempt when it was recorded."""
+        return self._entry.number
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of the recording; None if the file has none."""
+        return self._entry.seed
+
+    @property
+    def length(self) -> int:
+        """Number of observations: one after the reset and one after each step."""
+        return self._entry.length
+
+    @property
+    def outcome(self) -> str:
+        """``success``, or why the episode failed."""
+        return self._entry.outcome
+
+    @property
+    def success(self) -> bool:
+        """Whether the outcome is ``success``."""
+        return self.outcome == "success"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The recording's settings: task, robot, policy, seed and so on. Empty for files that MolmoSpaces wrote."""
+        return self._recording.get("settings", {})
+
+    @property
+    def obs_scene(self) -> dict[str, Any]:
+        """Task, description, objects, cameras and phases of the episode."""
+        return self._store.rows.get((self.index, "scene"), self._read_scene)
+
+    @property
+    def task(self) -> str:
+        """The instruction."""
+        scene = self.obs_scene
+        return str(scene.get("text") or scene.get("task_description") or "")
+
+    @property
+    def fps(self) -> Fraction:
+        """Observations per second, exactly."""
+        if "fps" in self._recording:
+            return Fraction(self._recording["fps"])
+        period = self.obs_scene.get("policy_dt_ms")
+        if not period:
+            raise ValueError(f"{self.path} does not state its rate: no attribute 'recording' and no policy_dt_ms in obs_scene")
+        return Fraction(1000) / Fraction(period).limit_denominator(1000)
+
+    @property
+    def streams(self) -> dict[str, Stream]:
+        """All streams by name. JSON rows appear as one stream per leaf: ``obs/agent/qpos/arm``."""
+        return self._store.rows.get((self.index, "streams"), self._find_streams)
+
+    def __len__(self) -> int:
+        return self.length
+
+    def __repr__(self) -> str:
+        return f"Episode({self.index}, {self.task!r}, {self.length} observations, {self.outcome!r})"
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.streams or any(stream.startswith(f"{name}/") for stream in self.streams)
+
+    def __getitem__(self, name: str) -> Any:
+        """All rows of a stream; of a group (``actions/joint_pos``, ``env_states/actors``) a dict of its streams."""
+        if name.startswith(VIDEOS):
+            return self.video(name)[:]
+        if found := self._load([name]):
+            return found[name].copy()
+        inside = [stream for stream in self.streams if stream.startswith(f"{name}/")]
+        if not inside:
+            raise self._unknown(name)
+        if any(self.streams[stream].kind == "video" for stream in inside):
+            raise KeyError(f"'{name}' is the group of the videos; name one of {', '.join(inside)}")
+        return {stream[len(name) + 1 :]: values.copy() for stream, values in self._load(inside).items()}
+
+    def video(self, camera: str) -> Video:
+        """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
+        videos = self._store.rows.get((self.index, "videos"), self._find_videos)
+        info = videos.get(camera if camera.startswith(VIDEOS) else VIDEOS + camera)
+        if info is None:
+            cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
+            raise UnknownNameError(f"Episode {self.index} has no video '{camera}'; it has {cameras or 'no videos'}")
+        return Video(info, self._store.frames)
+
+    # The next functions are for this package.
+
+    @property
+    def _recording(self) -> dict[str, Any]:
+        return self._store.recordings[self._entry.recording]
+
+    def _read_scene(self) -> tuple[dict[str, Any], int]:
+        with open_h5(self.path) as file:
+            text = file[self.trajectory]["obs_scene"][()] if "obs_scene" in file[self.trajectory] else b"{}"
+        return json.loads(text_of(text)), 16 * len(text)
+
+    def _unknown(self, name: str) -> UnknownNameError:
+        near = difflib.get_close_matches(name, [*self.streams, *{stream.rsplit("/", 1)[0] for stream in self.streams}], 3)
+        hint = f"; similar: {', '.join(near)}" if near else ""
+        return UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no stream '{name}'{hint}")
+
+    def _find_videos(self) -> tuple[dict[str, VideoInfo], int]:
+        videos: dict[str, VideoInfo] = {}
+        with open_h5(self.path) as file:
+            for key, dataset in file[self.trajectory].get(VIDEOS, {}).items():
+                name, at = text_of(dataset[:].tobytes()), dataset.attrs
+                if name and "width" in at:
+                    videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self.length, int(at["width"]), int(at["height"]),
+                                                     text_of(at["encoding"]), float(at.get("metres_per_unit", 0)),
+                                                     Fraction(text_of(at["fps"])))  # fmt: skip
+        return videos, 500 * len(videos)
+
+    def _find_streams(self) -> tuple[dict[str, Stream], int]:
+        streams: dict[str, Stream] = {}
+        videos = self._store.rows.get((self.index, "videos"), self._find_videos)
+
+        def visit(name: str, dataset: Any) -> None:
+            if not hasattr(dataset, "dtype") or name in ("obs_scene", REPLAY + "held") or name.startswith(REPLAY + "model/"):
+                return
+            about = {key: text_of(dataset.attrs.get(key, "")) for key in ("unit", "frame", "description")}
+            if name.startswith(VIDEOS):
+                if name in videos:
+                    info = videos[name]
+                    dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
+                    streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
+            elif _is_json(dataset):
+                for leaf, values in self._decode(name, dataset).items():
+                    unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
+                    streams[leaf] = Stream(leaf, values.dtype, values.shape[1:], unit, about["frame"], about["description"], "json")
+                    if mask := given_name(leaf):
+                        streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
+            else:
+                streams[name] = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
+
+        with open_h5(self.path) as file:
+            file[self.trajectory].visititems(visit)
+        return dict(sorted(streams.items())), 500 * len(streams)
+
+    def _decode(self, place: str, dataset: Any) -> dict[str, np.ndarray]:
+        """Arrays of the leaves of a dataset of JSON rows; they and their masks are cached."""
+        result: dict[str, np.ndarray] = {}
+        for path, (values, given) in json_rows.decode(dataset[:]).items():
+            leaf = place + path
+            result[leaf] = values
+            self._store.rows.add((self.index, leaf), values, values.nbytes)
+            if mask := given_name(leaf):
+                self._store.rows.add((self.index, mask), given, given.nbytes)
+        if self._store.leaves is not None and (new := result.keys() - self._store.leaves):
+            self._store.leaves |= new
+            warnings.warn(f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first, the last and other examined episodes "
+                          "lack; samples leave it out unless streams= names it", stacklevel=2)  # fmt: skip
+        return result
+
+    def _load(self, names: list[str]) -> dict[str, np.ndarray]:
+        """Whole arrays of streams that are not videos. Streams that this episode does not have are left out."""
+        cache, found = self._store.rows, {}
+        for name in names:
+            if (values := cache.find((self.index, name))) is not None:
+                found[name] = values
+        missing = [name for name in names if name not in found]
+        if not missing:
+            return found
+        decoded: set[str] = set()
+        with open_h5(self.path) as file:
+            trajectory = file[self.trajectory]
+            for name in missing:
+                place = _place_of(trajectory, name)
+                if place is None:
+                    continue
+                dataset = trajectory[place]
+                if _is_json(dataset):
+                    if place not in decoded:
+                        decoded.add(place)
+                        found.update(self._decode(place, dataset))
+                    if (values := cache.find((self.index, name))) is not None:
+                        found[name] = values
+                elif place == name:
+                    found[name] = dataset[:]
+                    if found[name].nbytes < LARGE_ROW * max(1, self.length):
+                        cache.add((self.index, name), found[name], found[name].nbytes)
+        return {name: found[name] for name in names if name in found}
+
+    def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:
+        """Rows of a stream whose rows are too large to keep all of them."""
+        with open_h5(self.path) as file:
+            dataset = file[self.trajectory][name]
+            return np.stack([dataset[t] for t in rows])
+
+    # Replay
+
+    @property
+    def states(self) -> np.ndarray:
+        """float64 [T, nstate]: MuJoCo's state at every observation, in the order of ``mjSTATE_INTEGRATION``."""
+        return playback.inputs_of(self).state.copy()
+
+    def model(self) -> mujoco.MjModel:
+        """The model that was simulated: the archived one with this episode's sizes, masses, colours and so on. A new object."""
+        return playback.model_of(self)
+
+    def set_state(self, model: mujoco.MjModel, data: mujoco.MjData, t: int) -> None:
+        """Sets ``data`` to the state at observation ``t`` and computes everything that depends on it. Does not step."""
+        if not -self.length <= t < self.length:
+            raise ValueError(f"t is {t}; episode {self.index} has {self.length} observations")
+        playback.set_state(model, data, playback.inputs_of(self).state[t])
+
+    def replay(
+        self,
+        from_: Literal["states", "actions"] = "states",
+        *,
+        model: mujoco.MjModel | None = None,
+        data: mujoco.MjData | None = None,
+    ) -> Iterator[tuple[int, mujoco.MjData]]:
+        """Yields ``(t, data)`` for every observation, always the same ``data``.
+
+        Args:
+            from_: ``states`` sets every recorded state; ``actions`` sets the first one and then simulates with the recorded controls.
+            model: Model to use; by default :meth:`model`.
+            data: Data of ``model`` to use; by default new data.
+        """
+        return playback.replay_episode(self, from_, model, data)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""JSON rows as arrays: one per leaf of the rows' tree, with a mask of the rows that have it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(inner, f"{path}/{key}")
+    else:
+        yield path, value
+
+
+def _array(values: list[Any]) -> np.ndarray:
+    """bool, float64 (null is NaN), or objects for everything else, such as text."""
+    if all(isinstance(v, bool) for v in values):
+        return np.array(values, bool)
+    try:
+        return np.array(values, np.float64)
+    except (TypeError, ValueError):  # text, or lists of different lengths
+        array = np.empty(len(values), object)
+        array[:] = values
+        return array
+
+
+def decode(rows: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """``{"/arm": (values [T, 7], given [T])}`` of uint8 rows ``[T, N]``. Values of rows without the leaf are 0. Lists without
+    elements are left out."""
+    columns: dict[str, tuple[list[int], list[Any]]] = {}
+    for t, row in enumerate(rows):
+        for path, value in _leaves(json.loads(row.tobytes().rstrip(b"\0") or b"{}"), ""):
+            if value == []:
+                continue
+            at, values = columns.setdefault(path, ([], []))
+            at.append(t)
+            values.append(value)
+    result = {}
+    for path in sorted(columns):
+        at, values = columns[path]
+        found = _array(values)
+        given = np.zeros(len(rows), bool)
+        given[at] = True
+        if given.all():
+            result[path] = found, given
+            continue
+        array = np.zeros((len(rows), *found.shape[1:]), found.dtype)
+        array[at] = found
+        if found.dtype == object:
+            array[~given] = ""
+        result[path] = array, given
+    return result
