@@ -114,7 +114,7 @@ def test_a_changed_state_is_named(copied):
 
 
 def test_every_part_of_the_state_has_a_name(door):
-    from mjsense.dataset import playback
+    from mjsense.dataset import replay_check
 
     model = mjs.Dataset(door).episodes[0].model()
     size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -122,7 +122,7 @@ def test_every_part_of_the_state_has_a_name(door):
     for i in range(size):
         recorded, replayed = np.zeros(size), np.zeros(size)
         replayed[i] = 1
-        found = playback._deviation(model, 3, recorded, replayed)
+        found = replay_check._deviation(model, 3, recorded, replayed)
         assert found.count == 1 and found.replayed == 1
         fields.add(found.field)
     assert {"time", "qpos", "qvel", "warmstart", "ctrl", "xfrc_applied", "mocap_pos", "mocap_quat"} <= fields

@@ -3,7 +3,7 @@
 
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode import Episode, Stream
-from mjsense.dataset.playback import Deviation, EpisodeCheck, ReplayReport, check_replay, replay
+from mjsense.dataset.replay_check import Deviation, EpisodeCheck, ReplayReport, check_replay, replay
 from mjsense.dataset.video import Video
 
 __all__ = ["Dataset", "Deviation", "Episode", "EpisodeCheck", "ReplayReport", "Stream", "Video", "check_replay", "replay"]
