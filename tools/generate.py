@@ -323,20 +323,14 @@ class Generator:
     def signature(self, text: str, name: str) -> str:
         struct, renamed, defaults, skipped = SIGNATURES[name]
         fields = [f for f in self.structs[struct]["fields"] if not f["hidden"] and f["name"] not in skipped]
-        # Options that record() has under the same name are described there only.
-        described = set() if name == "record.py" else {f["name"] for f in self.structs["RecordJobCfg"]["fields"]} - set(renamed)
-        lines, texts, shared = [], [], []
+        lines, args = [], []
         for f in fields:
             parameter = renamed.get(f["name"], f["name"])
             default = defaults.get(f["name"], self.default(f["type"], f["default"], f))
             annotation = "Seed" if f["type"]["kind"] == "unsigned" else self.annotation(f["type"], f)
             lines.append(f"    {parameter}: {annotation} = {default},\n")
-            if f["name"] in described:
-                shared.append(parameter)
-            else:
-                texts.append(f"{parameter}: {field_text(f)}")
-        texts += [f"same as in record: {', '.join(shared)}. See :func:`record`."] if shared else []
-        args = ["\n".join(textwrap.wrap(text, WIDTH, initial_indent=" " * 8, subsequent_indent=" " * 12)) + "\n" for text in texts]
+            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}", WIDTH, initial_indent=" " * 8,
+                                                subsequent_indent=" " * 12)) + "\n")  # fmt: skip
         text = between(text, "    # options of a recording", "    # end of options", "".join(lines))
         return between(text, "        Options:", "        Others:", "".join(args))
 

@@ -322,8 +322,22 @@ def make_vec(
 
         Options:
         num_envs: Number of worlds that run in parallel.
-        same as in record: threads, seed, camera_system, cameras, width, height, depth, segmentation, samples, shadows,
-            meshes, horizon, action_noise, perturb, terminate_upon_success. See :func:`record`.
+        threads: Number of simulation threads; 0: one per available CPU.
+        seed: Random seed; the same seed gives the same episodes.
+        camera_system: Name or file of the camera system; by default the cameras of the robot's model.
+        cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
+        width: Width of the images; by default the robot's. [pixels]
+        height: Height of the images; by default the robot's. [pixels]
+        depth: Add a lossless depth image for every camera.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadows: Draw shadows.
+        meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
+            if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
+        horizon: Maximum number of control steps of an episode; by default the task's.
+        action_noise: Add noise to the commands of the arm.
+        perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        terminate_upon_success: End an episode at its first success.
         Others:
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.
