@@ -13,8 +13,10 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/core/data_class.h
   mjsense/core/debug_shapes.h
   mjsense/core/error.h
+  mjsense/core/field_traits.h
   mjsense/core/fields.h
   mjsense/core/json.h
+  mjsense/core/named_enum.h
   mjsense/core/path_field.h
   mjsense/core/pose.h
   mjsense/core/rng.h
@@ -22,6 +24,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/core/sensor.h
   mjsense/core/sensor_fields.h
   mjsense/core/sensor_spec.h
+  mjsense/core/sentence.h
   mjsense/core/shared_cache.h
   mjsense/core/thread_pool.h
   mjsense/effects/all_effects.h

@@ -110,6 +110,8 @@ ENTRY_HEADERS = [
     "cameras/frozen_cameras.h",
     "cameras/load_cameras.h",
     "core/config_checks.h",
+    "core/fields.h",
+    "core/sensor_fields.h",
     "effects/effect_sensor.h",
     "effects/pipeline.h",
     "episode/object_sensors.h",

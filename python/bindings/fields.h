@@ -4,8 +4,10 @@
 
 #include <nanobind/nanobind.h>
 
+#include <memory>
 #include <string>
 
+#include "mjsense/core/fields.h"
 #include "mjsense/core/sensor_fields.h"
 
 namespace mjsense::python {

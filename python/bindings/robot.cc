@@ -9,8 +9,10 @@
 #include <nanobind/stl/vector.h>
 
 #include <memory>
+#include <variant>
 
 #include "mjsense/core/embedded_files.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
@@ -22,6 +24,11 @@ namespace mjsense::python {
 namespace {
 
 using Values = std::vector<std::vector<double>>;
+
+// Name of the kind, e.g. "joint_position".
+const char* controller_kind(const ControllerCfg& cfg) {
+  return std::visit([]<class C>(const C&) { return struct_of<C>().kind; }, cfg);
+}
 
 // A robot in a scene without other objects.
 class PyRobot {

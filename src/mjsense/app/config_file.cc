@@ -5,6 +5,7 @@
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/regular_file.h"
 #include "mjsense/core/toml_value.h"
 

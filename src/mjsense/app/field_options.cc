@@ -8,6 +8,7 @@
 #include <cctype>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 
 namespace mjsense {
 namespace {

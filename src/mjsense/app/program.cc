@@ -28,6 +28,7 @@
 #include "mjsense/app/schema.h"
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/print_stderr.h"
 #include "mjsense/core/regular_file.h"
 #include "mjsense/replay/recording_tools.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 
 namespace mjsense {
 

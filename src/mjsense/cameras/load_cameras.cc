@@ -11,6 +11,7 @@
 #include "mjsense/cameras/frozen_cameras.h"
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/toml_fields.h"
 
 namespace mjsense {

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "mjsense/core/fields.h"
 #include "mjsense/core/sensor_spec.h"
+#include "mjsense/core/sentence.h"
 
 namespace mjsense {
 

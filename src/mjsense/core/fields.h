@@ -14,6 +14,9 @@
 // of a recording and the documentation all use this declaration. The sentence is mandatory: without
 // it the code does not compile. Consumers are written once, for the table that struct_of<T>()
 // builds from visit_fields(), instead of once per struct.
+//
+// Headers that only declare fields do not include this file, but the small ones that they need:
+// core/named_enum.h, core/field_traits.h, core/path_field.h.
 
 #include <array>
 #include <cstddef>
@@ -29,70 +32,11 @@
 #include <variant>
 #include <vector>
 
+#include "mjsense/core/field_traits.h"
+#include "mjsense/core/named_enum.h"
+#include "mjsense/core/sentence.h"
+
 namespace mjsense {
-
-// A sentence of documentation, checked at compile time.
-class Sentence {
- public:
-  // NOLINT: implicit conversion from a literal is intended
-  consteval Sentence(const char* text) : text_(text) {
-    const std::size_t length = __builtin_strlen(text);
-    if (length < 2 || text[length - 1] != '.') throw "needs a sentence that ends with a full stop";
-  }
-  constexpr const char* text() const { return text_; }
-
- private:
-  const char* text_;
-};
-
-// Words for the values of an enumeration that counts from 0. Specialise next to the enumeration:
-//  template <> inline constexpr std::array<std::string_view, 2> kEnumNames<Side>{"left", "right"};
-template <class E>
-inline constexpr std::nullptr_t kEnumNames = nullptr;
-
-template <class E>
-concept HasEnumNames =
-    std::is_enum_v<E> && !std::is_same_v<decltype(kEnumNames<E>), const std::nullptr_t>;
-
-template <HasEnumNames E>
-std::string_view enum_name(E value) {
-  return kEnumNames<E>[static_cast<std::size_t>(value)];
-}
-
-// Index of `text` in `words`, ignoring case. Throws ValueError "sensor 'feet': reduce is 'max':
-// must be one of none, mindist, maxforce, netforce; did you mean 'maxforce'?"
-int enum_index(std::string_view text, std::span<const std::string_view> words,
-               std::string_view context, std::string_view field);
-
-// A member that holds one of the words: `cfg.reduce = ContactReduce::kNone` or `cfg.reduce =
-// "none"`. An unknown word does not compile.
-template <HasEnumNames E>
-class NamedEnum {
- public:
-  using Enum = E;
-  constexpr NamedEnum() = default;
-  constexpr NamedEnum(E value) : value_(value) {}  // NOLINT: implicit conversion is intended
-  // NOLINT: implicit conversion is intended
-  consteval NamedEnum(const char* text) : value_(find(text)) {}
-  constexpr operator E() const { return value_; }  // NOLINT
-  std::string_view text() const { return enum_name(value_); }
-  friend constexpr bool operator==(NamedEnum a, NamedEnum b) { return a.value_ == b.value_; }
-  friend constexpr bool operator==(NamedEnum a, E b) { return a.value_ == b; }
-
- private:
-  static consteval E find(std::string_view text) {
-    for (std::size_t i = 0; i < kEnumNames<E>.size(); ++i) {
-      if (kEnumNames<E>[i] == text) return static_cast<E>(i);
-    }
-    throw "the word is not one of the allowed words";
-  }
-  E value_{};
-};
-
-template <HasEnumNames E>
-E from_word(std::string_view text, std::string_view context, std::string_view field) {
-  return static_cast<E>(enum_index(text, kEnumNames<E>, context, field));
-}
 
 class JsonWriter;
 struct StructDecl;
@@ -338,17 +282,6 @@ double get_number(const FieldType& type, const void* value);
 std::string expected(const FieldType& type);
 
 // ------------------------------------------------------------------------------ types of values
-
-// Name of a choice in Python. Specialise next to the variant: template <> ...
-// kChoiceName<PatternCfg>.
-template <class V>
-inline constexpr const char* kChoiceName = "";
-template <class V>
-inline constexpr int kPlainAlternative = -1;
-
-// Specialise for other types of values; see effects/all_effects.h, core/path_field.h.
-template <class T>
-struct CustomFieldType;
 
 namespace field_detail {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Paths as fields. In a header of its own, because including <filesystem> would add a fifth to the
-// compile time of fields.h.
+// compile time of every configuration.
 
 #include <filesystem>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/field_traits.h"
 
 namespace mjsense {
 

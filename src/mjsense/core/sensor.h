@@ -19,6 +19,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/array.h"
@@ -170,5 +171,10 @@ struct SensorCfg {
   SensorCfg(const SensorCfg&) = default;
   SensorCfg& operator=(const SensorCfg&) = default;
 };
+template <class V>
+void visit_fields(V& v, SensorCfg& c) {
+  v.object("SensorCfg", "Base of the built-in sensor configurations.");
+  v("name", c.name, "Name of the sensor in the scene: ``scene[name]``.").required();
+}
 
 }  // namespace mjsense

@@ -11,12 +11,6 @@
 
 namespace mjsense {
 
-template <class V>
-void visit_fields(V& v, SensorCfg& c) {
-  v.object("SensorCfg", "Base of the built-in sensor configurations.");
-  v("name", c.name, "Name of the sensor in the scene: ``scene[name]``.").required();
-}
-
 struct SensorKind {
   const StructDecl* cfg;  // its `kind` equals the sensor's kind()
   const DataClass* data;  // null: the sensor returns a plain array

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/toml_value.h"
 
 namespace mjsense {

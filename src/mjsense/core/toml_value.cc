@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 
 namespace mjsense {
 namespace {

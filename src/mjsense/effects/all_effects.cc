@@ -3,6 +3,8 @@
 
 #include <vector>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
 namespace {
 

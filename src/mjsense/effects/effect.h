@@ -5,15 +5,18 @@
 // depend only on (seed, world, stream, tick), so that results are the same for any number of
 // threads and worlds.
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "mjsense/core/array.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/field_traits.h"
+#include "mjsense/core/named_enum.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor_spec.h"
 

@@ -8,6 +8,8 @@
 
 #include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense {

@@ -4,10 +4,12 @@
 // keeps the clean values.
 
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/sensor.h"
 #include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/chain.h"
 

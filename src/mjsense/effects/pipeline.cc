@@ -3,6 +3,8 @@
 
 #include <string_view>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
 
 EffectChainCfg pipeline(const PipelineCfg& cfg) {

@@ -191,6 +191,10 @@ class Task {
   // policy_phases and the task's own keys.
   std::string obs_scene(int world) const;
 
+  // The tasks of which this one consists; success in any of them is a success of this task. Empty
+  // for all other tasks.
+  virtual std::span<const std::unique_ptr<Task>> children() const { return {}; }
+
   // For grasp planners; null if nothing has to be grasped.
   virtual const GraspScene* grasp_scene() const { return nullptr; }
 

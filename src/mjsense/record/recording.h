@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
-#include "mjsense/core/fields.h"
 
 namespace mjsense {
 

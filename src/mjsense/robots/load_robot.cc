@@ -9,6 +9,7 @@
 
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/toml_value.h"
 #include "mjsense/robots/real_meshes.h"
 #include "mjsense/robots/sensor_tables.h"

@@ -11,9 +11,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/robots/controllers/controller_cfg.h"
 #include "mjsense/scene/entity.h"

@@ -14,7 +14,6 @@
 #include "mjsense/policies/planner/manipulation_planner.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
-#include "mjsense/tasks/multi_task/multi_task.h"
 
 namespace mjsense {
 namespace {
@@ -100,13 +99,11 @@ class TopDownPlanner final : public PlannerPolicy {
   std::vector<char> uses_any_direction_;  // [B], 1: the episode uses any_direction_
 };
 
-// The first child of a MultiTask that a planner exists for; any child counts as success. Other
-// tasks are returned unchanged.
+// The first child of the task that a planner exists for. Tasks without such a child are returned
+// unchanged.
 Task& first_plannable(Task& task) {
-  auto* several = dynamic_cast<MultiTask*>(&task);
-  if (!several) return task;
-  for (int i = 0; i < several->size(); ++i) {
-    if (has_planner(several->child(i))) return several->child(i);
+  for (const auto& child : task.children()) {
+    if (has_planner(*child)) return *child;
   }
   return task;
 }

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/episode_outcome.h"
 #include "mjsense/record/model_fields.h"

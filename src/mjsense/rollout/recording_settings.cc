@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/json.h"
 #include "mjsense/core/regular_file.h"
 #include "mjsense/record/checksum.h"

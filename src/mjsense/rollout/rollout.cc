@@ -4,14 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <functional>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/row_error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/observe/shared_field.h"
-#include "mjsense/rollout/action_sensors.h"
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/rollout/replay_sensor.h"
 #include "mjsense/rollout/task_defaults.h"
@@ -19,17 +16,6 @@
 
 namespace mjsense {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-constexpr int kDraws = 10;  // maximum draws of a start until one is playable
-// m/s or rad/s. MuJoCo's own limit is 1e10, which lets an object that a contact has thrown away fly
-// on until the horizon.
-constexpr double kMaxSpeed = 1e4;
-
-double since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 TaskCfg task_cfg(const RolloutCfg& cfg) {
   TaskCfg out;
@@ -85,32 +71,6 @@ RolloutCfg resolved(RolloutCfg cfg) {
     cfg.scene = default_scene(task_components(cfg.task)[0]);
   return cfg;
 }
-
-// Runs a function on the fresh data of some worlds, in parallel.
-class Rollout::ForEachHook final : public WorldHooks {
- public:
-  explicit ForEachHook(std::function<void(const World&)> body) : body_(std::move(body)) {}
-  void substep(const World& /*world*/) override {}
-  void reset(const World& /*world*/) override {}
-  void refreshed(const World& world) override { body_(world); }
-
- private:
-  std::function<void(const World&)> body_;
-};
-
-// A subset of the worlds, as seen by tasks and policies.
-class Rollout::WorldSubset final : public ActiveWorlds {
- public:
-  WorldSubset(Rollout& rollout, std::span<const int> ids) : rollout_(rollout), ids_(ids) {}
-  std::span<const int> ids() const override { return ids_; }
-  void for_each(std::function<void(const World&)> body) override {
-    rollout_.for_each(ids_, std::move(body));
-  }
-
- private:
-  Rollout& rollout_;
-  std::span<const int> ids_;
-};
 
 Rollout::Rollout(const RolloutCfg& cfg) : cfg_(resolved(cfg)) {
   check_fields(cfg_, "");
@@ -215,286 +175,11 @@ Rollout::~Rollout() = default;
 
 const Sensor* Rollout::replay_sensor() const { return replay_.get(); }
 
-std::span<const int> Rollout::active_worlds() {
-  ids_.clear();
-  for (int w = 0; w < num_worlds(); ++w) {
-    if (active_[w] && faults_[w].empty()) ids_.push_back(w);
-  }
-  return ids_;
-}
-
-void Rollout::for_each(std::span<const int> worlds, std::function<void(const World&)> body) {
-  ForEachHook hooks(std::move(body));
-  simulation_->worlds().visit(worlds, hooks);
-}
-
-void Rollout::set_fault(int world, std::string text) {
-  if (!active_[world] || !faults_[world].empty()) return;
-  faults_[world] = std::move(text);
-  evaluations_[world] = {};  // discard the evaluation of the previous step
-}
-
-void Rollout::take_failures() {
-  for (const Failure& failure : simulation_->failures()) set_fault(failure.world, failure.message);
-}
-
-// Ends the episodes in which something is faster than kMaxSpeed.
-void Rollout::check_speeds(std::span<const int> worlds) {
-  const mjModel* m = simulation_->model();
-  for (int w : worlds) {
-    for (int i = 0; i < m->nv; ++i) {
-      const double speed = std::abs(rows_[w].qvel[i]);
-      if (speed <= kMaxSpeed) continue;
-      const int body = m->dof_bodyid[i];
-      const char* name = mj_id2name(m, mjOBJ_BODY, body);
-      set_fault(w, fmt::format("the physics diverged: body '{}' moves at {:.2g} m/s or rad/s, more "
-                               "than {:.0e}",
-                               name ? name : std::to_string(body), speed, kMaxSpeed));
-      break;
-    }
-  }
-}
-
-void Rollout::reseed(std::uint64_t seed) {
-  std::ranges::fill(active_, 0);
-  cfg_.seed = seed;
-  task_->reseed(seed);
-  simulation_->seed(seed);
-}
-
-void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
-  if (worlds.size() != episodes.size()) {
-    throw ValueError(
-        fmt::format("start: {} worlds, but {} episodes", worlds.size(), episodes.size()));
-  }
-  if (worlds.empty()) return;
-  const auto begun = Clock::now();
-  const std::vector<int> sorted = simulation_->worlds().checked_ids(worlds);
-  for (std::size_t k = 0; k < worlds.size(); ++k) {
-    const int w = worlds[k];
-    active_[w] = true;
-    faults_[w].clear();
-    evaluations_[w] = {};
-    refused_[w] = false;
-    actions_[w] = Action{};
-    log_->begin(w);
-  }
-  sample(worlds, episodes);
-  place_cameras(sorted);
-  WorldSubset begins(*this, sorted);
-  task_->begin_all(begins);
-  if (policy_) policy_->reset_all(begins);
-  times_.reset += since(begun);
-  sense();
-  moving_.assign(sorted.begin(), sorted.end());
-  std::erase_if(moving_, [this](int w) { return !faults_[w].empty(); });
-  evaluate(moving_);
-  finish_rows();
-}
-
-// Samples the starts and makes them fresh. Starts that cannot be played are drawn again; those that
-// still cannot after kDraws draws become faults.
-void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
-  std::vector<std::int64_t> of(num_worlds());
-  for (std::size_t k = 0; k < worlds.size(); ++k) of[worlds[k]] = episodes[k];
-  std::vector<int> left = simulation_->worlds().checked_ids(worlds);
-  std::vector<std::string> why(num_worlds());
-  for (int draw = 0; draw < kDraws && !left.empty(); ++draw) {
-    for (int w : left) simulation_->worlds().rekey(w, static_cast<std::uint32_t>(of[w]));
-    simulation_->reset(left, task_->start_key());
-    for (int w : left) task_->sample(w, of[w], rows_[w], draw);
-    simulation_->forward(left);
-    take_failures();
-    for_each(left, [&](const World& world) { why[world.id] = task_->start_error(world); });
-    std::erase_if(left, [&](int w) { return why[w].empty() || !faults_[w].empty(); });
-  }
-  for (int w : left) set_fault(w, std::move(why[w]));
-}
-
-// Computes the poses of cameras that vary between episodes.
-void Rollout::place_cameras(std::span<const int> worlds) {
-  if (!camera_system_->varies()) return;
-  std::vector<std::string> why(num_worlds());
-  for_each(worlds, [&](const World& world) {
-    if (!faults_[world.id].empty()) return;
-    std::vector<int> objects;
-    for (const TaskObject& object : task_->objects(world.id)) {
-      if (object.body >= 0) objects.push_back(object.body);
-    }
-    why[world.id] = camera_system_->place_cameras(world, cfg_.seed,
-                                                  static_cast<std::uint64_t>(episode(world.id)),
-                                                  middle_of(*task_, world), objects);
-  });
-  for (int w : worlds) {
-    if (!why[w].empty()) set_fault(w, std::move(why[w]));
-  }
-  simulation_->worlds().model_changed();
-  simulation_->forward(worlds);
-  take_failures();
-}
-
 std::string Rollout::obs_scene(int world) const {
   std::string scene = task_->obs_scene(world);
   if (cfg_.camera_system.empty() && !camera_system_->varies()) return scene;
   return fmt::format("{},\"cameras\":{}}}", scene.substr(0, scene.rfind('}')),
                      camera_system_->frozen(world));
-}
-
-void Rollout::act() {
-  if (!policy_) throw ValueError("this rollout has no policy: write action(world) before step()");
-  const auto begun = Clock::now();
-  for (int w : active_worlds()) actions_[w] = Action{};
-  if (!ids_.empty()) {
-    WorldSubset worlds(*this, ids_);
-    policy_->act_all(worlds, actions_);
-  }
-  times_.policy += since(begun);
-}
-
-// Applies the actions of these worlds and advances them. `answers`: the actions answer the current
-// observation (false for the later steps of a chunk).
-void Rollout::move(std::span<const int> worlds, bool answers) {
-  auto begun = Clock::now();
-  if (answers) {
-    for_each(worlds, [this](const World& world) {
-      log_->remember(world, task_->robot());
-      task_->apply(world, actions_[world.id], rows_[world.id]);
-    });
-  } else {
-    for_each(worlds, [this](const World& world) {
-      task_->apply(world, actions_[world.id], rows_[world.id]);
-    });
-  }
-  task_->advance();
-  if (replay_) replay_->note_written(worlds);
-  times_.policy += since(begun);
-
-  begun = Clock::now();
-  const double rows = row_cost(), cast = cast_cost();
-  guard_rows([this, &worlds] { simulation_->step(1, worlds); });
-  take_failures();
-  check_speeds(worlds);
-  const double spent_rows = (row_cost() - rows) / threads();
-  const double spent_cast = cast_cost() - cast;
-  times_.sensing += spent_rows;
-  times_.rendering += spent_cast;
-  times_.physics += since(begun) - spent_rows - spent_cast;
-}
-
-void Rollout::step() {
-  if (active_worlds().empty()) return;
-  move(ids_, true);
-  sense();
-  evaluate(ids_);
-  finish_rows();
-}
-
-void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) {
-  const auto B = static_cast<std::size_t>(num_worlds());
-  if (actions.empty() || actions.size() % B != 0) {
-    throw ValueError(fmt::format(
-        "step_chunk: {} actions: must be a positive multiple of the {} worlds", actions.size(), B));
-  }
-  const std::size_t steps = actions.size() / B;
-  std::vector<double> reward(B);
-  const auto goes_on = [&](int w) {
-    const Evaluation& now = evaluations_[w];
-    return active_[w] && faults_[w].empty() && !now.terminal && !now.truncated &&
-           !(stop_on_success && now.success);
-  };
-  moving_.assign(active_worlds().begin(), active_worlds().end());
-  for (std::size_t k = 0; k < steps && !moving_.empty(); ++k) {
-    for (int w : moving_) actions_[w] = actions[k * B + w];
-    move(moving_, k == 0);
-    std::erase_if(moving_, [&](int w) { return !faults_[w].empty(); });
-    if (moving_.empty()) break;
-    evaluate(moving_);
-    for (int w : moving_) reward[w] += evaluations_[w].reward;
-    std::erase_if(moving_, [&](int w) { return !goes_on(w); });
-  }
-  for (int w : active_worlds()) evaluations_[w].reward = reward[w];
-  sense();
-  finish_rows();
-}
-
-// Runs `body`. If a row cannot be computed, only the episode of its world ends, and the result is
-// false.
-bool Rollout::guard_rows(const std::function<void()>& body) {
-  try {
-    body();
-    return true;
-  } catch (const RowError& e) {
-    for (const RowError::Fault& fault : e.faults) {
-      if (!active_[fault.world] || !faults_[fault.world].empty()) throw;
-    }
-    for (const RowError::Fault& fault : e.faults) {
-      set_fault(fault.world, fault.text);
-      refused_[fault.world] = true;
-    }
-    return false;
-  }
-}
-
-void Rollout::sense() {
-  const auto begun = Clock::now();
-  const double cast = cast_cost();
-  while (!active_worlds().empty() && !guard_rows([this] { suite_.refresh(ids_); })) {
-  }
-  if (replay_) {
-    Sensor* const replay[] = {replay_.get()};
-    simulation_->refresh(replay, active_worlds());
-  }
-  const double spent_cast = cast_cost() - cast;
-  times_.rendering += spent_cast;
-  times_.sensing += since(begun) - spent_cast;
-}
-
-// Evaluates each world exactly once per observation, because a task may keep state between
-// evaluations.
-void Rollout::evaluate(std::span<const int> worlds) {
-  if (worlds.empty()) return;
-  const auto begun = Clock::now();
-  WorldSubset some(*this, worlds);
-  task_->evaluate_all(some, evaluations_);
-  for (int w : worlds) {
-    const double reward = evaluations_[w].reward;
-    if (!std::isfinite(reward))
-      set_fault(w, fmt::format("task '{}': the reward is {}", task_->name(), reward));
-  }
-  times_.sensing += since(begun);
-}
-
-// Updates rows that depend on the evaluation, which happens after the sensors.
-void Rollout::finish_rows() {
-  for (int w : ids_) {
-    if (evaluations_[w].terminal) blank_actions(suite_, w, !(*log_)[w].given);
-  }
-  Sensor* info = task_->info_follows_evaluation() ? suite_.find("task_info") : nullptr;
-  if (!info) return;
-  while (!active_worlds().empty() && !guard_rows([this, info] {
-    for_each(ids_, [info](const World& world) { info->compute(world); });
-  })) {
-  }
-}
-
-double Rollout::row_cost() const {
-  double seconds = simulation_->ray_scene_cost();
-  for (const auto& sensor : suite_.sensors()) seconds += simulation_->cost(*sensor).compute;
-  for (const RecordedCamera& camera : cameras_) {
-    seconds += simulation_->cost(*camera.sensor).compute;
-  }
-  return seconds;
-}
-
-double Rollout::cast_cost() const {
-  double seconds = 0;
-  for (const RecordedCamera& camera : cameras_) seconds += simulation_->cost(*camera.sensor).cast;
-  return seconds;
-}
-
-// Number of threads that share the sensor work of one step.
-int Rollout::threads() const {
-  return std::max(1, std::min<int>(simulation_->worlds().threads(), static_cast<int>(ids_.size())));
 }
 
 }  // namespace mjsense

@@ -27,7 +27,6 @@
 #include <vector>
 
 #include "mjsense/cameras/camera_system.h"
-#include "mjsense/core/fields.h"
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
 #include "mjsense/observe/suite.h"

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/core/name_matching.h"
 #include "mjsense/scene/compiler_settings.h"

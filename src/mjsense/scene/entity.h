@@ -12,8 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/fields.h"
-
 namespace mjsense {
 
 // Source of an MJCF model: a path, an XML text, or a file of models/ ("embedded:objects/mug.xml").

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 
 namespace mjsense {
 namespace {

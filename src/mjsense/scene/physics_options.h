@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 
 namespace mjsense {
 

@@ -8,6 +8,7 @@
 
 #include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain_tile.h"
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 
 namespace mjsense {
 

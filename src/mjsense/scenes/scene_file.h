@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 #include "mjsense/scene/default_lighting.h"
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/scene.h"

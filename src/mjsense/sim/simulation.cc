@@ -4,76 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
 #include <exception>
-#include <functional>
-#include <new>
 #include <numeric>
 
-#include "mjsense/core/control_step.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/row_error.h"
 #include "mjsense/rays/ray_scene.h"
+#include "mjsense/sim/sensor_errors.h"
+#include "mjsense/sim/simulation_hooks.h"
+#include "mjsense/sim/simulation_slots.h"
 
 namespace mjsense {
 namespace {
-
-// Measures seconds since its construction. If off, returns 0 and does not read the clock, which
-// takes 25 ns, as much as a small sensor.
-class Timer {
- public:
-  explicit Timer(bool on) : on_(on) {
-    if (on_) start_ = std::chrono::steady_clock::now();
-  }
-  double seconds() const {
-    if (!on_) return 0.0;
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-
- private:
-  bool on_;
-  std::chrono::steady_clock::time_point start_;
-};
-
-// A lack of memory in a sensor, with the sensor's name. It allocates nothing.
-class SensorOutOfMemory : public std::bad_alloc {
- public:
-  explicit SensorOutOfMemory(const Sensor& sensor) {
-    std::snprintf(message_, sizeof message_, "sensor '%.80s': out of memory",
-                  sensor.name().c_str());
-  }
-  const char* what() const noexcept override { return message_; }
-
- private:
-  char message_[120];
-};
-
-// Runs `body` for a sensor. Errors that do not name the sensor get its name as a prefix.
-template <class Body>
-void guarded(const Sensor& sensor, Body&& body) {
-  try {
-    body();
-  } catch (const RowError&) {
-    throw;  // already names the sensor
-  } catch (const Error& e) {
-    const std::string named = fmt::format("'{}'", sensor.name());
-    if (std::string_view(e.what()).find(named) != std::string_view::npos) throw;
-    const std::string message = fmt::format("sensor {}: {}", named, e.what());
-    switch (e.kind()) {
-      case ErrorKind::kValue:
-        throw ValueError(message);
-      case ErrorKind::kKey:
-        throw KeyError(message);
-      case ErrorKind::kRuntime:
-        throw RuntimeError(message);
-    }
-  } catch (const SensorOutOfMemory&) {
-    throw;  // already names the sensor
-  } catch (const std::bad_alloc&) {
-    throw SensorOutOfMemory(sensor);
-  }
-}
 
 // Runs `first`, then `next` until it returns false, even if they throw RowError, so that all
 // listeners are notified although some rows could not be computed. Then the first exception is
@@ -100,121 +42,6 @@ void after_all(First&& first, Next&& next) {
 
 }  // namespace
 
-// A sensor and the state of its rows.
-struct Simulation::Slot {
-  Sensor* sensor;
-  std::vector<Slot*> inputs;
-  // by world: version_ of the state that the row was computed from
-  std::vector<std::int64_t> computed;
-  std::vector<double> compute_s;  // by world
-  double cast_s = 0;
-  mjtStage needs = mjSTAGE_ACC;
-  ControlStepListener* listener = nullptr;  // the sensor, if it is a ControlStepListener
-  int phase = 0;        // number of earlier passes: 1 + the phase of an input that casts
-  bool casts = false;   // stage kCast or kBatch: finished by cast()
-  bool read = false;    // since the last step
-  bool wanted = false;  // temporary flag of collect()
-};
-
-struct Simulation::Scratch {
-  std::vector<Slot*> slots;
-  std::vector<int> ids;
-};
-
-class Simulation::Borrowed {
- public:
-  explicit Borrowed(Simulation& sim) : sim_(sim) {
-    if (sim.scratch_.empty()) {
-      scratch_ = std::make_unique<Scratch>();
-    } else {
-      scratch_ = std::move(sim.scratch_.back());
-      sim.scratch_.pop_back();
-    }
-    scratch_->slots.clear();
-    scratch_->ids.clear();
-  }
-  ~Borrowed() { sim_.scratch_.push_back(std::move(scratch_)); }
-  Borrowed(const Borrowed&) = delete;
-  Borrowed& operator=(const Borrowed&) = delete;
-  Scratch* operator->() { return scratch_.get(); }
-
- private:
-  Simulation& sim_;
-  std::unique_ptr<Scratch> scratch_;
-};
-
-// Sensor callbacks of the parallel pass of MuJoCo's threads over the worlds.
-class Simulation::Hooks final : public WorldHooks {
- public:
-  enum class Only { kNothing, kSubstep, kReset };
-  Hooks(Simulation& sim, std::span<Slot* const> slots, int phase)
-      : sim_(sim), slots_(slots), phase_(phase) {
-    for (const Slot* s : slots) {
-      if (s->phase != phase) continue;
-      rays_ |= s->sensor->stage() == Stage::kCast;
-      stage_ = std::max(stage_, s->needs);
-    }
-    if (rays_) stage_ = std::max(stage_, mjSTAGE_POS);
-  }
-
-  // Calls only substep() or reset() of every sensor.
-  Hooks(Simulation& sim, Only only, double elapsed = 0.0)
-      : sim_(sim),
-        only_(only),
-        elapsed_(elapsed),
-        stage_(only == Only::kSubstep ? sim.substep_stage_ : mjSTAGE_ACC) {}
-
-  mjtStage stage() const override { return stage_; }
-  mjtStage substep_stage() const override { return sim_.substep_stage_; }
-  bool wants_substep() const override { return sim_.any_substep_; }
-
-  int control_every() const override { return sim_.control_every_; }
-  mjtStage control(const World& world, int index) override { return sim_.control_(world, index); }
-
-  void substep(const World& world) override {
-    for (auto& slot : sim_.slots_) {
-      if (slot->sensor->wants_substep())
-        guarded(*slot->sensor, [&] { slot->sensor->substep(world); });
-    }
-  }
-
-  void reset(const World& world) override {
-    for (auto& slot : sim_.slots_) guarded(*slot->sensor, [&] { slot->sensor->reset(world); });
-  }
-
-  void refreshed(const World& world) override {
-    if (only_ == Only::kSubstep) {
-      World by_hand = world;
-      by_hand.elapsed = elapsed_;
-      return substep(by_hand);
-    }
-    if (only_ == Only::kReset) return reset(world);
-    const std::int64_t version = sim_.version_[world.id];
-    if (rays_ && sim_.rays_version_[world.id] != version) {
-      const Timer timer(sim_.measure_cost_);
-      sim_.rays_->update(world);
-      sim_.rays_s_[world.id] += timer.seconds();
-      sim_.rays_version_[world.id] = version;
-    }
-    for (Slot* slot : slots_) {
-      if (slot->phase != phase_ || slot->computed[world.id] == version) continue;
-      const Timer timer(sim_.measure_cost_);
-      guarded(*slot->sensor, [&] { slot->sensor->compute(world); });
-      slot->compute_s[world.id] += timer.seconds();
-      if (!slot->casts) slot->computed[world.id] = version;
-    }
-  }
-
- private:
-  Simulation& sim_;
-  std::span<Slot* const> slots_;
-  int phase_ = 0;
-  Only only_ = Only::kNothing;
-  double elapsed_ = 0.0;
-  mjtStage stage_ = mjSTAGE_NONE;
-  bool rays_ = false;
-};
-
 Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
     : cfg_(cfg), scene_(std::move(scene)) {
   if (cfg.decimation < 1)
@@ -233,71 +60,6 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
 }
 
 Simulation::~Simulation() = default;
-
-// Initializes in the order of the registry, except that a sensor follows those that it reads.
-void Simulation::initialize_scene() {
-  std::vector<Sensor*> done, open;
-  const auto contains = [](const std::vector<Sensor*>& list, const Sensor* s) {
-    return std::find(list.begin(), list.end(), s) != list.end();
-  };
-  const std::function<void(Sensor&)> visit = [&](Sensor& sensor) {
-    if (contains(done, &sensor)) return;
-    if (contains(open, &sensor)) {
-      throw ValueError(fmt::format("sensor '{}': reads itself", sensor.name()));
-    }
-    open.push_back(&sensor);
-    for (const std::string& key : sensor.initialization_dependencies()) {
-      guarded(sensor, [&] { visit(scene_->sensor(key)); });
-    }
-    open.pop_back();
-    initialize(sensor);
-    done.push_back(&sensor);
-  };
-  for (auto& sensor : scene_->sensors()) visit(*sensor);
-}
-
-RayScene& Simulation::rays() {
-  if (!rays_) rays_ = std::make_unique<RayScene>(scene_->model(), cfg_.num_worlds);
-  return *rays_;
-}
-
-void Simulation::initialize(Sensor& sensor) {
-  const SensorInit init{scene_->model(), scene_.get(),  cfg_.num_worlds,
-                        cfg_.decimation, pool_->size(), &shared_};
-  guarded(sensor, [&] { sensor.initialize(init); });
-  auto slot = std::make_unique<Slot>();
-  slot->sensor = &sensor;
-  slot->listener = dynamic_cast<ControlStepListener*>(&sensor);
-  slot->computed.assign(cfg_.num_worlds, 0);
-  slot->compute_s.assign(cfg_.num_worlds, 0.0);
-  slot->casts = sensor.stage() == Stage::kCast || sensor.stage() == Stage::kBatch;
-  if (sensor.stage() == Stage::kPostCast) slot->phase = 1;
-  for (const Sensor* input : sensor.inputs()) {
-    Slot& in = slot_of(*input);
-    slot->inputs.push_back(&in);
-    slot->phase = std::max(slot->phase, in.phase + (in.casts ? 1 : 0));
-  }
-  if (sensor.stage() == Stage::kCast) rays();
-  slot->needs = sensor.needs();
-  if (sensor.wants_substep()) {
-    any_substep_ = true;
-    substep_stage_ = std::max(substep_stage_, slot->needs);
-  }
-  slots_.push_back(std::move(slot));
-}
-
-void Simulation::add(std::shared_ptr<Sensor> sensor) {
-  initialize(*sensor);
-  added_.push_back(std::move(sensor));
-}
-
-Simulation::Slot& Simulation::slot_of(const Sensor& sensor) const {
-  for (auto& slot : slots_) {
-    if (slot->sensor == &sensor) return *slot;
-  }
-  throw ValueError(fmt::format("sensor '{}' does not belong to this simulation: call add() first",
-                               sensor.name()));
-}
 
 // Collects the slots for which `wanted` holds, and their inputs, in order: an input was initialized
 // before the sensor that reads it.

@@ -4,9 +4,11 @@
 // detects failures. It allocates no memory while following.
 
 #include <array>
+#include <span>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 #include "mjsense/policies/planner/plan.h"
 #include "mjsense/robots/robot.h"
 

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/field_traits.h"
 
 namespace mjsense {
 
@@ -135,10 +135,5 @@ using ControllerCfg =
                  HolonomicBaseCfg, DifferentialBaseCfg, MocapBaseCfg, FreeBaseCfg, NoControllerCfg>;
 template <>
 inline constexpr const char* kChoiceName<ControllerCfg> = "ControllerCfg";
-
-// Name of the kind, e.g. "joint_position".
-inline const char* controller_kind(const ControllerCfg& cfg) {
-  return std::visit([]<class C>(const C&) { return struct_of<C>().kind; }, cfg);
-}
 
 }  // namespace mjsense

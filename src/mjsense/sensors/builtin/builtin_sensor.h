@@ -6,9 +6,11 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/named_enum.h"
+#include "mjsense/core/sensor.h"
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 

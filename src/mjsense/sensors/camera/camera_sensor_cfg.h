@@ -30,9 +30,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/named_enum.h"
+#include "mjsense/core/sensor.h"
 
 namespace mjsense {
 

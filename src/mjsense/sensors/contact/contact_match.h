@@ -5,11 +5,12 @@
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/named_enum.h"
 
 namespace mjsense {
 

@@ -15,9 +15,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/named_enum.h"
+#include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_match.h"
 #include "mjsense/sensors/contact/contact_memory.h"
 #include "mjsense/sensors/contact/contact_reducer.h"

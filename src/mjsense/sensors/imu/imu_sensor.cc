@@ -7,6 +7,8 @@
 
 #include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/scene/model_sensors/builtin_draw.h"
 #include "mjsense/sensors/imu/imu_data.h"
 

@@ -6,9 +6,10 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/sensor.h"
 #include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/chain.h"
 #include "mjsense/scene/entity.h"

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/field_traits.h"
 
 namespace mjsense {
 

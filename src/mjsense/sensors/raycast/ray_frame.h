@@ -4,8 +4,10 @@
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <string_view>
 
+#include "mjsense/core/named_enum.h"
 #include "mjsense/scene/entity.h"
 
 namespace mjsense {

@@ -9,6 +9,8 @@
 
 #include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/core/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 

@@ -20,10 +20,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/core/debug_shapes.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/named_enum.h"
+#include "mjsense/core/sensor.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/scene/entity.h"

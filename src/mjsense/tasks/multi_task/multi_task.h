@@ -4,6 +4,7 @@
 // the maximum of the children's rewards.
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,6 +53,7 @@ class MultiTask final : public Task {
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
   void edit_suite(SensorSuite& suite) const override { children_[0]->edit_suite(suite); }
+  std::span<const std::unique_ptr<Task>> children() const override { return children_; }
   const GraspScene* grasp_scene() const override;  // of the first child that has one
 
   int size() const { return static_cast<int>(children_.size()); }
