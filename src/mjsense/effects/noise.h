@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/effects/distribution.h"
 #include "mjsense/effects/effect.h"
 
 namespace mjsense {

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/encoder.h"
+#include "mjsense/record/encoder_pool.h"
 #include "mjsense/record/process.h"
 #include "mjsense/record/spawn.h"
 

@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "mjsense/record/encoder.h"
+#include "mjsense/record/encoder_pool.h"
 #include "mjsense/record/episode_file.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/record/recording_folder.h"

@@ -12,7 +12,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
-#include "mjsense/record/episode_outcome.h"
+#include "mjsense/record/outcome_details.h"
 #include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/json_text.h"

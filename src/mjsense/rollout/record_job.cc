@@ -11,7 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/episode_outcome.h"
+#include "mjsense/record/outcome_details.h"
 #include "mjsense/record/model_fields.h"
 #include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"

@@ -52,7 +52,7 @@ class WorldHooks {
 
 // A world whose physics diverged in the last call. Only this world was reset; the others continued.
 // If MuJoCo raises an error in the reset too, for example because of a value in the world's model,
-// the message says so. Such a world is broken: its rows keep their last values, and each step(),
+// its text is the message. Such a world is broken: its rows keep their last values, and each step(),
 // forward() and reset() tries to reset it again. A call whose worlds are all broken throws.
 struct Failure {
   int world;

@@ -24,9 +24,4 @@ std::unique_ptr<Controller> make_kind(const NoControllerCfg& /*cfg*/, const Move
   return std::make_unique<NoController>(group, init);
 }
 
-std::unique_ptr<Controller> make_controller(const ControllerCfg& cfg, const MoveGroup& group,
-                                            const ControllerInit& init) {
-  return std::visit([&](const auto& kind) { return make_kind(kind, group, init); }, cfg);
-}
-
 }  // namespace mjsense

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/record/episode_outcome.h"
+#include "mjsense/record/outcome_details.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The outcome of an episode, as recordings store it and summaries count it.
+// Separates the outcome of an episode from its details, so that summaries can count equal outcomes.
 
 #include <string_view>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/record/encoder.h"
+#include "mjsense/record/encoder_pool.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
