@@ -337,10 +337,10 @@ TEST(RecorderFaults, FfmpegWritesAnIncompleteVideo) {
       {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "the file is truncated"},
       {"ffmpeg -loglevel error -f rawvideo -pixel_format yuv420p -video_size 16x12 -i pipe:0 -c:v "
        "mpeg4 -y -f mp4 file:$out",
-       "holds mp4v in MP4, expected h264 in MP4"},
+       "contains mp4v in MP4, expected h264 in MP4"},
       {"ffmpeg -loglevel error -f rawvideo -pixel_format yuv420p -video_size 16x12 -i pipe:0 -c:v "
        "libx264 -y -f matroska file:$out",
-       "holds h264 in Matroska, expected h264 in MP4"}};
+       "contains h264 in Matroska, expected h264 in MP4"}};
   for (const auto& [body, complaint] : lies) {
     TempDir dir, tools;
     FakeSuite suite({1, 16, 12, true, false});

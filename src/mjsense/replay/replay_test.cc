@@ -209,7 +209,7 @@ TEST_F(RepairNames, AreAddedAtomically) {
 TEST_F(RepairNames, KeepThePermissionsOfTheFile) {
   for (const fs::perms mode : {fs::perms(0640), fs::perms(0444)}) {
     fs::permissions(path, mode);
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
     EXPECT_EQ(fs::status(path).permissions(), mode);
     fs::permissions(path, fs::perms(0600));
     in_videos(true, [&](hid_t videos) {
