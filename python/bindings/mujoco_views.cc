@@ -62,10 +62,10 @@ nb::object numpy_type<mjContact>() {
   FIELD(dist)
   FIELD(pos)
   FIELD(frame)
-  FIELD(includemargin) FIELD(friction) FIELD(solref) FIELD(solreffriction) FIELD(solimp)
-      FIELD(adhesion) FIELD(surfacevel) FIELD(mu) FIELD(H) FIELD(dim) FIELD(geom1) FIELD(geom2)
-          FIELD(geom) FIELD(flex) FIELD(elem) FIELD(vert) FIELD(exclude)
-              FIELD(efc_address) return type.done();
+  FIELD(includemargin)
+  FIELD(friction) FIELD(solref) FIELD(solreffriction) FIELD(solimp) FIELD(adhesion)
+      FIELD(surfacevel) FIELD(mu) FIELD(H) FIELD(dim) FIELD(geom1) FIELD(geom2) FIELD(geom)
+          FIELD(flex) FIELD(elem) FIELD(vert) FIELD(exclude) FIELD(efc_address) return type.done();
 }
 
 template <>

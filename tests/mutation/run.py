@@ -38,7 +38,7 @@ BUILD = TREE / "build/dev"
 
 # In the order of docs/architecture.md: dependencies point up this list, so a mistake shows in a room or in one below.
 ROOMS = [*re.findall(r"^\| `(\w+)/", (ROOT / "docs/architecture.md").read_text(), re.M), "python"]
-# Those with a test program: as cmake/Tests.cmake, where an x_test.cc stands beside the code.
+# Rooms with a test program: those with x_test.cc files, as in cmake/Tests.cmake.
 PROGRAMS = [room for room in ROOMS if any((ROOT / "src/mjsense" / room).rglob("*_test.cc"))]
 PYTESTS = {
     "hdf5": ["tests/record"],
@@ -62,7 +62,7 @@ QUICK_PYTESTS = {
 
 
 class Failure(Exception):
-    """What is no answer: a mutant that does not apply or does not compile, tests that fail without it."""
+    """There is no result: the mutant does not apply or does not compile, or the tests fail without it."""
 
 
 @dataclasses.dataclass
@@ -258,7 +258,7 @@ class Runner:
 
 
 def module(name: str):
-    """A file beside this one, under a name of its own: other folders of tests have a run.py too."""
+    """Loads a module of this folder under a unique name, because other folders of tests have a run.py too."""
     spec = importlib.util.spec_from_file_location(f"mutation_{name}", HERE / f"{name}.py")
     loaded = sys.modules[f"mutation_{name}"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(loaded)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every mutant applies to the code as it stands: whoever moves its text moves it here too."""
+"""Every listed mutant applies to the current code. A change of the text that it quotes must change it too."""
 
 import importlib.util
 import sys
