@@ -30,6 +30,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/effects/all_effects.h
   mjsense/effects/calibration.h
   mjsense/effects/chain.h
+  mjsense/effects/distribution.h
   mjsense/effects/effect.h
   mjsense/effects/effect_sensor.h
   mjsense/effects/noise.h

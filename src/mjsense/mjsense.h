@@ -30,6 +30,7 @@
 #include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/chain.h"
+#include "mjsense/effects/distribution.h"
 #include "mjsense/effects/effect.h"
 #include "mjsense/effects/effect_sensor.h"
 #include "mjsense/effects/noise.h"
