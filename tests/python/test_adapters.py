@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/*_images.py).
+"""mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
 The packages and the MuJoCo that they need are in an environment of their own, build/adapters. MJSENSE_TEST_ADAPTERS=1 makes it.
 """
@@ -44,10 +44,12 @@ def python():
     return folder / "bin/python"
 
 
-@pytest.mark.parametrize("script", ["dm_control", "aloha", "gymnasium", "robosuite"])
+@pytest.mark.parametrize(
+    "script", ["dm_control_images", "aloha_images", "gymnasium_images", "robosuite_images", "without_opengl"]
+)
 def test_images_are_those_of_the_package(python, script):
     path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    run = [python, "-W", "ignore", Path(__file__).parent / f"adapters/{script}_images.py"]
+    run = [python, "-W", "ignore", Path(__file__).parent / f"adapters/{script}.py"]
     done = subprocess.run(run, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
     if done.returncode == 77:
         pytest.skip(done.stdout)

@@ -4,7 +4,7 @@
     mjsense.compat.robosuite.use()
     env = robosuite.make("Lift", robots="Panda", has_renderer=False, has_offscreen_renderer=True)
 
-``use`` is called before environments are made. It also serves packages that build on robosuite's environments, such as LIBERO.
+``use`` is called before environments are made.
 """
 
 from __future__ import annotations

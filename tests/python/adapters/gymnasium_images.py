@@ -8,7 +8,6 @@ require_opengl()
 import gymnasium
 import gymnasium_robotics
 import metaworld  # noqa: F401
-
 from mjsense.compat import gymnasium as adapter
 
 gymnasium.register_envs(gymnasium_robotics)

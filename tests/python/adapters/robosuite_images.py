@@ -1,18 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """robosuite's camera observations: agentview and wrist of Lift and PickPlace, with depth and segmentation."""
 
-import sys
-
 import numpy as np
 from images import compare, compare_depth, end, require_opengl
 
 require_opengl()
 
 import robosuite
+from mjsense.compat import robosuite as adapter
 from robosuite.environments import base
 from robosuite.utils.camera_utils import get_real_depth_map
-
-from mjsense.compat import robosuite as adapter
 
 CAMERAS = ["agentview", "robot0_eye_in_hand"]
 own_context = base.MjRenderContextOffscreen
