@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import contextlib
+import weakref
 from typing import TYPE_CHECKING, Any
 
 import mujoco
@@ -37,8 +38,14 @@ class Context:
     def __init__(self, physics: Any) -> None:
         self.scene = wrapper.MjvScene(physics.model)
         self.flags = self.scene.flags.copy()
-        self.renderer = Renderer.of_scene(physics.model.ptr, self.scene, 1, 1)
+        self.renderers: weakref.WeakSet[Renderer] = weakref.WeakSet()
+        self.renderer = self.renderer_of(physics, self.scene)
         self.cameras: dict[tuple[Any, ...], Any] = {}
+
+    def renderer_of(self, physics: Any, scene: Any) -> Renderer:
+        renderer = Renderer.of_scene(physics.model.ptr, scene, 1, 1)
+        self.renderers.add(renderer)
+        return renderer
 
     def camera(self, physics: Any, height: int, width: int, camera_id: int | str) -> Any:
         """The camera of ``Physics.render``. It is kept: a new one makes a new scene, and that takes 1 ms."""
@@ -60,12 +67,12 @@ class Context:
         """Environments call ``mjr_upload*`` after changes of height fields and textures."""
         name = function.__name__
         if name.startswith("mjr_upload"):
-            self.renderer.reload()
+            for renderer in self.renderers:
+                renderer.reload()
         elif name != "mjr_setBuffer":
             raise ValueError(f"mjsense.compat.dm_control: {name} needs OpenGL, which this environment does not use after use()")
 
     def free(self) -> None:
-        self.renderer.close()
         self.cameras.clear()
 
 
@@ -107,7 +114,8 @@ def _camera_render(
     render_flag_overrides: Any = None,
 ) -> Any:
     physics = camera._physics
-    if not isinstance(physics.contexts.gl, Context):
+    context = physics.contexts.gl
+    if not isinstance(context, Context):
         return _opengl["camera_render"](camera, overlays, depth, segmentation, scene_option, render_flag_overrides)
     if overlays:
         raise ValueError("mjsense.compat.dm_control: overlay texts are not drawn; remove the argument overlays")
@@ -118,7 +126,7 @@ def _camera_render(
     model, scene = physics.model.ptr, camera._scene
     renderer = getattr(camera, "_renderer", None)
     if renderer is None or renderer.model is not model:
-        renderer = camera._renderer = Renderer.of_scene(model, scene, 1, 1)
+        renderer = camera._renderer = context.renderer_of(physics, scene)
     mujoco.mjv_updateCamera(model, physics.data.ptr, camera._render_camera.ptr, scene)
     camera.update(scene_option)
     if camera._scene_callback:
