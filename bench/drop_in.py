@@ -3,18 +3,20 @@
 
     python bench/drop_in.py [--sizes 84 256] [--json FILE] [ENVIRONMENT ...]
 
-Needs the packages of the environments, PyOpenGL and EGL; environments that cannot be made are skipped. Both renderers draw the same states,
-after one step each, through the environment's own ``render()``.
+Needs the packages of the environments (those of tests/python/test_adapters.py), PyOpenGL and EGL; environments that cannot be made are skipped.
+Both renderers draw the same states, after one step each, through the environment's own function.
 """
 
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
 import statistics
 import time
 import warnings
+from typing import TYPE_CHECKING, Any
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 os.environ.setdefault("LP_NUM_THREADS", "1")  # llvmpipe's; CPU time counts all threads in any case
@@ -22,7 +24,11 @@ os.environ.setdefault("LP_NUM_THREADS", "1")  # llvmpipe's; CPU time counts all 
 import gymnasium
 import mujoco
 import numpy as np
-from mjsense.compat import gymnasium as adapter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Made = tuple[Any, Callable[[], object], Callable[[], np.ndarray]]  # environment, its step, its image
 
 ENVIRONMENTS = (
     "HalfCheetah-v5",
@@ -35,25 +41,99 @@ ENVIRONMENTS = (
     "HandManipulateBlock-v1",
     "AdroitHandDoor-v1",
     "AdroitHandRelocate-v1",
+    "Meta-World/reach-v3",
+    "Meta-World/drawer-open-v3",
+    "gym_aloha/AlohaTransferCube-v0",
+    "dm_control/cheetah/run",
+    "dm_control/humanoid/stand",
+    "robosuite/Lift/agentview",
+    "robosuite/Lift/robot0_eye_in_hand",
+    "robosuite/PickPlace/agentview",
+    "robosuite/PickPlace/robot0_eye_in_hand",
 )
+
+
+def gymnasium_env(name: str, size: int, use: bool) -> Made:
+    arguments = {"id": name, "render_mode": "rgb_array", "width": size, "height": size, "disable_env_checker": True}
+    if name.startswith("Meta-World/"):
+        import metaworld  # noqa: F401
+
+        arguments |= {"id": "Meta-World/MT1", "env_name": name.split("/")[1], "camera_name": "corner2", "seed": 0}
+    env = gymnasium.make(**arguments)
+    if use:
+        from mjsense.compat import gymnasium as adapter
+
+        adapter.use(env)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    return env, lambda: env.step(env.action_space.sample()), env.render
+
+
+def aloha_env(name: str, size: int, use: bool) -> Made:
+    import gym_aloha  # noqa: F401
+
+    sizes = {"observation_width": 8, "observation_height": 8, "visualization_width": size, "visualization_height": size}
+    env = gymnasium.make(name, disable_env_checker=True, **sizes)
+    if use:
+        from mjsense.compat import dm_control as adapter
+
+        adapter.use(env.unwrapped._env)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    return env, lambda: env.step(env.action_space.sample()), env.render
+
+
+def dm_control_env(name: str, size: int, use: bool) -> Made:
+    from dm_control import suite
+
+    env = suite.load(*name.split("/")[1:], task_kwargs={"random": 0})
+    if use:
+        from mjsense.compat import dm_control as adapter
+
+        adapter.use(env)
+    env.reset()
+    rng, shape = np.random.default_rng(0), env.action_spec().shape
+    return env, lambda: env.step(rng.uniform(-1, 1, shape)), lambda: env.physics.render(size, size, camera_id=0)
+
+
+def robosuite_env(name: str, size: int, use: bool) -> Made:
+    import robosuite
+    from robosuite.environments import base
+    from robosuite.utils.binding_utils import MjRenderContextOffscreen
+
+    base.MjRenderContextOffscreen = MjRenderContextOffscreen
+    if use:
+        from mjsense.compat import robosuite as adapter
+
+        adapter.use()
+    _, task, camera = name.split("/")
+    env = robosuite.make(task, robots="Panda", has_renderer=False, has_offscreen_renderer=True, use_camera_obs=False, seed=0)
+    env.reset()
+    rng = np.random.default_rng(0)
+    return (
+        env,
+        lambda: env.step(rng.uniform(-1, 1, env.action_dim)),
+        lambda: env.sim.render(width=size, height=size, camera_name=camera),
+    )
+
+
+MAKE = {"gym_aloha": aloha_env, "dm_control": dm_control_env, "robosuite": robosuite_env}
 
 
 def images(name: str, size: int, use: bool, count: int) -> tuple[np.ndarray, float, float]:
     """The images of `count` steps, the median CPU time of one in ms, and that of the first image with the renderer's construction."""
-    env = gymnasium.make(name, render_mode="rgb_array", width=size, height=size)
-    if use:
-        adapter.use(env)
-    env.reset(seed=0)
-    env.action_space.seed(0)
+    env, step, render = MAKE.get(name.split("/")[0], gymnasium_env)(name, size, use)
     start = time.process_time()
-    rows, times = [env.render()], []
+    rows, times = [render()], []
     first = time.process_time() - start
     for _ in range(count):
-        env.step(env.action_space.sample())
+        step()
         start = time.process_time()
-        rows.append(env.render())
+        rows.append(render())
         times.append(time.process_time() - start)
     env.close()
+    del env, step, render
+    gc.collect()  # frees OpenGL's contexts here, not in a later measurement
     return np.array(rows[1:]), 1e3 * statistics.median(times), 1e3 * first
 
 
@@ -77,7 +157,7 @@ def main() -> None:
     except Exception as error:
         print(f"gymnasium-robotics: {error}")
     print(f"MuJoCo {mujoco.__version__}")
-    print(f"{'environment':24s} {'size':>5s} {'OpenGL':>9s} {'mjsense':>9s} {'ratio':>6s} {'first':>8s} {'PSNR':>6s}")
+    print(f"{'environment':38s} {'size':>5s} {'OpenGL':>9s} {'mjsense':>9s} {'ratio':>6s} {'first':>8s} {'PSNR':>6s}")
     rows = []
     for name in arguments.environments:
         for size in arguments.sizes:
@@ -85,7 +165,7 @@ def main() -> None:
                 theirs, slow, _ = images(name, size, False, arguments.count)
                 ours, fast, first = images(name, size, True, arguments.count)
             except Exception as error:
-                print(f"{name:24s} {size:5d} {type(error).__name__}: {str(error)[:90]}")
+                print(f"{name:38s} {size:5d} {type(error).__name__}: {str(error)[:90]}")
                 continue
             row = {
                 "environment": name,
@@ -96,7 +176,7 @@ def main() -> None:
                 "psnr": psnr(theirs, ours),
             }
             rows.append(row)
-            print(f"{name:24s} {size:5d} {slow:6.2f} ms {fast:6.2f} ms {slow / fast:6.1f} {first:5.1f} ms {row['psnr']:6.1f}")
+            print(f"{name:38s} {size:5d} {slow:6.2f} ms {fast:6.2f} ms {slow / fast:6.1f} {first:5.1f} ms {row['psnr']:6.1f}")
     for size in arguments.sizes:
         ratios = [row["opengl_ms"] / row["mjsense_ms"] for row in rows if row["size"] == size]
         if ratios:

@@ -116,9 +116,7 @@ class Renderer:
         self._batch: _Pool | None = None
         if not isinstance(model, mujoco.MjModel):
             raise TypeError(f"Renderer: model must be a mujoco.MjModel, got {type(model).__name__}")
-        for name, value in (("height", height), ("width", width)):
-            if int(value) < 1:
-                raise ValueError(f"Renderer: {name} must be at least 1, got {value}")
+        self._checked_size(height, width)
         self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
 
     @classmethod
@@ -162,7 +160,9 @@ class Renderer:
             "line_width": float(model.vis.global_.linewidth),
             "projected_textures": int(self._mujoco.mj_versionString().split(".")[0]) < 4,
         }
-        geoms, lights, cameras = scene.geoms, scene.lights, scene.camera
+        # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.
+        geoms = self._mujoco.MjvScene.geoms.fget(scene)
+        lights, cameras = scene.lights, scene.camera
         where = {
             name: _scene_layout.address(value)
             for name, value in (
@@ -175,6 +175,13 @@ class Renderer:
         where["geom_stride"] = _scene_layout.address(geoms[1].pos) - where["geoms"]
         where["light_stride"] = _scene_layout.address(lights[1].pos) - where["lights"]
         return _core.SceneRenderer(arrays, settings, _scene_layout.layouts(), where, soft)
+
+    @staticmethod
+    def _checked_size(height: int, width: int) -> tuple[int, int]:
+        for name, value in (("height", height), ("width", width)):
+            if int(value) < 1:
+                raise ValueError(f"Renderer: {name} must be at least 1, got {value}")
+        return int(height), int(width)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -305,14 +312,22 @@ class Renderer:
         np.copyto(out, image, casting="unsafe")
         return out
 
-    def render_images(self, kinds: Sequence[str] = ("rgb", "depth", "segmentation")) -> dict[str, np.ndarray]:
+    def render_images(
+        self, kinds: Sequence[str] = ("rgb", "depth", "segmentation"), *, height: int | None = None, width: int | None = None
+    ) -> dict[str, np.ndarray]:
         """Renders several images of the scene at once: ``rgb``, ``depth`` and ``segmentation``, with the shapes and types of ``render()``.
+
+        Args:
+            kinds: the images.
+            height: height of these images in pixels; None for the renderer's.
+            width: width of these images in pixels; None for the renderer's.
 
         Returns:
             New arrays by kind.
         """
         self._check_open()
-        images = {kind: self._empty(kind) for kind in kinds}
+        size = self._checked_size(self._height if height is None else height, self._width if width is None else width)
+        images = {kind: self._empty(kind, *size) for kind in kinds}
         self._draw(**images)
         return images
 
@@ -372,11 +387,11 @@ class Renderer:
         self._check_open()
         self._native.reload()
 
-    def _empty(self, kind: str) -> np.ndarray:
+    def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
         if kind not in _KINDS:
             raise ValueError(f"Renderer: unknown kind of image '{kind}'; expected one of {', '.join(_KINDS)}")
         dtype, channels = _KINDS[kind]
-        return np.empty((self._height, self._width, *channels), dtype)
+        return np.empty((height, width, *channels), dtype)
 
     def _draw(
         self, rgb: np.ndarray | None = None, depth: np.ndarray | None = None, segmentation: np.ndarray | None = None
@@ -387,9 +402,11 @@ class Renderer:
             self._check_scene()
         shown = [bool(flags[i]) for i in (flag.mjRND_SHADOW, flag.mjRND_REFLECTION, flag.mjRND_SKYBOX, flag.mjRND_HAZE)]
         shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
-        images = [0 if image is None else _scene_layout.address(image) for image in (rgb, depth, segmentation)]
+        images = [image for image in (rgb, depth, segmentation) if image is not None]
+        height, width = images[0].shape[:2] if images else (self._height, self._width)
+        memory = [0 if image is None else _scene_layout.address(image) for image in (rgb, depth, segmentation)]
         try:
-            self._native.render(scene.ngeom, scene.nlight, tuple(shown), self._width, self._height, *images)
+            self._native.render(scene.ngeom, scene.nlight, tuple(shown), width, height, *memory)
         except ValueError as error:
             raise ValueError(f"Renderer: {self._with_names(str(error))}") from None
 

@@ -335,6 +335,33 @@ def test_processes():
         np.testing.assert_array_equal(pool.apply(child_image), expected)
 
 
+def test_images_of_another_size_are_those_of_a_renderer_of_that_size():
+    model, data = load(SHAPES, 20)
+    with mjs.Renderer(model, 60, 80) as renderer, mjs.Renderer(model, 33, 47) as other:
+        for each in (renderer, other):
+            each.update_scene(data, "view")
+        found = renderer.render_images(height=33, width=47)
+        for kind, image in other.render_images().items():
+            np.testing.assert_array_equal(found[kind], image)
+        assert renderer.render().shape == (60, 80, 3)
+        with pytest.raises(ValueError, match="width must be at least 1, got 0"):
+            renderer.render_images(("rgb",), width=0)
+
+
+def test_a_scene_whose_class_has_only_the_geoms_in_use_is_drawn():
+    class Scene(mujoco.MjvScene):  # as dm_control's
+        @property
+        def geoms(self):
+            return super().geoms[: self.ngeom]
+
+    model, data = load(BALL)
+    scene, camera = Scene(model, 100), mujoco.MjvCamera()
+    camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, 0
+    renderer = mjs.Renderer.of_scene(model, scene, 60, 80)
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    np.testing.assert_array_equal(renderer.render(), image_of(model, data, 0))
+
+
 def test_renderers_leak_nothing():
     model, data = load(SHAPES)
 

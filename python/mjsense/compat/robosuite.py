@@ -4,7 +4,7 @@
     mjsense.compat.robosuite.use()
     env = robosuite.make("Lift", robots="Panda", has_renderer=False, has_offscreen_renderer=True)
 
-``use`` is called before environments are made. It also serves packages that build on robosuite's environments, such as LIBERO.
+``use`` is called before environments are made.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class RenderContext:
         self.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self.vopt = mujoco.MjvOption()
         self.pert = mujoco.MjvPerturb()
-        self._renderers: dict[tuple[int, int], Renderer] = {}
+        self._renderer = Renderer.of_scene(sim.model._model, self.scn, max_height, max_width)
 
     def update_offscreen_size(self, width: int, height: int) -> None:
         """Images may have any size."""
@@ -49,10 +49,8 @@ class RenderContext:
 
     def read_pixels(self, width: int, height: int, depth: bool = False, segmentation: bool = False) -> Any:
         """rgb uint8 [H, W, 3], or (object type, id) int32 [H, W, 2] with `segmentation`; with `depth` a pair with float32 [H, W], 0 to 1."""
-        if (width, height) not in self._renderers:
-            self._renderers[width, height] = Renderer.of_scene(self.model._model, self.scn, height, width)
         color = "segmentation" if segmentation else "rgb"
-        images = self._renderers[width, height].render_images((color, "depth") if depth else (color,))
+        images = self._renderer.render_images((color, "depth") if depth else (color,), height=height, width=width)
         image = images[color][::-1]
         image = image[..., ::-1] if segmentation else image
         return (
@@ -61,8 +59,7 @@ class RenderContext:
 
     def upload_texture(self, tex_id: int) -> None:
         """Shows a changed texture in the next image."""
-        for renderer in self._renderers.values():
-            renderer.reload()
+        self._renderer.reload()
 
 
 def use() -> None:
