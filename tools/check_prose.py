@@ -16,7 +16,7 @@ import re
 import subprocess
 import sys
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -127,13 +127,15 @@ READERS = {
 }  # fmt: skip
 
 
-def reader(path: Path):
+def reader(path: Path) -> Callable[[str], Iterator[tuple[int, str]]] | None:
     return READERS.get(path.suffix or path.name)
 
 
 def findings(path: Path) -> Iterator[str]:
     """One line for each phrase of the list."""
-    for line, block in reader(path)(path.read_text()):
+    read = reader(path)
+    assert read is not None, f"no reader of {path.name}"
+    for line, block in read(path.read_text()):
         for rule, advice in RULES:
             for match in rule.finditer(block):
                 yield f"{path}:{line}: '{match[0].strip()}' -> {advice}"

@@ -9,9 +9,11 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -63,9 +65,10 @@ nb::object numpy_type<mjContact>() {
   FIELD(pos)
   FIELD(frame)
   FIELD(includemargin)
-  FIELD(friction) FIELD(solref) FIELD(solreffriction) FIELD(solimp) FIELD(adhesion)
-      FIELD(surfacevel) FIELD(mu) FIELD(H) FIELD(dim) FIELD(geom1) FIELD(geom2) FIELD(geom)
-          FIELD(flex) FIELD(elem) FIELD(vert) FIELD(exclude) FIELD(efc_address) return type.done();
+  FIELD(friction)
+  FIELD(solref) FIELD(solreffriction) FIELD(solimp) FIELD(adhesion) FIELD(surfacevel) FIELD(mu)
+      FIELD(H) FIELD(dim) FIELD(geom1) FIELD(geom2) FIELD(geom) FIELD(flex) FIELD(elem) FIELD(vert)
+          FIELD(exclude) FIELD(efc_address) return type.done();
 }
 
 template <>
@@ -186,13 +189,11 @@ nb::dict arena_fields(std::uintptr_t model, std::uintptr_t address) {
 // Arrays of mjModel whose change requires mj_setConst(): the first group of its computations that uses one reads it.
 std::vector<std::string> setconst_inputs() {
   std::vector<std::string> names;
-#define X(name, fixed, kin0, inert0, spring)   \
-  if (const int first = (fixed)    ? (fixed)   \
-                        : (kin0)   ? (kin0)    \
-                        : (inert0) ? (inert0)  \
-                                   : (spring); \
-      first & mjSC_IN)                         \
-    names.emplace_back(#name);
+  const auto add = [&](const char* name, std::initializer_list<int> groups) {
+    const auto first = std::ranges::find_if(groups, [](int group) { return group != 0; });
+    if (first != groups.end() && (*first & mjSC_IN)) names.emplace_back(name);
+  };
+#define X(name, fixed, kin0, inert0, spring) add(#name, {fixed, kin0, inert0, spring});
   MJSETCONST_ARRAYS
 #undef X
   return names;

@@ -66,16 +66,18 @@ class _AvDecoder:
         self._container = av.open(str(info.path))
         self._stream = self._container.streams.video[0]
         self._stream.codec_context.thread_count = 1
+        assert self._stream.time_base is not None  # only streams that are being written have none
+        self._time_base = self._stream.time_base
         self._frames = self._container.decode(self._stream)
         self._next = 0
 
     def frames_until(self, index: int) -> Iterator[tuple[int, Any]]:
         """Decoded frames up to the frame ``index``, with their numbers: from the current position or from the key frame before it."""
         if not self._next <= index < self._next + _SKIP:
-            self._container.seek(round(index / self._fps / self._stream.time_base), stream=self._stream)
+            self._container.seek(round(index / self._fps / self._time_base), stream=self._stream)
             self._frames = self._container.decode(self._stream)
         for frame in self._frames:
-            number = round(frame.pts * self._stream.time_base * self._fps)
+            number = round((frame.pts or 0) * self._time_base * self._fps)
             self._next = number + 1
             yield number, frame
             if number >= index:

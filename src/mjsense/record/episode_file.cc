@@ -212,6 +212,7 @@ void EpisodeFile::write_array(const EpisodeArray& array) {
   h5::check(H5Dwrite(dataset, h5::memory_type(array.dtype), H5S_ALL, H5S_ALL, H5P_DEFAULT,
                      array.values.data()),
             path);
+  h5::set_attribute(dataset, "description", array.description);
   h5::set_attribute(dataset, kChecksumAttribute, sum.text());
 }
 

@@ -36,8 +36,10 @@ void add(const char* name, const T* world, const T* scene, std::int64_t rows, st
         std::memcpy(values.data() + i * sizeof(T), &kSame, sizeof(T));
     }
   }
-  out.push_back({std::string("model/") + name, stored_type<T>(),
-                 columns == 1 ? Shape{rows} : Shape{rows, columns}, std::move(values)});
+  out.push_back({std::string("model/") + name,
+                 "Values of this episode's model; NaN: the value of the archived model.",
+                 stored_type<T>(), columns == 1 ? Shape{rows} : Shape{rows, columns},
+                 std::move(values)});
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ TEST(Recorder, StoresTheArchiveAndTheArraysOfAnEpisode) {
   const auto bytes = std::as_bytes(std::span(sizes));
   recorder.finish_episode(
       0, "{}", "success",
-      {{"model/geom_size", DType::kFloat64, {2, 3}, {bytes.begin(), bytes.end()}}});
+      {{"model/geom_size", "Sizes.", DType::kFloat64, {2, 3}, {bytes.begin(), bytes.end()}}});
   recorder.complete();
   const h5::H5Lock lock;
   const h5::Id file = h5::open_file(out.path / "house_0/trajectories_batch_1_of_1.h5");

@@ -122,6 +122,7 @@ struct EpisodeMeta {
 // An array of an episode that does not depend on the step: traj_{i}/replay/{path}.
 struct EpisodeArray {
   std::string path;  // "model/geom_size", "held"
+  std::string description;
   DType dtype = DType::kFloat64;
   Shape shape;
   std::vector<std::byte> values;

@@ -11,8 +11,8 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/outcome_details.h"
 #include "mjsense/record/model_fields.h"
+#include "mjsense/record/outcome_details.h"
 #include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/model_archive.h"
@@ -207,6 +207,7 @@ class RecordJob {
     const auto bytes = std::as_bytes(std::span(held));
     if (!held.empty())
       arrays.push_back({"held",
+                        "Ids of the free joints of absent objects, which are held at rest.",
                         DType::kInt32,
                         {static_cast<std::int64_t>(held.size())},
                         {bytes.begin(), bytes.end()}});

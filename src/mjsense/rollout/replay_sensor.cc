@@ -41,12 +41,15 @@ void ReplaySensor::initialize(const SensorInit& init) {
   ctrl_ = mocap_ = nullptr;
   if (ticks_ < 2) return;
   ctrl_ = &add_field(
-      "ctrl", spec_of({ticks_, init.model->nu}, "Controls at each control tick of the step."),
+      "ctrl",
+      spec_of({ticks_, init.model->nu},
+              "Controls at each control tick of the step; NaN at the first observation."),
       init.num_worlds);
   if (init.model->nmocap == 0) return;
   mocap_ = &add_field("mocap",
                       spec_of({ticks_, init.model->nmocap, 7},
-                              "Mocap poses, m and wxyz, at each control tick of the step."),
+                              "Mocap poses, m and wxyz, at each control tick of the step; NaN at "
+                              "the first observation."),
                       init.num_worlds);
 }
 
