@@ -22,6 +22,9 @@ import numpy as np
 Seed = int
 """A non-negative int of 64 bits."""
 
+OutputArray = np.ndarray
+"""A NumPy array that a function writes to."""
+
 T = TypeVar("T")
 
 
@@ -51,6 +54,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "str": (lambda value: isinstance(value, str), "a str"),
     "Path": (lambda value: isinstance(value, PurePath), "a Path"),
     "Callable": (callable, "a function"),
+    "OutputArray": (lambda value: isinstance(value, np.ndarray), "a numpy array"),
     "Sequence[str]": (lambda value: _is_list(value) and all(isinstance(v, str) for v in value), "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),

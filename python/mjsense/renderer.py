@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core, _scene_layout
+from mjsense._arguments import OutputArray, checked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -84,6 +85,7 @@ class _Pool:
             return self._make()
 
 
+@checked
 class Renderer:
     """Renders MuJoCo scenes on the CPU, with the interface of ``mujoco.Renderer`` and without OpenGL.
 
@@ -114,8 +116,6 @@ class Renderer:
 
         self._native: Any = None
         self._batch: _Pool | None = None
-        if not isinstance(model, mujoco.MjModel):
-            raise TypeError(f"Renderer: model must be a mujoco.MjModel, got {type(model).__name__}")
         self._checked_size(height, width)
         self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
 
@@ -284,7 +284,7 @@ class Renderer:
             self._model, data, scene_option or self._scene_option, None, view, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene
         )
 
-    def render(self, *, out: np.ndarray | None = None) -> np.ndarray:
+    def render(self, *, out: OutputArray | None = None) -> np.ndarray:
         """Renders the scene.
 
         Args:
@@ -337,7 +337,7 @@ class Renderer:
         cameras: Any = -1,
         scene_option: mujoco.MjvOption | None = None,
         *,
-        out: np.ndarray | None = None,
+        out: OutputArray | None = None,
     ) -> np.ndarray:
         """Renders one rgb image of each `data` on all CPU cores. ``scene`` does not change.
 
@@ -352,6 +352,9 @@ class Renderer:
         """
         self._check_open()
         datas = list(datas)
+        for index, data in enumerate(datas):
+            if not isinstance(data, self._mujoco.MjData):
+                raise TypeError(f"Renderer.render_batch(): datas[{index}] must be a mujoco.MjData, not {data!r:.100}")
         each = list(cameras) if isinstance(cameras, (list, tuple, np.ndarray)) else [cameras] * len(datas)
         if len(each) != len(datas):
             raise ValueError(f"Renderer.render_batch: got {len(each)} cameras for {len(datas)} datas")

@@ -4,6 +4,7 @@
 import inspect
 import types
 
+import mujoco
 import numpy as np
 import pytest
 from scenes import BALL, ball_scene, feet_cfg
@@ -78,7 +79,9 @@ def live(tmp_path_factory):
     objects[-2].reset()
     mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, worlds=1)
     dataset = mjs.Dataset(data)
-    objects += [dataset, dataset.episodes[0], dataset.episodes[0].video("wrist_camera")]
+    renderer = mjs.Renderer(scene.model, 4, 4)
+    renderer.update_scene(mujoco.MjData(scene.model))
+    objects += [renderer, dataset, dataset.episodes[0], dataset.episodes[0].video("wrist_camera")]
     objects += [
         mjs.JointPositionSensor(), mjs.JointVelocitySensor(), mjs.PoseSensor("p", body="ball/ball"), mjs.TcpPoseSensor(),
         mjs.RobotBasePoseSensor(), mjs.EnvStatesSensor(), mjs.CameraParameterSensor("eye"), mjs.CameraImageSensor("eye"),
@@ -91,7 +94,7 @@ RIGHT = {"field": "geom_friction", "values": 1.0, "name": "geom_friction", "uuid
          "env": None, "center": (0, 0, 0), "start": (0, 0, 0), "end": (0, 0, 1), "radius": 0.1, "color": (1, 0, 0, 1), "num_envs": 2,
          "position": (0, 0, 0), "rotation_matrix": np.eye(3), "path": "x.nothing", "scene": None, "sensor": None, "world": 0,
          "episode": 0, "body": "ball/ball", "joint": "ball/root", "pos": (0, 0, 0), "value": 0.0, "actions": [[0.0] * 8],
-         "group": "arm", "camera": "wrist_camera", "model": None, "data": None, "t": 0, "pose": [0.5, 0, 0.9, 0, 1, 0, 0]}  # fmt: skip
+         "group": "arm", "camera": "wrist_camera", "model": None, "data": None, "datas": [], "t": 0, "pose": [0.5, 0, 0.9, 0, 1, 0, 0]}  # fmt: skip
 WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5], [-1], [7], ["a"], {}, np.zeros((1, 2, 3)))
 
 

@@ -64,7 +64,7 @@ def test_pipeline_errors():
         (dict(clip=(0, 1, 2)), "clip must be 2 numbers"),
         (dict(operation="mul"), "ObservationPipeline: operation is 'mul': must be one of add, scale, abs"),
         (dict(nan_policy="sanitise"), "did you mean 'sanitize'"),
-        (dict(delay_min_lag=2, delay_max_lag=1), "need 0 <= min_lag <= max_lag"),
+        (dict(delay_min_lag=2, delay_max_lag=1), "must satisfy 0 <= min_lag <= max_lag"),
         (dict(delay_hold_prob=2.0), "delay_hold_prob is 2: must be between 0 and 1"),
         (dict(history_length=-1), "history_length is -1"),
         (dict(noise="much"), "noise must be"),

@@ -56,7 +56,7 @@ def check_readable(record_fake, out, finished):
     house = out / "house_0"
     assert finished <= episodes_of([*house.glob("*.h5"), *house.glob(".recording/episode_????????/traj.h5")])
     for path in house.glob("*.h5"):  # files with a final name are complete, including their videos
-        assert "\nwhole" in "\n" + record_fake("verify", path).stdout
+        assert "\nintact" in "\n" + record_fake("verify", path).stdout
 
 
 def test_repair_completes_a_killed_recording(record_fake, tmp_path):

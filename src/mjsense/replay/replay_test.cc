@@ -103,7 +103,7 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
     const VerifyResult result = verify(dir.path);
     std::ofstream(what, std::ios::binary) << original;
     EXPECT_EQ(result.findings.size(), 1u) << result.text();
-    return result.ok() ? std::string("whole") : result.findings[0].text;
+    return result.ok() ? std::string("intact") : result.findings[0].text;
   };
   // The episodes have 6, 7 and 8 steps.
   EXPECT_THAT(replaced(video(dir.path, 2), video(dir.path, 0)),
