@@ -66,7 +66,7 @@ def gymnasium_env(name: str, size: int, use: bool) -> Made:
         adapter.use(env)
     env.reset(seed=0)
     env.action_space.seed(0)
-    return env, lambda: env.step(env.action_space.sample()), env.render
+    return env, lambda: env.step(env.action_space.sample()), lambda: np.asarray(env.render())
 
 
 def aloha_env(name: str, size: int, use: bool) -> Made:
@@ -77,10 +77,10 @@ def aloha_env(name: str, size: int, use: bool) -> Made:
     if use:
         from mjsense.compat import dm_control as adapter
 
-        adapter.use(env.unwrapped._env)
+        adapter.use(env.unwrapped._env)  # pyright: ignore[reportAttributeAccessIssue]  # gym-aloha's
     env.reset(seed=0)
     env.action_space.seed(0)
-    return env, lambda: env.step(env.action_space.sample()), env.render
+    return env, lambda: env.step(env.action_space.sample()), lambda: np.asarray(env.render())
 
 
 def dm_control_env(name: str, size: int, use: bool) -> Made:
