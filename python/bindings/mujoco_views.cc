@@ -55,43 +55,66 @@ class StructType {
 
 }  // namespace
 
-#define FIELD(field) type.add<decltype(Struct::field)>(#field, offsetof(Struct, field));
+#define FIELD(field) type.add<decltype(Struct::field)>(#field, offsetof(Struct, field))
 
 template <>
 nb::object numpy_type<mjContact>() {
   using Struct = mjContact;
   StructType type(sizeof(Struct));
-  FIELD(dist)
-  FIELD(pos)
-  FIELD(frame)
-  FIELD(includemargin)
-  FIELD(friction)
-  FIELD(solref) FIELD(solreffriction) FIELD(solimp) FIELD(adhesion) FIELD(surfacevel) FIELD(mu)
-      FIELD(H) FIELD(dim) FIELD(geom1) FIELD(geom2) FIELD(geom) FIELD(flex) FIELD(elem) FIELD(vert)
-          FIELD(exclude) FIELD(efc_address) return type.done();
+  FIELD(dist);
+  FIELD(pos);
+  FIELD(frame);
+  FIELD(includemargin);
+  FIELD(friction);
+  FIELD(solref);
+  FIELD(solreffriction);
+  FIELD(solimp);
+  FIELD(adhesion);
+  FIELD(surfacevel);
+  FIELD(mu);
+  FIELD(H);
+  FIELD(dim);
+  FIELD(geom1);
+  FIELD(geom2);
+  FIELD(geom);
+  FIELD(flex);
+  FIELD(elem);
+  FIELD(vert);
+  FIELD(exclude);
+  FIELD(efc_address);
+  return type.done();
 }
 
 template <>
 nb::object numpy_type<mjSolverStat>() {
   using Struct = mjSolverStat;
   StructType type(sizeof(Struct));
-  FIELD(improvement)
-  FIELD(gradient)
-  FIELD(lineslope) FIELD(nactive) FIELD(nchange) FIELD(neval) FIELD(nupdate) return type.done();
+  FIELD(improvement);
+  FIELD(gradient);
+  FIELD(lineslope);
+  FIELD(nactive);
+  FIELD(nchange);
+  FIELD(neval);
+  FIELD(nupdate);
+  return type.done();
 }
 
 template <>
 nb::object numpy_type<mjWarningStat>() {
   using Struct = mjWarningStat;
   StructType type(sizeof(Struct));
-  FIELD(lastinfo) FIELD(number) return type.done();
+  FIELD(lastinfo);
+  FIELD(number);
+  return type.done();
 }
 
 template <>
 nb::object numpy_type<mjTimerStat>() {
   using Struct = mjTimerStat;
   StructType type(sizeof(Struct));
-  FIELD(duration) FIELD(number) return type.done();
+  FIELD(duration);
+  FIELD(number);
+  return type.done();
 }
 
 Fields option_fields(const mjOption& opt) {
