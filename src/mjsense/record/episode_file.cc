@@ -85,8 +85,7 @@ EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string
   for (const char* group : standard_groups()) h5::create_group(trajectory_, group);
   datasets_.reserve(plan.arrays.size() + kOwnStreams);
   for (const ArrayStream& stream : plan.arrays) {
-    add_dataset(stream.path, stream.spec.dtype, stream.spec.shape, stream.chunk_rows,
-                stream.shuffled);
+    add_dataset(stream.path, stream.spec.dtype, stream.spec.shape, stream.chunk_rows);
     describe(datasets_.back().id, stream.sensor->name(), stream.kind(), stream.spec);
     if (stream.spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
   }
@@ -103,13 +102,12 @@ EpisodeFile::~EpisodeFile() {
 }
 
 void EpisodeFile::add_dataset(std::string_view path, DType dtype, const Shape& row,
-                              std::int64_t chunk_rows, bool shuffled) {
+                              std::int64_t chunk_rows) {
   Dataset dataset;
   hsize_t chunk[Shape::kMaxRank + 1] = {static_cast<hsize_t>(chunk_rows)};
   hsize_t maximum[Shape::kMaxRank + 1] = {H5S_UNLIMITED};
   dataset.rank = row.rank() + 1;
   dataset.row_bytes = static_cast<std::size_t>(row.size()) * dtype_size(dtype);
-  if (shuffled && gzip_ > 0) dataset.shuffled = dtype_size(dtype);
   for (int i = 0; i < row.rank(); ++i) {
     // A row may have no elements, but HDF5 requires chunk dimensions of at least 1.
     const auto size = static_cast<hsize_t>(row[i]);
@@ -122,7 +120,6 @@ void EpisodeFile::add_dataset(std::string_view path, DType dtype, const Shape& r
   const h5::Id space(H5Screate_simple(dataset.rank, dataset.dims, maximum), H5Sclose, name);
   const h5::Id properties = h5::dataset_properties();
   h5::check(H5Pset_chunk(properties, dataset.rank, chunk), name);
-  if (dataset.shuffled > 0) h5::check(H5Pset_shuffle(properties), name);
   if (gzip_ > 0) h5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), name);
 
   const auto slash = name.rfind('/');
@@ -143,33 +140,21 @@ std::span<const std::uint8_t> EpisodeFile::texts_of(const ArrayStream& stream, s
   return texts_;
 }
 
-std::span<const std::uint8_t> EpisodeFile::packed(std::span<const std::uint8_t> chunk,
-                                                  std::size_t shuffled) {
-  if (shuffled > 1) {
-    // HDF5's shuffle filter: the first bytes of all elements, then the second bytes ...
-    const std::size_t count = chunk.size() / shuffled;
-    shuffled_.resize(chunk.size());
-    for (std::size_t b = 0; b < shuffled; ++b) {
-      for (std::size_t i = 0; i < count; ++i) shuffled_[b * count + i] = chunk[i * shuffled + b];
-    }
-    chunk = shuffled_;
-  }
-  packed_.resize(compressBound(chunk.size()));
-  uLongf size = packed_.size();
-  if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
-    throw RuntimeError(fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(),
-                                   folder_->display_path(name_)));
-  }
-  return {packed_.data(), size};
-}
-
 void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk) {
   const auto index = static_cast<std::size_t>(stream);
   if (index < plan_.arrays.size() && plan_.arrays[index].text)
     chunk = texts_of(plan_.arrays[index], rows, chunk);
+  std::span<const std::uint8_t> bytes = chunk;
   // Without the lock of the HDF5 library, because compression takes most of the time.
-  const std::span<const std::uint8_t> bytes =
-      gzip_ > 0 && !chunk.empty() ? packed(chunk, datasets_[index].shuffled) : chunk;
+  if (gzip_ > 0 && !chunk.empty()) {
+    packed_.resize(compressBound(chunk.size()));
+    uLongf size = packed_.size();
+    if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
+      throw RuntimeError(fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(),
+                                     folder_->display_path(name_)));
+    }
+    bytes = {packed_.data(), size};
+  }
   // Computed here because the compressor has just loaded the chunk into this core's cache.
   if (!chunk.empty())
     datasets_[index].sum.add(chunk.data(),
@@ -203,7 +188,6 @@ void EpisodeFile::write_array(const EpisodeArray& array) {
   const h5::Id properties = h5::dataset_properties();
   if (gzip_ > 0) {
     h5::check(H5Pset_chunk(properties, array.shape.rank(), dims.data()), path);
-    h5::check(H5Pset_shuffle(properties), path);
     h5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), path);
   }
   const h5::Id dataset(H5Dcreate2(trajectory_, path.c_str(), h5::memory_type(array.dtype), space,

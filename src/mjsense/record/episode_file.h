@@ -51,17 +51,13 @@ class EpisodeFile {
     h5::Id id, crc;  // the dataset and its checksum attribute
     int rank = 0;
     std::size_t row_bytes = 0;
-    std::size_t shuffled = 0;  // bytes of an element if the shuffle filter is used, else 0
-    Checksum sum;              // of all rows
+    Checksum sum;  // of all rows
     hsize_t dims[Shape::kMaxRank + 1] = {};
   };
   // Returns a chunk converted to text; valid until the next call.
   std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
                                          std::span<const std::uint8_t> kept);
-  void add_dataset(std::string_view path, DType dtype, const Shape& row, std::int64_t chunk_rows,
-                   bool shuffled = false);
-  // Compresses a chunk; the result is valid until the next call.
-  std::span<const std::uint8_t> packed(std::span<const std::uint8_t> chunk, std::size_t shuffled);
+  void add_dataset(std::string_view path, DType dtype, const Shape& row, std::int64_t chunk_rows);
 
   std::shared_ptr<const Folder> folder_;
   std::string name_;
@@ -69,7 +65,7 @@ class EpisodeFile {
   const RecordingPlan& plan_;
   h5::Id file_, trajectory_;
   std::vector<Dataset> datasets_;
-  std::vector<std::uint8_t> texts_, shuffled_, packed_;
+  std::vector<std::uint8_t> texts_, packed_;
 };
 
 }  // namespace mjsense

@@ -186,7 +186,6 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
       stream.sensor = sensor;
       stream.path = path_of(stream.spec.name);
       stream.chunk_rows = chunk_rows(stream.row_bytes());
-      stream.shuffled = stream.path.starts_with(kReplayGroup);
       claim(stream.path, owner);
       plan.arrays.push_back(std::move(stream));
     };

@@ -25,7 +25,6 @@ struct ArrayStream {
   const Field* present = nullptr;        // bool; the row is NaN where it is false. Null: no flag
   std::string path;                      // path in the trajectory's group: "obs/extra/tcp_pose"
   std::int64_t chunk_rows = 1;
-  bool shuffled = false;  // stored with HDF5's shuffle filter
 
   std::string_view kind() const;   // "json", or the sensor's kind
   std::size_t row_bytes() const;   // on disk, before compression
@@ -78,8 +77,7 @@ std::string batch_file(int batch, int batches);  // batch from 0
 std::string video_file(const VideoStream& video, int index, int batch, int batches);  // final name
 std::string video_file(std::string_view stem, std::string_view extension, int index, int batch,
                        int batches);
-// Group of the data for replay. Its arrays are smaller with the shuffle filter: 1.1 instead of 2.0 kB
-// a step of pick.
+// Group of the data for replay.
 inline constexpr std::string_view kReplayGroup = "replay/";
 constexpr std::size_t kFileNameBytes = 100;  // width of a file name in obs/sensor_data
 
