@@ -14,7 +14,7 @@ target_link_options(mjsense_fuzzed PUBLIC ${flags})
 target_include_directories(mjsense_fuzzed PUBLIC src ${PROJECT_SOURCE_DIR})
 target_link_libraries(mjsense_fuzzed PUBLIC mujoco::mujoco ${MJSENSE_PRIVATE_LIBS})
 
-set_source_files_properties(src/mjsense/core/toml_value.cc PROPERTIES
+set_source_files_properties(src/mjsense/core/fields/toml_value.cc PROPERTIES
                             COMPILE_OPTIONS -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/fuzz/ignored.txt)
 
 add_custom_target(fuzz)

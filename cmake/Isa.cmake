@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Instruction sets. The library runs on any x86-64. Files named *_avx2.cc and *_avx512.cc are compiled for these and chosen at
-# run time (core/cpu.h), so that no CPU executes an instruction that it does not support.
+# run time (core/system/cpu.h), so that no CPU executes an instruction that it does not support.
 # GCC 12 warns of uninitialised values inside its own AVX-512 headers. At -O3 its vectorizer for straight-line code drops the
 # rounding of double(float(x)); it is disabled, because the kernels are already written with vectors.
 # GCC copies structures 16 bytes at a time; a vector of 32 or 64 that is read right after such a copy has to wait until all parts

@@ -4,7 +4,7 @@ import pathlib
 import sys
 
 root, out = map(pathlib.Path, sys.argv[1:])
-lines = ['#include "mjsense/core/embedded_files.h"', "", "#include <array>", "", "namespace mjsense {", "namespace {"]
+lines = ['#include "mjsense/core/files/embedded_files.h"', "", "#include <array>", "", "namespace mjsense {", "namespace {"]
 files = sorted(p for p in root.rglob("*") if p.suffix in (".xml", ".toml"))
 for i, path in enumerate(files):
     data = path.read_bytes()

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Generates files from the declarations of fields in C++ (`visit_fields`, core/fields.h): the Python dataclasses and signatures,
+"""Generates files from the declarations of fields in C++ (`visit_fields`, core/fields/fields.h): the Python dataclasses and signatures,
 and the tables of the documentation. Also generates the list of public headers.
 
     tools/generate.py SCHEMA.json           write the files
@@ -109,9 +109,9 @@ SIGNATURES = {
 ENTRY_HEADERS = [
     "cameras/frozen_cameras.h",
     "cameras/load_cameras.h",
-    "core/config_checks.h",
-    "core/fields.h",
-    "core/sensor_fields.h",
+    "core/fields/config_checks.h",
+    "core/fields/fields.h",
+    "core/fields/sensor_fields.h",
     "effects/effect_sensor.h",
     "effects/pipeline.h",
     "episode/object_sensors.h",

@@ -6,7 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/sensor_spec.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"

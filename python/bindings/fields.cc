@@ -7,7 +7,7 @@
 
 #include "mjsense/app/schema.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/sensors/all_sensors.h"
 
 namespace mjsense::python {

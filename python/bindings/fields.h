@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 
 namespace mjsense::python {
 

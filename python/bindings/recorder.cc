@@ -13,7 +13,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/observe/shared_field.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"

@@ -11,8 +11,8 @@
 #include <memory>
 #include <variant>
 
-#include "mjsense/core/embedded_files.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/files/embedded_files.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"

@@ -14,7 +14,7 @@
 
 #include <numeric>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scenes/scene_file.h"

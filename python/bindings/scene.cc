@@ -11,10 +11,10 @@
 #include <nanobind/stl/vector.h>
 
 #include "mjsense/app/schema.h"
-#include "mjsense/core/embedded_files.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/embedded_files.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/mujoco_call.h"
-#include "mjsense/core/regular_file.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/mujoco_callbacks.h"

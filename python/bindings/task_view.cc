@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/json.h"
+#include "mjsense/core/text/json.h"
 #include "mjsense/scene/resolve.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"

@@ -3,7 +3,7 @@
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/rollout/record_job.h"
 #include "tests/fuzz/fuzz.h"
 

@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/cpu.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/effect_sensor.h"
 #include "mjsense/effects/noise.h"

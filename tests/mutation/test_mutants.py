@@ -22,9 +22,9 @@ def test_every_mutant_applies():
     ("file", "old", "new", "found"),
     [
         ("src/mjsense/core/nowhere.cc", "x", "y", "there is no src/mjsense/core/nowhere.cc"),
-        ("src/mjsense/core/png.cc", "what stands nowhere", "y", "its text stands 0 times"),
-        ("src/mjsense/core/png.cc", "mjsense", "y", "times in src/mjsense/core/png.cc, expected once"),
-        ("src/mjsense/core/png.cc", "namespace mjsense {", "namespace mjsense {", "changes nothing"),
+        ("src/mjsense/core/files/png.cc", "what stands nowhere", "y", "its text stands 0 times"),
+        ("src/mjsense/core/files/png.cc", "mjsense", "y", "times in src/mjsense/core/files/png.cc, expected once"),
+        ("src/mjsense/core/files/png.cc", "namespace mjsense {", "namespace mjsense {", "changes nothing"),
         ("tests/golden/golden_test.cc", "x", "y", "in no room"),
     ],
 )

@@ -8,7 +8,7 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/sensors/lidar/point_cloud.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 #include "python/bindings/bindings.h"

@@ -5,9 +5,9 @@
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/regular_file.h"
-#include "mjsense/core/toml_value.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/toml_value.h"
+#include "mjsense/core/files/regular_file.h"
 
 namespace mjsense {
 namespace {

@@ -12,7 +12,7 @@
 #include "mjsense/app/progress.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {

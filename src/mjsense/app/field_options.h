@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "mjsense/app/completion.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 
 namespace mjsense {
 

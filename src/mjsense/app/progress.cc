@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mjsense/app/terminal.h"
-#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/system/print_stderr.h"
 
 namespace mjsense {
 

@@ -11,7 +11,7 @@
 #include "mjsense/app/progress.h"
 #include "mjsense/app/text_table.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/system/print_stderr.h"
 #include "mjsense/replay/recording_tools.h"
 
 namespace mjsense {

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/system/print_stderr.h"
 
 namespace mjsense {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scenes/scene_file.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 
 namespace mjsense {
 

@@ -8,7 +8,7 @@
 
 #include "mjsense/app/progress.h"
 #include "mjsense/app/terminal.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 
 namespace mjsense {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/system/print_stderr.h"
 
 namespace mjsense {
 namespace {

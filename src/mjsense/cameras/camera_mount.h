@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 
 namespace mjsense {
 

@@ -9,10 +9,10 @@
 #include <sstream>
 
 #include "mjsense/cameras/frozen_cameras.h"
-#include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/toml_fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/toml_fields.h"
+#include "mjsense/core/files/data_file.h"
 
 namespace mjsense {
 namespace {

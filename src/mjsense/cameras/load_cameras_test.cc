@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/data_file.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {

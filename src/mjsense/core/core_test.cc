@@ -11,10 +11,10 @@
 
 #include "mjsense/core/array.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/json.h"
 #include "mjsense/core/rng.h"
-#include "mjsense/core/thread_pool.h"
-#include "mjsense/core/utf8.h"
+#include "mjsense/core/system/thread_pool.h"
+#include "mjsense/core/text/json.h"
+#include "mjsense/core/text/utf8.h"
 
 namespace mjsense {
 namespace {

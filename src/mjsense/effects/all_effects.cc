@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 
 namespace mjsense {
 namespace {

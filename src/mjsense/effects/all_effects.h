@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "mjsense/core/field_traits.h"
+#include "mjsense/core/fields/field_traits.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/chain.h"
 #include "mjsense/effects/noise.h"

@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/system/print_stderr.h"
 
 namespace mjsense {
 

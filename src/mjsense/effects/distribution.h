@@ -6,7 +6,7 @@
 #include <string_view>
 #include <variant>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/effects/effect.h"
 
 namespace mjsense {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
-#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields/config_checks.h"
 
 namespace mjsense {
 

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
-#include "mjsense/core/field_traits.h"
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/field_traits.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor_spec.h"
 

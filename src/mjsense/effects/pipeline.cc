@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 
 namespace mjsense {
 

@@ -27,9 +27,9 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/json.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/core/text/json.h"
 #include "mjsense/episode/active_worlds.h"
 #include "mjsense/episode/perturbation.h"
 #include "mjsense/robots/robot.h"

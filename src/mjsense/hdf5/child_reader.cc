@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_descriptor.h"
-#include "mjsense/core/os.h"
+#include "mjsense/core/files/file_descriptor.h"
+#include "mjsense/core/system/os.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
 namespace mjsense::h5 {

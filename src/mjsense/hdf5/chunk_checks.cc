@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/lzf.h"
 #include "mjsense/hdf5/untrusted_file.h"
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
-#include "mjsense/core/file_size_limit.h"
+#include "mjsense/core/files/file_size_limit.h"
 
 namespace mjsense::h5 {
 

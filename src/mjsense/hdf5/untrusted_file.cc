@@ -8,7 +8,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/chunk_checks.h"
 
 namespace mjsense::h5 {

@@ -6,9 +6,9 @@
 
 #include <string>
 
-#include "mjsense/core/json.h"
 #include "mjsense/core/row_error.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/core/text/json.h"
 
 namespace mjsense {
 

@@ -23,8 +23,8 @@
 #include <span>
 #include <vector>
 
-#include "mjsense/core/cpu.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_world.h"
 

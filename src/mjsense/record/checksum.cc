@@ -13,9 +13,9 @@
 #include <span>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_descriptor.h"
-#include "mjsense/core/file_size_limit.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/file_descriptor.h"
+#include "mjsense/core/files/file_size_limit.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/record/crc32.h"
 #include "mjsense/record/folder.h"
 

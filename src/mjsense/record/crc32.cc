@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "mjsense/core/cpu.h"
+#include "mjsense/core/system/cpu.h"
 
 #if defined(__x86_64__)
 #include <immintrin.h>

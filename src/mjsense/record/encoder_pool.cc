@@ -17,7 +17,7 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/os.h"
+#include "mjsense/core/system/os.h"
 #include "mjsense/record/process.h"
 
 namespace mjsense {

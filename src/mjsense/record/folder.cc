@@ -15,9 +15,9 @@
 #include <span>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_size_limit.h"
-#include "mjsense/core/os.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/file_size_limit.h"
+#include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/system/os.h"
 
 namespace fs = std::filesystem;
 

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/file_descriptor.h"
+#include "mjsense/core/files/file_descriptor.h"
 
 namespace mjsense {
 

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/json.h"
+#include "mjsense/core/text/json.h"
 
 namespace mjsense {
 namespace {

@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/os.h"
+#include "mjsense/core/system/os.h"
 #include "mjsense/record/spawn.h"
 
 namespace mjsense {

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/process_state.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/system/process_state.h"
 #include "mjsense/record/recorder_impl.h"
 
 namespace mjsense {

@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/testing/tools.h"

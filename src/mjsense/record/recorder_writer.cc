@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recorder_impl.h"
 #include "mjsense/record/video_file.h"

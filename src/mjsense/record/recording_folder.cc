@@ -15,8 +15,8 @@
 #include <optional>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/os.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/system/os.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recording_description.h"

@@ -25,7 +25,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/file_descriptor.h"
+#include "mjsense/core/files/file_descriptor.h"
 #include "mjsense/record/folder.h"
 #include "mjsense/record/recording_plan.h"
 #include "mjsense/record/staged_episode.h"

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "mjsense/core/file_descriptor.h"
+#include "mjsense/core/files/file_descriptor.h"
 #include "mjsense/record/folder.h"
 
 namespace mjsense {

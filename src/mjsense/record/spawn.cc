@@ -12,7 +12,7 @@
 #include <filesystem>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/os.h"
+#include "mjsense/core/system/os.h"
 
 namespace mjsense {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <random>
 
-#include "mjsense/core/file_descriptor.h"
+#include "mjsense/core/files/file_descriptor.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"
 #include "mjsense/record/testing/tools.h"

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mjsense/core/cpu.h"
+#include "mjsense/core/system/cpu.h"
 
 namespace mjsense {
 namespace {

@@ -22,7 +22,7 @@ std::size_t yuv420_bytes(int width, int height);
 void encode_yuv420(std::span<const std::uint8_t> rgb, int width, int height,
                    std::span<std::uint8_t> out);
 
-// Variants for each instruction set (core/cpu.h). `scratch` holds yuv420_scratch(width) values.
+// Variants for each instruction set (core/system/cpu.h). `scratch` holds yuv420_scratch(width) values.
 using Yuv420Kernel = void (*)(const std::uint8_t* rgb, int width, int height, std::uint8_t* out,
                               std::int16_t* scratch);
 std::size_t yuv420_scratch(int width);

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/cpu.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/record/process.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <memory>
 
-#include "mjsense/core/cpu.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
 #include "mjsense/render/testing/test_renderer.h"

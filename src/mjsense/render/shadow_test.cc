@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "mjsense/core/cpu.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/render/testing/test_renderer.h"
 
 namespace mjsense {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/png.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/png.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/video_file.h"

@@ -10,7 +10,7 @@
 #include <span>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/outcome_details.h"
 #include "mjsense/record/recording_description.h"

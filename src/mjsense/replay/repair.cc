@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_size_limit.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/file_size_limit.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"

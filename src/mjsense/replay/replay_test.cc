@@ -15,7 +15,7 @@
 #include <fstream>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_descriptor.h"
+#include "mjsense/core/files/file_descriptor.h"
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/recording_tools.h"

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_folder.h"

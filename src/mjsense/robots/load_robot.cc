@@ -7,10 +7,10 @@
 #include <set>
 #include <variant>
 
-#include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/toml_value.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/toml_value.h"
+#include "mjsense/core/files/data_file.h"
 #include "mjsense/robots/real_meshes.h"
 #include "mjsense/robots/sensor_tables.h"
 #include "mjsense/scene/mj_spec.h"

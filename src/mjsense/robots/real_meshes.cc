@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/name_matching.h"
+#include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/mj_spec.h"
 
 namespace mjsense {

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/robots/controllers/controller_cfg.h"
 #include "mjsense/scene/entity.h"

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/name_matching.h"
+#include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/sensors/all_sensors.h"
 

@@ -16,7 +16,7 @@
 // A reference without `entity` refers to the robot, except in `secondary`, where it refers to the
 // whole scene.
 
-#include "mjsense/core/toml_value.h"
+#include "mjsense/core/fields/toml_value.h"
 #include "mjsense/robots/robot_cfg.h"
 
 namespace mjsense {

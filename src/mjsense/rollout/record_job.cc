@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/model_fields.h"
 #include "mjsense/record/outcome_details.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/path_field.h"
+#include "mjsense/core/fields/path_field.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/rollout/rollout.h"
 

@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/json.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/text/json.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/scenes/load_scene.h"
 

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/observe/shared_field.h"
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/rollout/replay_sensor.h"

@@ -17,8 +17,8 @@
 #include <functional>
 #include <iterator>
 
-#include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/data_file.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/episode/testing/played_task.h"

@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/core/mujoco_call.h"
-#include "mjsense/core/name_matching.h"
+#include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/model_assets.h"
 #include "mjsense/scene/physics_options.h"

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/name_matching.h"
+#include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/resolve.h"
 

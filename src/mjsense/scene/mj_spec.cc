@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "mjsense/core/embedded_files.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/embedded_files.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/resolve.h"
 

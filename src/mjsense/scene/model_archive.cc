@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/zip.h"
+#include "mjsense/core/files/zip.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense {

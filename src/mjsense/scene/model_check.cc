@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

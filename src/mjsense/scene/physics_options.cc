@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 
 namespace mjsense {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/default_lighting.h"

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/config_checks.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain_tile.h"
 

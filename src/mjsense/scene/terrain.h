@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 
 namespace mjsense {
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <utility>
 
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/scenes/absent_objects.h"
 #include "mjsense/scenes/entity_model.h"
 #include "mjsense/scenes/final_spec_edits.h"

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/name_matching.h"
+#include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/episode_scene.h"
 

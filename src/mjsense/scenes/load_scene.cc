@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <optional>
 
-#include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/toml_fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/toml_fields.h"
+#include "mjsense/core/files/data_file.h"
 
 namespace mjsense {
 namespace {

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/scene/default_lighting.h"
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/scene.h"

@@ -9,8 +9,8 @@
 #include <type_traits>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/name_matching.h"
 #include "mjsense/core/pose.h"
+#include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

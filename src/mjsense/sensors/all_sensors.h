@@ -5,7 +5,7 @@
 
 #include <span>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 
 namespace mjsense {
 

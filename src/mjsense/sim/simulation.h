@@ -15,7 +15,7 @@
 #include "mjsense/core/debug_shapes.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/core/shared_cache.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/worlds/worlds.h"
 

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <set>
 
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 
 namespace mjsense {
 namespace {

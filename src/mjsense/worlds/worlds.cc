@@ -8,9 +8,9 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
-#include "mjsense/core/os.h"
-#include "mjsense/core/process_state.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/os.h"
+#include "mjsense/core/system/process_state.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/worlds/ordered_apply.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reads the archives of core/zip.h, by their directory.
+// Reads the archives of core/files/zip.h, by their directory.
 
 #include <zlib.h>
 

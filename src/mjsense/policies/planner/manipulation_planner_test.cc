@@ -9,7 +9,7 @@
 #include <cstring>
 #include <set>
 
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_loop.h"

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <vector>
 
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"

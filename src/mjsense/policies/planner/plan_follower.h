@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/policies/planner/plan.h"
 #include "mjsense/robots/robot.h"
 

@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "mjsense/core/cpu.h"
+#include "mjsense/core/system/cpu.h"
 
 namespace mjsense::testing {
 

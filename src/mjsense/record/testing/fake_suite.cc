@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/json.h"
+#include "mjsense/core/text/json.h"
 
 namespace mjsense {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/core/cpu.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/render/view/view.h"
 
 namespace mjsense {

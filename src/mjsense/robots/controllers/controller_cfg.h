@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "mjsense/core/field_traits.h"
+#include "mjsense/core/fields/field_traits.h"
 
 namespace mjsense {
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "mjsense/core/png.h"
+#include "mjsense/core/files/png.h"
 
 namespace mjsense {
 namespace {

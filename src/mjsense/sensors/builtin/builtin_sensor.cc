@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/scene/scene.h"

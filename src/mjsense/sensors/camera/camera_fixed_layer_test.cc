@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/camera_sensor.h"

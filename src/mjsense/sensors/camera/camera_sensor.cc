@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/shared_cache.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
 #include "mjsense/sensors/camera/camera_data.h"

@@ -10,8 +10,8 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 

@@ -33,7 +33,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
 
 namespace mjsense {

@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/name_matching.h"
+#include "mjsense/core/text/name_matching.h"
 
 namespace mjsense {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/print_stderr.h"
+#include "mjsense/core/system/print_stderr.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_field_sensor.h"

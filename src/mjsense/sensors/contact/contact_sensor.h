@@ -18,7 +18,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_match.h"
 #include "mjsense/sensors/contact/contact_memory.h"

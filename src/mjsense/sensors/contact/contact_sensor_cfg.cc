@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
-#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/config_checks.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 

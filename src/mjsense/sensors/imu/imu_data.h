@@ -2,7 +2,7 @@
 #pragma once
 // Declares the fields of an IMU.
 
-#include "mjsense/core/data_class.h"
+#include "mjsense/core/fields/data_class.h"
 
 namespace mjsense {
 

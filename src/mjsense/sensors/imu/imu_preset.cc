@@ -3,8 +3,8 @@
 #include <map>
 #include <numbers>
 
-#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields/config_checks.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/noise.h"
 #include "mjsense/sensors/imu/imu_sensor.h"

@@ -5,10 +5,10 @@
 
 #include <utility>
 
-#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/config_checks.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/scene/model_sensors/builtin_draw.h"
 #include "mjsense/sensors/imu/imu_data.h"
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "mjsense/core/rng.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 
 namespace mjsense {

@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/sensors/lidar/npy.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 

@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 
 namespace mjsense {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/regular_file.h"
+#include "mjsense/core/files/regular_file.h"
 
 namespace mjsense {
 

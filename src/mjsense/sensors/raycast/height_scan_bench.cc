@@ -13,7 +13,7 @@
 #include <string>
 
 #include "mjsense/core/rng.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {

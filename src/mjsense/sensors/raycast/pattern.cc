@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
-#include "mjsense/core/config_checks.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/fields.h"
-#include "mjsense/core/sensor_fields.h"
-#include "mjsense/core/thread_pool.h"
+#include "mjsense/core/fields/config_checks.h"
+#include "mjsense/core/fields/fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
+#include "mjsense/core/system/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
 namespace mjsense {

@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "mjsense/core/debug_shapes.h"
-#include "mjsense/core/named_enum.h"
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_scene.h"

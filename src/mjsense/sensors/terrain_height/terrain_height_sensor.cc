@@ -7,7 +7,7 @@
 #include <array>
 #include <string_view>
 
-#include "mjsense/core/sensor_fields.h"
+#include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
 namespace mjsense {

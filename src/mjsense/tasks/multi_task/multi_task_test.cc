@@ -8,7 +8,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/json.h"
+#include "mjsense/core/text/json.h"
 #include "mjsense/episode/policy.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
