@@ -8,7 +8,7 @@ import signal
 import sys
 from itertools import pairwise
 
-from mjsense import _core
+from mjsense import _core, commands
 from mjsense.assets import use_installed_meshes
 from mjsense.ffmpeg import use_installed_ffmpeg
 
@@ -18,10 +18,16 @@ def main() -> int:
     # The program handles Ctrl-C itself, as it does outside of Python.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     words = sys.argv[1:]
+    if words and words[0] in commands.COMMANDS:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        return commands.run(words)
+    if words[:2] == ["complete", "--"] and len(words) > 3 and words[2] in commands.COMMANDS:
+        print(*commands.completions(words[2:]), sep="\n")
+        return 0
     if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
         use_installed_meshes()
     use_installed_ffmpeg()
-    return _core.run_program([b"mjsense", *map(os.fsencode, words)])
+    return _core.run_program([b"mjsense", *map(os.fsencode, words)], list(commands.COMMANDS.items()))
 
 
 if __name__ == "__main__":

@@ -203,7 +203,7 @@ void read_config_argument(int argc, char** argv, RecordOptions& options) {
   }
 }
 
-int run(int argc, char** argv) {
+int run(int argc, char** argv, std::span<const OtherCommand> others) {
   show_warnings();
   disable_mujoco_log_file();
   CLI::App program("Sensors, cameras and recordings for MuJoCo simulations.", "mjsense");
@@ -272,6 +272,8 @@ int run(int argc, char** argv) {
   std::vector<std::string> to_complete;
   CLI::App& complete_app = *program.add_subcommand("complete", "")->group("");
   complete_app.add_option("words", to_complete);
+
+  for (const OtherCommand& other : others) program.add_subcommand(other.name, other.description);
 
   // Set last, because subcommands inherit the footer.
   program.footer(
@@ -352,9 +354,9 @@ int run(int argc, char** argv) {
 
 }  // namespace
 
-int run_program(int argc, char** argv) {
+int run_program(int argc, char** argv, std::span<const OtherCommand> others) {
   try {
-    const int code = run(argc, argv);
+    const int code = run(argc, argv, others);
     // Output that was redirected to a full disk is an error.
     if (std::fflush(stdout) != 0 || std::ferror(stdout))
       throw RuntimeError(fmt::format("cannot write to stdout: {}", std::strerror(errno)));

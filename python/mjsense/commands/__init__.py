@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The commands of the ``mjsense`` program that are written in Python, one module each.
+
+A module ``mjsense.commands.NAME`` has ``add_arguments(parser)``, ``run(arguments) -> exit code``, and ``EXAMPLES``: pairs of a command and
+its explanation. It imports what it needs in ``run``, so that ``--help`` and completion are fast.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import shutil
+import sys
+from types import ModuleType
+
+COMMANDS = {
+    "replay": "Replay recorded episodes and compare them with the recording.",
+}
+"""Names and one-line descriptions, in the order of ``mjsense --help``."""
+
+FAILED = 1  # some episodes or checks failed
+WRONG_INPUT = 2
+_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=26, width=min(shutil.get_terminal_size().columns, 100))
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]  # raises instead of exiting
+        raise ValueError(f"{message}; see {self.prog} --help")
+
+
+def _module(name: str) -> ModuleType:
+    return importlib.import_module(f"mjsense.commands.{name.replace('-', '_')}")
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    """The argument parser of a command."""
+    module = _module(name)
+    examples = "\n".join(f"  # {why}\n  {command}" for command, why in module.EXAMPLES)
+    parser = _Parser(
+        prog=f"mjsense {name}", description=COMMANDS[name], epilog=f"Examples:\n{examples}", formatter_class=_HelpFormatter, allow_abbrev=False
+    )
+    module.add_arguments(parser)
+    return parser
+
+
+def _message(error: BaseException) -> str:
+    text = error.args[0] if isinstance(error, KeyError) and error.args else error  # str() of a KeyError is a repr
+    return " ".join(str(text).split()) or type(error).__name__
+
+
+def run(words: list[str]) -> int:
+    """Runs the command ``words[0]`` with the other words as its arguments. Errors are printed on stderr.
+
+    Returns:
+        0: done; 1: some episodes or checks failed; 2: wrong usage or input; 130: interrupted.
+    """
+    try:
+        arguments = parser_of(words[0]).parse_args(words[1:])
+        code = _module(words[0]).run(arguments)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+    except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
+        print(f"mjsense {words[0]}: {_message(error)}", file=sys.stderr)
+        return WRONG_INPUT
+
+
+def completions(words: list[str]) -> list[str]:
+    """Completions of the last of these words, of which the first is a command: option names, or the choices of an option."""
+    parser, last = parser_of(words[0]), words[-1]
+    options = {name: action for action in parser._actions for name in action.option_strings}
+    before = options.get(words[-2]) if len(words) > 2 else None
+    if last.startswith("-"):
+        found = list(options)
+    elif before is not None and before.nargs != 0:
+        found = [str(choice) for choice in before.choices or ()]
+    else:
+        found = [str(c) for action in parser._actions if not action.option_strings for c in action.choices or ()]
+    return [name for name in found if name.startswith(last)]
