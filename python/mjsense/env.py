@@ -40,7 +40,7 @@ class TaskEnv(gymnasium.Env):
         return _row(observation, 0), {}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Performs one control step with the action ``[n]``: actuator commands of the move groups; see ``action_groups``."""
+        """Performs one control step with the action ``[n]``: commands of the move groups; see :meth:`TaskVectorEnv.step`."""
         return self._single(*self.worlds.step(np.asarray(action)[None]))
 
     def step_chunk(self, actions: Any, stop_on_success: bool = False) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:

@@ -54,6 +54,7 @@ class TaskVectorEnv(VectorEnv):
         observations: Sequence[str] | None,
         render_mode: str | None,
         autoreset_mode: str | AutoresetMode,
+        action_space: str,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', not {render_mode!r}")
@@ -88,6 +89,9 @@ class TaskVectorEnv(VectorEnv):
         """Columns of an action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
         low[low <= -_mujoco.MAXVAL], high[high >= _mujoco.MAXVAL] = -np.inf, np.inf  # no limit
+        self._command_range = _command_range(self.action_groups, low, high) if action_space == "normalised" else None
+        if self._command_range is not None:
+            low, high = np.full_like(low, -1), np.full_like(high, 1)
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         boxes = {name: box_of(spec) for name, spec in self.specs.items()}
@@ -138,7 +142,8 @@ class TaskVectorEnv(VectorEnv):
         """Performs one control step.
 
         Args:
-            actions: ``[num_envs, n]``: actuator commands of the move groups; see ``action_groups``.
+            actions: ``[num_envs, n]``: commands of the move groups (see ``action_groups``), or with
+                ``action_space="normalised"`` their images in -1 to 1.
             done: Optional, bool ``[num_envs]``: the policy has finished and the episode ends after this step.
         """
         values = self._checked(actions, (self.num_envs, *(self.single_action_space.shape or ())))
@@ -158,7 +163,7 @@ class TaskVectorEnv(VectorEnv):
         A world stops early at the end of its episode or, with ``stop_on_success``, at its first success. Rewards are summed.
 
         Args:
-            actions: ``[num_envs, steps, n]``: actuator commands.
+            actions: ``[num_envs, steps, n]``; see :meth:`step`.
         """
         shape = np.shape(actions)
         steps = shape[1] if len(shape) == 3 and shape[1] > 0 else "steps"
@@ -175,7 +180,10 @@ class TaskVectorEnv(VectorEnv):
         finite = np.isfinite(actions).reshape(self.num_envs, -1).all(1)
         if not finite.all():
             raise ValueError(f"actions of worlds {np.flatnonzero(~finite).tolist()} are not finite")
-        return actions
+        if self._command_range is None:
+            return actions
+        low, high = self._command_range
+        return low + (np.clip(actions, -1, 1) + 1) / 2 * (high - low)
 
     def _play(self, play: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         resting = self._ended.copy()
@@ -217,7 +225,11 @@ class TaskVectorEnv(VectorEnv):
         self._rollout.act()
         actions, done = self._rollout.actions()
         self.expert_done = np.array(done, bool)
-        return np.array(actions, dtype=np.float32)
+        commands = np.array(actions, np.float64)
+        if self._command_range is not None:
+            low, high = self._command_range
+            commands = 2 * (commands - low) / (high - low) - 1
+        return commands.astype(np.float32)
 
     def _observe(self) -> dict[str, Any]:
         return nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
@@ -273,6 +285,14 @@ def _row(observation: dict[str, Any], world: int) -> dict[str, Any]:
     return {key: _row(value, world) if isinstance(value, dict) else value[world, ...] for key, value in observation.items()}
 
 
+def _command_range(groups: dict[str, slice], low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """float64 ``[n]`` each. Raises ValueError if a group's commands have no range."""
+    for name, columns in groups.items():
+        if not np.isfinite([low[columns], high[columns]]).all():
+            raise ValueError(f"action_space='normalised': the commands of move group '{name}' have no range; use action_space='commands'")
+    return low.astype(np.float64), high.astype(np.float64)
+
+
 def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
     return gymnasium.spaces.Dict({key: _space(box) if isinstance(box, dict) else box for key, box in boxes.items()})
 
@@ -307,6 +327,7 @@ def make_vec(
     use_sensors: bool = True,
     autoreset_mode: str | AutoresetMode = "next_step",
     render_mode: str | None = None,
+    action_space: Literal["commands", "normalised"] = "commands",
 ) -> TaskVectorEnv:
     """Creates a gymnasium vector environment of a task.
 
@@ -342,10 +363,12 @@ def make_vec(
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.
         render_mode: None or rgb_array.
+        action_space: ``commands``: actions are the commands of the robot's controllers, in their units. ``normalised``: actions
+            from -1 to 1, mapped linearly to the range of each command and clipped; an error if a command has no range.
     """
     options = dict(locals())
-    for name in ("observations", "sensors", "autoreset_mode", "render_mode"):
+    for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space"):
         del options[name]
     options["num_worlds"] = options.pop("num_envs")
     objects = parts_of(options, sensors)
-    return TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode)
+    return TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)

@@ -26,7 +26,8 @@ struct MoveGroup {
   // position targets.
   int target_size = 0;
   std::string target_unit;
-  int leaf_site = -1;  // -1: the leaf frame is the base frame
+  bool commands_are_targets = false;  // each number of a command is the target of an actuator
+  int leaf_site = -1;                 // -1: the leaf frame is the base frame
   int root_body = -1;
   // Grippers only.
   double open_command = 0, closed_command = 0, max_opening = 0;

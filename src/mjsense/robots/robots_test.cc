@@ -24,7 +24,10 @@ struct DataDelete {
 
 // One robot without other objects, in one world.
 struct Alone {
-  explicit Alone(const std::string& name) : cfg(robot_cfg(name)) {
+  explicit Alone(const std::string& name, const std::optional<ControllerCfg>& of_arms = {})
+      : cfg(robot_cfg(name)) {
+    for (MoveGroupCfg& group : cfg.groups)
+      if (of_arms && group.kind == GroupKind::kArm) group.controller = *of_arms;
     SceneCfg scene_cfg;
     EntityCfg entity;
     entity.model = cfg.model;
@@ -281,6 +284,52 @@ TEST_P(EveryRobot, ActionNoiseOfArmsIsAsLargeAsConfigured) {
       }
     }
     EXPECT_NEAR(std::sqrt(square / expected), 1, 0.1) << group.name;
+  }
+}
+
+// Moves every arm's tool 10 cm in several directions and turns it by 0.2 rad, with poses and with
+// displacements as commands.
+TEST_P(EveryRobot, ToolsReachCommandedPoses) {
+  for (const ControllerCfg& controller :
+       std::initializer_list<ControllerCfg>{EePoseCfg{}, EeDeltaPoseCfg{}}) {
+    const bool absolute = std::holds_alternative<EePoseCfg>(controller);
+    Alone of(GetParam(), controller);
+    const Robot& robot = *of.robot;
+    for (int g = 0; g < static_cast<int>(robot.groups().size()); ++g) {
+      const MoveGroup& group = robot.groups()[g];
+      if (group.kind != GroupKind::kArm) continue;
+      int reachable = 0;
+      for (const Vec3 to : {Vec3{0.1, 0, 0}, Vec3{-0.1, 0, 0}, Vec3{0, 0.1, 0}, Vec3{0, -0.1, 0},
+                            Vec3{0, 0, 0.1}, Vec3{0, 0, -0.1}}) {
+        of.start();
+        const Pose from = robot.tcp_pose(of.world, g);
+        const Pose goal{from.p + to, normalized(exp3({0, 0, 0.2}) * from.q)};
+        RobotValues values;
+        robot.read_qpos(of.world, values);
+        if (!robot.ik(g, goal, values, Chain::kTracking)) continue;
+        ++reachable;
+        std::vector<double> command(7);
+        write_pose(goal, command.data());
+        if (!absolute) command = {to.x / 4, to.y / 4, to.z / 4, 0, 0, 0.2 / 4};
+        Action action;
+        action.commands[g].set(command);
+        for (int step = 0; step < 30; ++step) {
+          if (!absolute && step == 4) action.commands[g].set(std::vector<double>(6, 0.0));
+          of.play(action);
+          for (std::size_t i = 0; i < group.joints.size(); ++i) {
+            const double* range = of.model->jnt_range + 2 * group.joints[i];
+            EXPECT_GT(of.data->qpos[group.qpos[i]], range[0] - 0.01);
+            EXPECT_LT(of.data->qpos[group.qpos[i]], range[1] + 0.01);
+          }
+        }
+        const Pose reached = robot.tcp_pose(of.world, g);
+        EXPECT_LT(norm(reached.p - goal.p), 0.002)
+            << group.name << " " << absolute << " " << to.x << " " << to.y << " " << to.z;
+        EXPECT_LT(angle_between(reached.q, goal.q), 0.5 * std::numbers::pi / 180)
+            << group.name << " " << absolute << " " << to.x << " " << to.y << " " << to.z;
+      }
+      EXPECT_GE(reachable, 3) << group.name;
+    }
   }
 }
 

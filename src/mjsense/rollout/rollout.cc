@@ -17,10 +17,24 @@
 namespace mjsense {
 namespace {
 
+void set_arm_controller(const std::string& text, RobotCfg& robot) {
+  const ControllerCfg controller = parse_controller(text, "arm_controller");
+  bool any = false;
+  for (MoveGroupCfg& group : robot.groups) {
+    if (group.kind != GroupKind::kArm) continue;
+    group.controller = controller;
+    any = true;
+  }
+  if (!any)
+    throw ValueError(
+        fmt::format("arm_controller is '{}', but robot '{}' has no arm", text, robot.name));
+}
+
 TaskCfg task_cfg(const RolloutCfg& cfg) {
   TaskCfg out;
   if (!cfg.robot.empty()) {
     out.robot = robot_cfg(cfg.robot);
+    if (!cfg.arm_controller.empty()) set_arm_controller(cfg.arm_controller, out.robot);
     out.policy_dt_ms = out.robot.policy_dt_ms;
     out.ctrl_dt_ms = out.robot.ctrl_dt_ms;
     out.sim_dt_ms = out.robot.sim_dt_ms;

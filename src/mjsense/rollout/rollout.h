@@ -54,6 +54,7 @@ inline constexpr std::string_view kTaskRobot = "auto";
 struct RolloutCfg {
   std::string task = "pick";
   std::string robot{kTaskRobot};
+  std::string arm_controller;
   std::string scene;
   std::string policy = "planner";
   int num_worlds = 1;
@@ -103,6 +104,10 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("robot", c.robot,
     "Name or file of the robot. ``auto``: the task's default robot, or the first that can do the "
     "task; no robot for a task whose scene includes one.")
+      .decides_data();
+  v("arm_controller", c.arm_controller,
+    "Controller of the robot's arms, which decides what an action is: its kind, for example "
+    "``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.")
       .decides_data();
   v("scene", c.scene, "Name or file of the scene; by default the task's.").decides_data();
   v("policy", c.policy, "Name of the policy.").decides_data();

@@ -70,7 +70,7 @@ void Follower::initialize(const Robot& robot, const mjModel* model, int num_worl
 
 bool Follower::joints_are_commanded(int group) const {
   const MoveGroup& g = robot_->groups()[group];
-  return g.targets_are_qpos() && g.command_size == g.target_size;
+  return g.targets_are_qpos() && g.commands_are_targets;
 }
 
 void Follower::reset(const World& world) {

@@ -4,10 +4,12 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "mjsense/core/fields/field_traits.h"
+#include "mjsense/core/fields/named_enum.h"
 
 namespace mjsense {
 
@@ -124,6 +126,60 @@ void visit_fields(V& v, FreeBaseCfg& c) {
   v("max_turn", c.max_turn, "Maximum turning speed of the mocap body.").unit("rad/s").positive();
 }
 
+struct EePoseCfg {
+  double max_speed = 0.5;
+  double max_turn = 2.0;
+  double max_joint_speed = 2.0;
+};
+template <class V>
+void visit_fields(V& v, EePoseCfg& c) {
+  v.object(
+      "EePoseCfg",
+      "A command is a pose of the tool in the robot's base frame: x, y, z (m) and a quaternion "
+      "wxyz. Inverse kinematics turns it into the targets of the arm's position servos.",
+      "ee_pose");
+  v("max_speed", c.max_speed, "Maximum speed of the tool.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "Maximum turning speed of the tool.").unit("rad/s").positive();
+  v("max_joint_speed", c.max_joint_speed,
+    "Maximum speed of each joint's target, rad/s or m/s. Near singular postures it slows the tool.")
+      .positive();
+}
+
+enum class DeltaFrame { kBase, kTool };
+template <>
+inline constexpr std::array<std::string_view, 2> kEnumNames<DeltaFrame>{"base", "tool"};
+enum class DeltaReference { kTarget, kMeasured };
+template <>
+inline constexpr std::array<std::string_view, 2> kEnumNames<DeltaReference>{"target", "measured"};
+
+struct EeDeltaPoseCfg {
+  NamedEnum<DeltaFrame> frame = DeltaFrame::kBase;
+  NamedEnum<DeltaReference> reference = DeltaReference::kTarget;
+  double max_translation = 0.05;
+  double max_rotation = 0.25;
+  double max_joint_speed = 2.0;
+};
+template <class V>
+void visit_fields(V& v, EeDeltaPoseCfg& c) {
+  v.object("EeDeltaPoseCfg",
+           "A command is a displacement of the tool: x, y, z (m) and a rotation vector (rad). "
+           "Inverse kinematics turns it into the targets of the arm's position servos.",
+           "ee_delta_pose");
+  v("frame", c.frame,
+    "Axes of the command: those of the robot's base frame, or those of the tool. Rotation is about "
+    "the tool's origin in both cases.");
+  v("reference", c.reference,
+    "Pose to which the displacement is added: the last target, or the measured pose, from which a "
+    "loaded arm sinks.");
+  v("max_translation", c.max_translation, "Limit of x, y and z of a command.").unit("m").positive();
+  v("max_rotation", c.max_rotation, "Limit of each part of the rotation vector of a command.")
+      .unit("rad")
+      .positive();
+  v("max_joint_speed", c.max_joint_speed,
+    "Maximum speed of each joint's target, rad/s or m/s. Near singular postures it slows the tool.")
+      .positive();
+}
+
 struct NoControllerCfg {};
 template <class V>
 void visit_fields(V& v, NoControllerCfg&) {
@@ -132,8 +188,13 @@ void visit_fields(V& v, NoControllerCfg&) {
 
 using ControllerCfg =
     std::variant<JointPositionCfg, JointPositionRelativeCfg, JointVelocityCfg, TorsoHeightCfg,
-                 HolonomicBaseCfg, DifferentialBaseCfg, MocapBaseCfg, FreeBaseCfg, NoControllerCfg>;
+                 HolonomicBaseCfg, DifferentialBaseCfg, MocapBaseCfg, FreeBaseCfg, EePoseCfg,
+                 EeDeltaPoseCfg, NoControllerCfg>;
 template <>
 inline constexpr const char* kChoiceName<ControllerCfg> = "ControllerCfg";
+
+// Reads the kind of a controller, "ee_delta_pose", or an inline table of TOML with its fields,
+// "{ kind = 'ee_delta_pose', frame = 'tool' }". `context` begins the message of a ValueError.
+ControllerCfg parse_controller(std::string_view text, const std::string& context);
 
 }  // namespace mjsense

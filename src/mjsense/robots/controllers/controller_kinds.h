@@ -18,6 +18,8 @@ MakeController<HolonomicBaseCfg> make_kind;
 MakeController<DifferentialBaseCfg> make_kind;
 MakeController<MocapBaseCfg> make_kind;
 MakeController<FreeBaseCfg> make_kind;
+MakeController<EePoseCfg> make_kind;
+MakeController<EeDeltaPoseCfg> make_kind;
 MakeController<NoControllerCfg> make_kind;
 
 }  // namespace mjsense

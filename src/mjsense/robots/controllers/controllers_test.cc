@@ -308,5 +308,93 @@ TEST(Bases, FixedBaseCannotBePlacedElsewhere) {
   }
 }
 
+// A planar arm of two links of 1 m in the xy plane, and a wrist; the tool is at the wrist.
+MoveGroupCfg planar_arm(ControllerCfg controller) {
+  MoveGroupCfg group;
+  group.kind = GroupKind::kArm;
+  group.joints = group.actuators = {"shoulder", "elbow", "wrist"};
+  group.leaf_site = "tool";
+  group.init = {0.3, 1.2, 0.5};
+  group.controller = std::move(controller);
+  return group;
+}
+
+const std::string kPlanarArm = R"(<mujoco><option gravity="0 0 0"/><default>
+  <position kp="1000" dampratio="1" ctrlrange="-3 3"/><joint axis="0 0 1" armature="0.1"/></default>
+  <worldbody><body name="base"><geom size=".1" mass="1"/>
+    <body><joint name="shoulder"/><geom size=".1" mass="1"/>
+    <body pos="1 0 0"><joint name="elbow"/><geom size=".1" mass="1"/>
+    <body pos="1 0 0"><joint name="wrist"/><geom size=".1" mass=".1"/><site name="tool"/>
+    </body></body></body></body></worldbody><actuator><position name="shoulder" joint="shoulder"/>
+    <position name="elbow" joint="elbow"/><position name="wrist" joint="wrist"/></actuator></mujoco>)";
+
+Pose tool_of(const OneGroup& r) { return r.robot->tcp_pose(r.world, 0); }
+
+TEST(Controllers, DisplacementsOfTheToolAreInTheChosenFrame) {
+  for (const DeltaFrame frame : {DeltaFrame::kBase, DeltaFrame::kTool}) {
+    OneGroup r(kPlanarArm, planar_arm(EeDeltaPoseCfg{.frame = frame}));
+    EXPECT_EQ(r.robot->groups()[0].command_size, 6);
+    const Pose from = tool_of(r);
+    r.play({0.02, 0.01, 0, 0, 0, 0.1});
+    r.play({0, 0, 0, 0, 0, 0}, 30);
+    const Vec3 moved{0.02, 0.01, 0};
+    const Vec3 expected = from.p + (frame == DeltaFrame::kBase ? moved : rotate(from.q, moved));
+    const Pose target = r.robot->target_pose(r.world, 0);
+    EXPECT_LT(norm(target.p - expected), 1e-6);
+    EXPECT_NEAR(log3(target.q * conjugate(from.q)).z, 0.1, 1e-6);
+    EXPECT_LT(norm(tool_of(r).p - expected), 1e-3);
+  }
+}
+
+TEST(Controllers, DisplacementsOfTheToolAreLimited) {
+  OneGroup r(kPlanarArm, planar_arm(EeDeltaPoseCfg{.max_translation = 0.02}));
+  const Pose from = tool_of(r);
+  r.play({0, 1, 0, 0, 0, 0});
+  r.play({0, 0, 0, 0, 0, 0}, 30);
+  EXPECT_NEAR(tool_of(r).p.y - from.p.y, 0.02, 1e-3);
+}
+
+// The target moves with 0.5 m/s: 0.03 m in one step of 60 ms.
+TEST(Controllers, PosesOfTheToolAreApproachedAtLimitedSpeed) {
+  OneGroup r(kPlanarArm, planar_arm(EePoseCfg{}));
+  const Pose from = tool_of(r);
+  std::vector<double> command(7);
+  write_pose(Pose{from.p + Vec3{0, 0.12, 0}, from.q}, command.data());
+  r.play(command);
+  EXPECT_NEAR(r.robot->target_pose(r.world, 0).p.y - from.p.y, 0.03, 1e-6);
+  r.play(command, 30);
+  EXPECT_NEAR(tool_of(r).p.y - from.p.y, 0.12, 1e-3);
+  EXPECT_THAT(
+      [&] {
+        r.play({0, 0, 0, 0, 0, 0, 0});
+      },
+      ThrowsMessage<ValueError>(HasSubstr("is not a rotation")));
+}
+
+// A pose that is out of reach stretches the arm; the joints' targets stay finite and slow.
+TEST(Controllers, PosesOutOfReachAreApproached) {
+  OneGroup r(kPlanarArm, planar_arm(EePoseCfg{}));
+  double last[3] = {r.target(0), r.target(1), r.target(2)};
+  for (int step = 0; step < 200; ++step) {
+    r.play({3, 0, 0.5, 1, 0, 0, 0});
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_LE(std::abs(r.target(i) - last[i]), 0.12 + 1e-9);
+      last[i] = r.target(i);
+    }
+  }
+  EXPECT_GT(tool_of(r).p.x, 1.9);
+}
+
+TEST(Controllers, ToolControllersNeedATool) {
+  MoveGroupCfg group = planar_arm(EePoseCfg{});
+  group.leaf_site.clear();
+  EXPECT_THAT([&] { OneGroup(kPlanarArm, group); },
+              ThrowsMessage<ValueError>(HasSubstr("needs leaf_site")));
+  EXPECT_THAT([] { parse_controller("ee_delta_pos", "arm_controller"); },
+              ThrowsMessage<ValueError>(HasSubstr("did you mean 'ee_delta_pose'")));
+  const ControllerCfg parsed = parse_controller("{ kind = 'ee_delta_pose', frame = 'tool' }", "x");
+  EXPECT_EQ(std::get<EeDeltaPoseCfg>(parsed).frame, DeltaFrame::kTool);
+}
+
 }  // namespace
 }  // namespace mjsense

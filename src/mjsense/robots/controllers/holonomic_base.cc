@@ -20,6 +20,7 @@ class HolonomicBase final : public RampedController {
   void describe(MoveGroup& group) const override {
     RampedController::describe(group);
     group.command_unit = group.target_unit = "m, m, rad";
+    group.commands_are_targets = true;
   }
   void command(const World& world, std::span<const double> command,
                std::span<double> target) override {

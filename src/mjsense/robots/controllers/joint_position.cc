@@ -11,6 +11,10 @@ class JointPosition final : public RampedController {
  public:
   JointPosition(const JointPositionCfg& cfg, const MoveGroup& group, const ControllerInit& init)
       : RampedController(cfg.ramp, group, init) {}
+  void describe(MoveGroup& group) const override {
+    RampedController::describe(group);
+    group.commands_are_targets = true;
+  }
   void command(const World& /*world*/, std::span<const double> command,
                std::span<double> target) override {
     for (int i = 0; i < size(); ++i) target[i] = clip(i, command[i]);

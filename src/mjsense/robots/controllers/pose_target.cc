@@ -9,6 +9,18 @@
 
 namespace mjsense {
 
+Pose commanded_pose(std::span<const double> command, const std::string& context) {
+  const Quat q = quat(command.data() + 3);
+  const double size = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+  if (!(size > 1e-12)) {
+    throw ValueError(
+        fmt::format("{}: the quaternion ({}, {}, {}, {}) of the command is not a rotation; a "
+                    "command is x, y, z and the quaternion w, x, y, z",
+                    context, q.w, q.x, q.y, q.z));
+  }
+  return {vec3(command.data()), normalized(q)};
+}
+
 PoseTarget::PoseTarget(int mocap, const Pose& base_to_mocap, double max_speed, double max_turn,
                        const ControllerInit& init)
     : mocap_(mocap),
@@ -42,15 +54,7 @@ void PoseTarget::keep(const World& world, std::span<const double> /*target*/,
 
 void PoseTarget::command(const World& world, std::span<const double> command,
                          std::span<double> /*target*/) {
-  const Quat q = quat(command.data() + 3);
-  const double size = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
-  if (!(size > 1e-12)) {
-    throw ValueError(
-        fmt::format("{}: the quaternion ({}, {}, {}, {}) of the command is not a rotation; a "
-                    "command is x, y, z and the quaternion w, x, y, z",
-                    context_, q.w, q.x, q.y, q.z));
-  }
-  goals_[world.id] = {true, {vec3(command.data()), normalized(q)}};
+  goals_[world.id] = {true, commanded_pose(command, context_)};
 }
 
 void PoseTarget::begin(const World& world, std::span<const double> /*target*/,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Moves a mocap body to a commanded pose at limited speed. Base class for bases that are mocap
-// bodies or are welded to one.
+// Commands that are poses. PoseTarget moves a mocap body to a commanded pose at limited speed: the
+// base class for bases that are mocap bodies or are welded to one.
 
 #include <vector>
 
@@ -9,6 +9,10 @@
 #include "mjsense/robots/controllers/controller.h"
 
 namespace mjsense {
+
+// The pose of a command x, y, z, w, x, y, z. Throws ValueError if the quaternion is zero; the
+// message begins with `context`.
+Pose commanded_pose(std::span<const double> command, const std::string& context);
 
 class PoseTarget : public Controller {
  public:
