@@ -65,6 +65,7 @@ def record(
     out: str | Path,
     scene: Scenes = "",
     # options of a recording
+    arm_controller: str = "",
     worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
@@ -112,6 +113,8 @@ def record(
             scene.
 
         Options:
+        arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
+            ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
         worlds: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.

@@ -89,6 +89,8 @@ class TaskVectorEnv(VectorEnv):
         """Columns of an action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
         low[low <= -_mujoco.MAXVAL], high[high >= _mujoco.MAXVAL] = -np.inf, np.inf  # no limit
+        if action_space not in ("commands", "normalised"):
+            raise ValueError(f"action_space must be 'commands' or 'normalised', not {action_space!r}")
         self._command_range = _command_range(self.action_groups, low, high) if action_space == "normalised" else None
         if self._command_range is not None:
             low, high = np.full_like(low, -1), np.full_like(high, 1)
@@ -307,6 +309,7 @@ def make_vec(
     observations: Sequence[str] | None = None,
     sensors: Iterable[Any] = (),
     # options of a recording
+    arm_controller: str = "",
     num_envs: int = 1,
     threads: int = 0,
     seed: Seed = 0,
@@ -342,6 +345,8 @@ def make_vec(
             a sensor fails in a world, that world's episode is ``truncated`` and ``info["fault"]`` contains the reason.
 
         Options:
+        arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
+            ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
         num_envs: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.

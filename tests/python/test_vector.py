@@ -214,3 +214,35 @@ def test_top_down_planner_grasps_from_above():
     w, x, y, z = env.rows["grasp_pose"][:, 3:].T
     np.testing.assert_allclose(w * w - x * x - y * y + z * z, -1, atol=1e-3)
     env.close()
+
+
+def test_normalised_actions_move_the_tool():
+    """An action of 1 is the largest displacement, 5 cm; the same commands in their units give the same states."""
+    with_range = make(arm_controller="ee_delta_pose", action_space="normalised")
+    assert (with_range.single_action_space.low == -1).all() and with_range.single_action_space.shape == (7,)
+    before = with_range.reset(seed=3)[0]["tcp_pose"]
+    up = np.tile([0, 0, 1, 0, 0, 0, -1], (3, 1))
+    still = np.tile([0, 0, 0, 0, 0, 0, -1], (3, 1))
+    with_range.step(up)
+    for _ in range(15):
+        after = with_range.step(still)[0]["tcp_pose"]
+    np.testing.assert_allclose(after[:, :3] - before[:, :3], np.tile([0, 0, 0.05], (3, 1)), atol=0.002)
+    in_metres = make(arm_controller="ee_delta_pose")
+    in_metres.reset(seed=3)
+    in_metres.step(up * [0, 0, 0.05, 0, 0, 0, 0])
+    for _ in range(15):
+        same = in_metres.step(still * [0, 0, 0, 0, 0, 0, 0])[0]["tcp_pose"]
+    np.testing.assert_array_equal(same, after)
+    with_range.close()
+    in_metres.close()
+
+
+def test_errors_of_action_spaces():
+    with pytest.raises(ValueError, match="move group 'arm' have no range"):
+        make(arm_controller="ee_pose", action_space="normalised")
+    with pytest.raises(ValueError, match="must be 'commands' or 'normalised', not 'unit'"):
+        make(action_space="unit")
+    with pytest.raises(ValueError, match="did you mean 'ee_delta_pose'"):
+        make(arm_controller="ee_delta_pse")
+    with pytest.raises(ValueError, match="commands joint positions; the controller of move group 'arm'"):
+        make(arm_controller="joint_position_relative", policy="planner")

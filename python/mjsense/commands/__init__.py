@@ -11,6 +11,7 @@ import argparse
 import importlib
 import shutil
 import sys
+import textwrap
 from types import ModuleType
 
 COMMANDS = {
@@ -23,9 +24,13 @@ WRONG_INPUT = 2
 _INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 
+def _width() -> int:
+    return min(shutil.get_terminal_size().columns, 100)
+
+
 class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
     def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=26, width=min(shutil.get_terminal_size().columns, 100))
+        super().__init__(prog, max_help_position=26, width=_width())
 
 
 class _Parser(argparse.ArgumentParser):
@@ -42,7 +47,11 @@ def parser_of(name: str) -> argparse.ArgumentParser:
     module = _module(name)
     examples = "\n".join(f"  # {why}\n  {command}" for command, why in module.EXAMPLES)
     parser = _Parser(
-        prog=f"mjsense {name}", description=COMMANDS[name], epilog=f"Examples:\n{examples}", formatter_class=_HelpFormatter, allow_abbrev=False
+        prog=f"mjsense {name}",
+        description=textwrap.fill(COMMANDS[name], _width()),
+        epilog=f"Examples:\n{examples}",
+        formatter_class=_HelpFormatter,
+        allow_abbrev=False,
     )
     module.add_arguments(parser)
     return parser
