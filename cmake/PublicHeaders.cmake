@@ -8,25 +8,25 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/cameras/frozen_cameras.h
   mjsense/cameras/load_cameras.h
   mjsense/core/array.h
-  mjsense/core/fields/config_checks.h
-  mjsense/core/system/cpu.h
-  mjsense/core/fields/data_class.h
   mjsense/core/debug_shapes.h
   mjsense/core/error.h
+  mjsense/core/fields/config_checks.h
+  mjsense/core/fields/data_class.h
   mjsense/core/fields/field_traits.h
   mjsense/core/fields/fields.h
-  mjsense/core/text/json.h
   mjsense/core/fields/named_enum.h
   mjsense/core/fields/path_field.h
+  mjsense/core/fields/sensor_fields.h
   mjsense/core/pose.h
   mjsense/core/rng.h
   mjsense/core/row_error.h
   mjsense/core/sensor.h
-  mjsense/core/fields/sensor_fields.h
   mjsense/core/sensor_spec.h
-  mjsense/core/text/sentence.h
   mjsense/core/shared_cache.h
+  mjsense/core/system/cpu.h
   mjsense/core/system/thread_pool.h
+  mjsense/core/text/json.h
+  mjsense/core/text/sentence.h
   mjsense/effects/all_effects.h
   mjsense/effects/calibration.h
   mjsense/effects/chain.h
