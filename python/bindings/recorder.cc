@@ -131,7 +131,7 @@ class PyRecorder {
   }
   // A camera with rgb or depth becomes videos plus its other fields, as in recordings of tasks.
   void add(const std::shared_ptr<Sensor>& sensor) {
-    sources_.push_back(sensor);
+    if (!dynamic_cast<const WrittenRows*>(sensor.get())) sources_.push_back(sensor);
     const auto has = [&](std::string_view field) {
       return std::ranges::find(sensor->fields(), field, &Field::name) != sensor->fields().end();
     };
