@@ -184,7 +184,8 @@ std::uintptr_t make_model(nb::dict sizes) {
   mjModel fields{};
   mj_defaultOption(&fields.opt);
   mj_defaultVisual(&fields.vis);
-#define X(name) fields.name = nb::cast<decltype(fields.name)>(sizes[#name]);
+#define X(name) \
+  if (sizes.contains(#name)) fields.name = nb::cast<decltype(fields.name)>(sizes[#name]);
   MJMODEL_SIZES
 #undef X
   const mjModel* m = &fields;
@@ -283,7 +284,7 @@ void bind_mujoco_views(nb::module_& m) {
   m.def("model_fields", &model_fields, nb::arg("model"),
         "Fields of an mjModel: name -> (address, data type, shape).");
   m.def("make_model", &make_model, nb::arg("sizes"),
-        "Address of a new mjModel of these sizes, which the caller owns: arrays are 0.");
+        "Address of a new mjModel, which the caller owns. Other sizes and all arrays are 0.");
   m.def("data_fields", &data_fields, nb::arg("model"), nb::arg("data"),
         "Fields of an mjData that stay where they are.");
   m.def("arena_fields", &arena_fields, nb::arg("model"), nb::arg("data"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _foreign_model, _libmujoco, _mujoco
+from mjsense import _foreign_model
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.configs import SceneCfg
 from mjsense.errors import UnknownNameError
@@ -55,7 +55,7 @@ class Attached(KnownAttributes):
         self._mujoco: Any = _foreign_model.package_of(model)
         self._same_series = _foreign_model.is_our_series(self._mujoco)
         copy = None if self._same_series else _foreign_model.copy_of(model)
-        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), model._address if copy is None else copy.address)
+        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), (model if copy is None else copy)._address)
         self._sim = Simulation(scene, len(self.datas), decimation, threads, seed)
         state = self._sim.state
         self._columns: dict[str, slice] = {}
@@ -189,14 +189,15 @@ class Attached(KnownAttributes):
                 and other options, and the structure of the model.
         """
         sim, base = self._sim, self._sim.model
+        model = self.model if self._same_series else _foreign_model.copy_of(self.model)
         changed: dict[str, np.ndarray] = {}
-        for name, now in _foreign_model.arrays_of(self.model, base).items():
-            shown = self._edited.get(name, getattr(base, name)[: len(now)])
+        for name, now in _foreign_model.arrays_of(model, base).items():
+            shown = self._edited[name] if name in self._edited else getattr(base, name)[: len(now)]
             if now.shape != shown.shape:
                 raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown.shape}: attach again")
             if not np.array_equal(now, shown, equal_nan=now.dtype.kind == "f"):
                 changed[name] = np.array(now)
-        options = _foreign_model.changed_options(self.model, base)
+        options = _foreign_model.changed_options(model, base)
         try:
             for name in changed:
                 sim._check_randomizable(name)

@@ -189,7 +189,7 @@ class EpisodeRecording:
 
     def _rate(self, fps: float | None) -> Fraction:
         if fps is None:
-            fps = self._env.metadata.get("render_fps") or 30
+            fps = float(self._env.metadata.get("render_fps") or 30)
             inner = getattr(self._env.unwrapped, "envs", [self._env])[0].unwrapped
             with contextlib.suppress(AttributeError, TypeError, ZeroDivisionError):
                 fps = 1 / float(inner.dt)
@@ -254,7 +254,8 @@ class EpisodeRecording:
         frames = self._env.render() if "render" in self._cameras.values() else None
         images = {w: self._images(w, frames) for w in steps}
         if self._core is None:
-            self._open(next(iter(images.values())))
+            self._core = self._open(next(iter(images.values())))
+            self.complete = self._core.enough
         for world, seed in begun.items():
             self._ended.discard(world)
             self._leave(world, "the environment was reset")
@@ -291,7 +292,7 @@ class EpisodeRecording:
             images[name] = image
         return images
 
-    def _open(self, images: Mapping[str, np.ndarray]) -> None:
+    def _open(self, images: Mapping[str, np.ndarray]) -> Any:
         handles = []
 
         def add(name: str, dtype: str, shape: Sequence[int], description: str, **more: Any) -> None:
@@ -313,11 +314,10 @@ class EpisodeRecording:
             if isinstance(sensor, Sensor) and not sensor._mjs_fields:
                 raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
             handles.append(sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle)
-        self._core = _core.Recorder(
+        return _core.Recorder(
             None if attached is None else attached.simulation._core, self._worlds, handles, str(self.path.parent), self._fps.numerator,
             self._fps.denominator, json.dumps(self._settings, sort_keys=True), {**self._options},
         )  # fmt: skip
-        self.complete = self._core.enough
 
     def _write(self, world: int, step: _Step, images: Mapping[str, np.ndarray]) -> None:
         for name, values in (("observation", step.observation), ("actions/action", step.action)):

@@ -247,7 +247,7 @@ class Marker(mjs.Sensor):
 
 def test_errors():
     model, (data,) = started(1)
-    with pytest.raises(TypeError, match="model must be a mujoco.MjModel, not 3"):
+    with pytest.raises(TypeError, match=r"model must be a mujoco.MjModel, not 3"):
         mjs.attach(3, data)
     with pytest.raises(TypeError, match=r"data\[1\] must be a mujoco.MjData, not None"):
         mjs.attach(model, [data, None])
@@ -262,9 +262,9 @@ def test_errors():
         mjs.attach(model, data, (mjs.CameraSensorCfg(name="a", camera_name="fornt"),))
     with pytest.raises(ValueError, match="sensor 'gyro': already exists"):
         mjs.attach(model, data, (mjs.BuiltinSensorCfg(name="gyro", sensor_type="gyro", obj=mjs.ObjRef("site", "imu")),))
-    with pytest.raises(ValueError, match="the model has no site 'mark', which a sensor needs: add <site name=\"mark\".*/> to the model's XML"):
+    with pytest.raises(ValueError, match=r"the model has no site 'mark', which a sensor needs: add <site name=.mark..*/> to the model's XML"):
         mjs.attach(model, data, (Marker(pos=[0, 0, 1]),))
-    with pytest.raises(ValueError, match='the model has no sensor \'slow\', which a sensor needs: add <clock name="slow".*/> to the model\'s XML, in <sensor>'):
+    with pytest.raises(ValueError, match=r'the model has no sensor \'slow\', which a sensor needs: add <clock name="slow".*/> to the model\'s XML, in <sensor>'):
         mjs.attach(model, data, (Marker(interval=[0.1, 0]),))
     attached = mjs.attach(model, data, (Speed(),))
     with pytest.raises(mjs.UnknownNameError, match="no sensor named 'sped' is attached; did you mean 'speed'"):

@@ -23,7 +23,7 @@ spaces = gymnasium.spaces
 class Counter(gymnasium.Env):
     """Counts its steps; episodes have `length` steps, and those of odd seeds are truncated. It is no MuJoCo environment."""
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
     def __init__(self, length=4, render_mode="rgb_array"):
         self.length, self.render_mode, self.episode = length, render_mode, -1
@@ -160,7 +160,7 @@ def test_episodes_that_are_cut_short(tmp_path):
 class Pendulum(gymnasium.Env):
     """A MuJoCo environment."""
 
-    metadata = {"render_modes": []}  # noqa: RUF012
+    metadata = {"render_modes": []}
     frame_skip, dt = 5, 0.01
 
     def __init__(self):
@@ -259,19 +259,19 @@ def test_errors(tmp_path):
         mjs.RecordEpisodes(Counter(), tmp_path, 1, quality=3)
     with pytest.raises(ValueError, match="episodes is 0: must be at least 1"):
         mjs.RecordEpisodes(Counter(), tmp_path, 0)
-    with pytest.raises(ValueError, match="do not see the last state of an episode with AutoresetMode.SAME_STEP"):
+    with pytest.raises(ValueError, match=r"do not see the last state of an episode with AutoresetMode.SAME_STEP"):
         mjs.RecordEpisodes(SyncVectorEnv([Counter], autoreset_mode=AutoresetMode.SAME_STEP), tmp_path, 1, cameras={"view": "render"})
     with pytest.raises(ValueError, match="render_mode='rgb_array'"):
         env = Counter()
         env.render = lambda: None
         mjs.RecordEpisodes(env, tmp_path, 1, cameras={"view": "render"}).reset()
     env = AsyncVectorEnv([Pendulum])
-    with pytest.raises(TypeError, match="are in other processes.*house=0, 1, 2"):
+    with pytest.raises(TypeError, match=r"are in other processes.*house=0, 1, 2"):
         mjs.RecordEpisodes(env, tmp_path, 1, cameras=["side"])
     env.close()
     env = Counter()
     env.observation_space = spaces.Text(5)
-    with pytest.raises(TypeError, match="observation: .*Text.*FilterObservation"):
+    with pytest.raises(TypeError, match=r"observation: .*Text.*FilterObservation"):
         mjs.RecordEpisodes(env, tmp_path, 1)
     env = Pendulum()
     wrapped = mjs.RecordEpisodes(env, tmp_path, 1, cameras=["side"])
