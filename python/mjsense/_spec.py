@@ -22,7 +22,7 @@ _LISTS = {
     "hfields": Obj.HFIELD, "textures": Obj.TEXTURE, "materials": Obj.MATERIAL,
 }  # fmt: skip
 _IN_BODIES = (Obj.BODY, Obj.GEOM, Obj.JOINT, Obj.SITE, Obj.CAMERA, Obj.LIGHT)
-_RENUMBERED = {"mjEQ_DISTANCE": 7, "mjDYN_USER": 7, "mjGAIN_USER": 6, "mjBIAS_USER": 5}
+RENUMBERED = {"mjEQ_DISTANCE": 7, "mjDYN_USER": 7, "mjGAIN_USER": 6, "mjBIAS_USER": 5}
 """Enumerators of mjSpec that had other values in an earlier version."""
 
 
@@ -59,7 +59,7 @@ class _Fields:
             return
         target = array_of(self._owner, address, kind, shape)
         if shape == ():
-            target[...] = _RENUMBERED.get(getattr(value, "name", ""), value)
+            target[...] = RENUMBERED.get(getattr(value, "name", ""), value)
             return
         value = np.atleast_1d(np.asarray(value))
         if value.ndim > 1 or len(value) > len(target):

@@ -64,3 +64,11 @@ def test_everything_works_and_equals_what_is_computed_here(version, order, here,
     found = run(environment(version), order, tmp_path / "out")
     if not version.startswith("4."):  # which is used itself, and need not compute the same
         assert found == here
+
+
+@pytest.mark.parametrize("version", [v for v in VERSIONS if v != "none" and "+" not in v])
+def test_attached_sensors_measure_what_that_mujoco_computes(version):
+    path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    run = [environment(version), "-W", "ignore", Path(__file__).with_name("attach_other_mujoco.py")]
+    done = subprocess.run(run, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stdout + done.stderr[-3000:]

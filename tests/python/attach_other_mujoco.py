@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""mjsense.attach with any MuJoCo: measurements are those of its own functions, within the bounds of docs/attach.md. Prints the deviations.
+
+Run by test_other_mujocos.py.
+"""
+
+import mujoco
+import numpy as np
+
+import mjsense as mjs
+
+MODEL = """
+<mujoco>
+  <option timestep="0.004"/>
+  <asset>
+    <texture name="checker" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="16" height="16"/>
+    <material name="checker" texture="checker"/>
+    <mesh name="rock" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2 .1 .1 .15"/>
+    <hfield name="hill" nrow="4" ncol="4" size="1 1 .2 .1"/>
+  </asset>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom name="floor" type="plane" size="5 5 .1" material="checker"/>
+    <geom type="hfield" hfield="hill" pos="3 3 0"/>
+    <camera name="front" pos="0 -2 1" xyaxes="1 0 0 0 .5 1"/>
+    <body name="box" pos="0 0 .3" gravcomp=".1"><freejoint/><geom type="box" size=".1 .1 .1" rgba="1 0 0 1"/><site name="imu"/></body>
+    <body name="rock" pos="1 0 .4"><freejoint/><geom name="rock" type="mesh" mesh="rock"/></body>
+    <body name="target" mocap="true" pos="1 1 1"><geom size=".05" contype="0" conaffinity="0"/></body>
+    <body name="arm" pos=".5 1 .5">
+      <joint name="shoulder" axis="0 1 0"/><geom name="upper" type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>
+      <body pos=".3 0 0">
+        <joint name="wrist" type="ball"/><geom type="capsule" fromto="0 0 0 .2 0 0" size=".03"/><site name="tip" pos=".2 0 0"/>
+        <body pos=".2 0 0"><joint name="slide" type="slide" axis="1 0 0" range="-.1 .1"/><geom name="ball" size=".04"/></body>
+      </body>
+    </body>
+  </worldbody>
+  <equality><weld body1="box" body2="target" active="false"/><joint joint1="shoulder" joint2="slide"/></equality>
+  <contact><exclude body1="box" body2="arm"/></contact>
+  <tendon>
+    <fixed name="fixed"><joint joint="shoulder" coef="1"/><joint joint="slide" coef="2"/></fixed>
+    <spatial name="spatial" range="0 2"><site site="imu"/><geom geom="ball"/><site site="tip"/></spatial>
+  </tendon>
+  <actuator>
+    <motor joint="shoulder" ctrlrange="-1 1"/><position tendon="fixed" kp="1"/>
+    <general joint="slide" dyntype="filter" dynprm=".1" biastype="affine" biasprm="0 -1 0"/>
+  </actuator>
+  <sensor>
+    <framepos name="pos" objtype="site" objname="tip"/><framequat name="quat" objtype="body" objname="rock"/><jointpos name="angle" joint="shoulder"/>
+    <tendonpos name="length" tendon="spatial"/><rangefinder name="range" site="tip"/><subtreecom name="com" body="arm"/>
+    <gyro name="gyro" site="imu"/><velocimeter name="speed" site="tip"/><tendonvel name="rate" tendon="spatial"/>
+    <accelerometer name="acc" site="imu"/><force name="force" site="tip"/><torque name="torque" site="tip"/><touch name="touch" site="imu"/>
+    <actuatorfrc name="push" actuator="ACTUATOR"/><framelinacc name="a" objtype="body" objname="rock"/>
+  </sensor>
+</mujoco>""".replace('<motor joint="shoulder"', '<motor name="motor" joint="shoulder"').replace("ACTUATOR", "motor")
+
+model = mujoco.MjModel.from_xml_string(MODEL)
+datas = [mujoco.MjData(model) for _ in range(2)]
+for world, data in enumerate(datas):
+    data.qvel[:3], data.ctrl[:] = [0.1, 0.2 * world, 0], 0.3
+sensors = (
+    mjs.ImuSensorCfg(name="imu", site=mjs.ObjRef("site", "imu")),
+    mjs.CameraSensorCfg(name="front", camera_name="front", width=32, height=24, data_types=("rgb", "segmentation")),
+    mjs.CameraSensorCfg(name="mounted", parent_body="box", pos=(0, 0, 0.2), width=16, height=12, data_types=("depth",)),
+    mjs.ContactSensorCfg(name="feet", primary=mjs.ContactMatch(mode="geom", pattern=("rock", "geom_2")), fields=("found",), track_air_time=True),
+    mjs.TerrainHeightSensorCfg(name="height", frame=mjs.ObjRef("site", "tip")),
+)
+attached = mjs.attach(model, datas, sensors)
+own = mujoco.MjData(model)
+names = [model.sensor(i).name for i in range(model.nsensor)]
+worst = dict.fromkeys(names, 0.0)
+air, contacts = np.zeros(2), 0
+for step in range(200):
+    for data in datas:
+        mujoco.mj_step(model, data)
+    attached.update()
+    for world, data in enumerate(datas):
+        for field in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart"):
+            getattr(own, field)[:] = getattr(data, field)
+        own.time = data.time
+        mujoco.mj_forward(model, own)
+        for name in names:
+            expected, found = own.sensor(name).data, attached[name].data[world]
+            worst[name] = max(worst[name], float(np.max(np.abs(found - expected)) / max(1.0, np.max(np.abs(expected)))))
+        touched = any({model.geom("rock").id} & {c.geom1, c.geom2} for c in own.contact)
+        contacts += touched
+        air[world] = 0 if touched else air[world] + model.opt.timestep
+        assert bool(attached["feet"].data.found[world, 0]) == touched
+        assert abs(attached["feet"].data.current_air_time[world, 0] - air[world]) < 1e-6
+assert 20 < contacts < 380
+position = max(worst[n] for n in ("pos", "quat", "angle", "length", "range", "com"))
+velocity = max(worst[n] for n in ("gyro", "speed", "rate"))
+force = max(worst[n] for n in ("acc", "force", "torque", "touch", "push", "a"))
+print(f"MuJoCo {mujoco.mj_versionString()}: positions {position:.1e}, velocities {velocity:.1e}, accelerations and forces {force:.1e}")
+assert position < 1e-6 and velocity < 1e-6 and force < 1e-3, worst
+assert attached["front"].data.rgb.std() > 10 and np.isfinite(attached["mounted"].data.depth).all()
+assert np.allclose(attached["imu"].data.gyro, attached["gyro"].data)
+before = attached["front"].data.rgb.copy()
+model.geom_rgba[2] = [0, 1, 0, 1]
+attached.reload()
+assert not np.array_equal(before, attached["front"].data.rgb)
+attached.close()
