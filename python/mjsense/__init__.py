@@ -21,7 +21,8 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
-    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
+    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay; for other programs:
+                                 export_lerobot, export_lerobot21
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -63,6 +64,7 @@ from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
+from mjsense.export import export_lerobot, export_lerobot21
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
@@ -89,15 +91,13 @@ __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "EpisodeRecording", "FunctionSensor",
-    "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
-    "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
-    "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes", "Recorder", "Renderer", "ReplayReport",
-    "Robot",
-    "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
-    "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
-    "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names",
-    "record", "register_policy", "register_task", "replay",
-    "robot_names", "task_names",
+    "EpisodeCheck", "EpisodeRecording", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
+    "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
+    "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
+    "Recorder", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData",
+    "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor",
+    "TerrainHeightSensor", "UnknownNameError", "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models",
+    "export_lerobot", "export_lerobot21", "make", "make_vec", "observations", "policy_names", "record", "register_policy",
+    "register_task", "replay", "robot_names", "task_names",
     "__version__",
 ]

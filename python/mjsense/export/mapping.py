@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which streams of a recording become which features of an exported data set."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from collections.abc import Mapping as Table
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjsense._arguments import checked
+from mjsense.dataset import Dataset, Episode, Stream, Video
+from mjsense.dataset.episode import LARGE_ROW, VIDEOS, given_name
+from mjsense.errors import UnknownNameError
+
+_OF_STEPS = ("actions/", "rewards", "success", "fail", "terminated", "truncated")
+"""Row t of these streams belongs to the step that led to observation t."""
+_FLAGS = {"reward": ("rewards",), "success": ("success",), "terminated": ("terminated",), "truncated": ("truncated",)}
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """Streams of a recording by feature. A name stands for a stream or for a group of streams, in the order of their names; the
+    numbers of all streams of a feature are concatenated."""
+
+    state: tuple[str, ...] = ("obs/agent/qpos",)
+    """Streams of the robot's state."""
+    action: tuple[str, ...] = ("actions/joint_pos",)
+    """Streams of the action."""
+    cameras: dict[str, str] | None = None
+    """Cameras by exported name; None: all colour cameras with their own names."""
+    features: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """Streams of other features by exported name."""
+
+    @staticmethod
+    def of(source: Mapping | str | Path | Table[str, Any] | None) -> Mapping:
+        """The mapping that a TOML file or a dict of the same form describes; None: the default mapping.
+
+        Raises:
+            ValueError: An unknown key, or a value of the wrong type.
+        """
+        if isinstance(source, Mapping):
+            return source
+        if source is None:
+            return Mapping()
+        if isinstance(source, (str, Path)):
+            try:
+                table, about = tomllib.loads(Path(source).read_text()), str(source)
+            except tomllib.TOMLDecodeError as error:
+                raise ValueError(f"{source}: {error}") from error
+        else:
+            table, about = dict(source), "map"
+        known = ("state", "action", "cameras", "features")
+        if unknown := [key for key in table if key not in known]:
+            raise ValueError(f"{about}: unknown key '{unknown[0]}'; the keys are {', '.join(known)}")
+        for key in ("cameras", "features"):
+            if not isinstance(table.get(key, {}), Table):
+                raise ValueError(f"{about}: '{key}' must be a table of names")
+
+        def streams(key: str, value: Any) -> tuple[str, ...]:
+            names = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, (list, tuple)) else ()
+            if not names or not all(isinstance(name, str) for name in names):
+                raise ValueError(f"{about}: '{key}' must be the name of a stream or a list of names")
+            return names
+
+        made: dict[str, Any] = {key: streams(key, table[key]) for key in ("state", "action") if key in table}
+        if "cameras" in table:
+            made["cameras"] = {name: streams(f"cameras.{name}", camera)[0] for name, camera in table["cameras"].items()}
+        made["features"] = {name: streams(f"features.{name}", value) for name, value in table.get("features", {}).items()}
+        if taken := [name for name in made["features"] if name in (*known[:2], *_FLAGS)]:
+            raise ValueError(f"{about}: the feature name '{taken[0]}' is taken; choose another")
+        return Mapping(**made)
+
+
+@dataclass(frozen=True)
+class Feature:
+    """Numbers of one step of an exported data set: a vector of the numbers of one or several streams."""
+
+    name: str
+    dtype: np.dtype[Any]
+    names: tuple[str, ...]
+    """Name of each number: ``arm_0``, ``arm_1``, ``gripper_0``."""
+    parts: dict[str, slice]
+    """Position of each stream's numbers by its short name: ``{"arm": slice(0, 7), "gripper": slice(7, 9)}``."""
+    streams: tuple[str, ...]
+    """Names of the streams in the recording."""
+    of_step: bool
+    """True: an action, a reward or another result of a step, with one row less than the observations."""
+
+    @property
+    def size(self) -> int:
+        """Number of numbers."""
+        return len(self.names)
+
+
+@checked
+class Source:
+    """A recording as exports read it: chosen episodes, features, and cameras.
+
+    Args:
+        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
+        map: A :class:`Mapping`, a TOML file, or a dict of the same form; by default :class:`Mapping`'s defaults.
+        episodes: Positions of episodes in the recording; by default all.
+        success: Only successful (True) or only failed (False) episodes.
+    """
+
+    def __init__(
+        self,
+        root: str | Path,
+        *,
+        map: Mapping | str | Path | dict[str, Any] | None = None,
+        episodes: Iterable[int] | None = None,
+        success: bool | None = None,
+    ) -> None:
+        mapping = Mapping.of(map)
+        chosen = Dataset(root, episodes=episodes, success=success)
+        self._chosen = chosen
+        self.episodes: list[Episode] = [episode for episode in chosen.episodes if episode.length > 1]
+        """The episodes that have at least one step."""
+        if not self.episodes:
+            raise ValueError(f"{root}: no episode with a step matches")
+        self.fps: Fraction = chosen.fps
+        """Observations per second, exactly."""
+        self.robot: str = str(self.episodes[0].settings.get("robot", ""))
+        """Name of the robot; empty if the recording does not state it."""
+        known = dict(chosen.streams)
+        wanted = {"state": mapping.state, "action": mapping.action, **mapping.features, **_FLAGS}
+        self.features: dict[str, Feature] = {name: self._feature(name, streams, known) for name, streams in wanted.items()}
+        """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features."""
+        self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
+        """The distinct instructions, in the order of their first episode."""
+        colour = [name[len(VIDEOS) :] for name, stream in chosen.streams.items() if stream.kind == "video" and len(stream.shape) == 3]
+        self.cameras: dict[str, str] = {camera: camera for camera in colour} if mapping.cameras is None else dict(mapping.cameras)
+        """Names of cameras in the recording by exported name."""
+        for camera in self.cameras.values():
+            shapes = {episode.video(camera).shape[1:]: episode.index for episode in self.episodes}
+            if len(shapes) > 1:
+                sizes = ", ".join(f"{w}x{h} (episode {i})" for (h, w, *_), i in shapes.items())
+                raise ValueError(f"{root}: the images of '{camera}' have different sizes: {sizes}; choose episodes of one size")
+
+    def __len__(self) -> int:
+        return len(self.episodes)
+
+    def rows(self, episode: Episode) -> dict[str, np.ndarray]:
+        """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
+        that was taken at observation t.
+
+        A move group without an action keeps its last one; before its first action it has its measured position, or 0 if that has
+        another size.
+        """
+        names = {stream for feature in self.features.values() for stream in feature.streams}
+        names |= {mask for name in names if (mask := given_name(name))} | {_measured(name) for name in names}
+        loaded = episode._load(sorted(names))
+        return {feature.name: self._rows(episode, feature, loaded) for feature in self.features.values()}
+
+    def video(self, episode: Episode, camera: str) -> Video:
+        """Frames of a camera by its exported name."""
+        return episode.video(self.cameras[camera])
+
+    def _feature(self, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
+        try:
+            expanded = self._chosen._expand_all(streams, known)
+        except UnknownNameError as error:
+            raise UnknownNameError(f"Feature '{name}': {error.args[0]}. A map (map=, --map) chooses other streams") from error
+        found = list(dict.fromkeys(stream for stream in expanded if "/given/" not in stream))
+        names: list[str] = []
+        parts: dict[str, slice] = {}
+        for stream in found:
+            about = known[stream]
+            if about.kind == "video" or about.dtype == object or about.dtype.itemsize * int(np.prod(about.shape)) >= LARGE_ROW:
+                raise ValueError(f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than {LARGE_ROW} bytes per row")
+            short = stream if "/" not in stream else stream.rsplit("/", 1)[1]
+            short = short if short not in parts else stream
+            size = int(np.prod(about.shape))
+            parts[short] = slice(len(names), len(names) + size)
+            names += [f"{short}_{i}" for i in range(size)] if about.shape else [short]
+        of_step = {stream.startswith(_OF_STEPS) for stream in found}
+        if len(of_step) != 1:
+            raise ValueError(f"The feature '{name}' mixes observations and results of steps: {', '.join(found)}")
+        return Feature(name, np.result_type(*(known[s].dtype for s in found)), tuple(names), parts, tuple(found), of_step.pop())
+
+    def _rows(self, episode: Episode, feature: Feature, loaded: dict[str, np.ndarray]) -> np.ndarray:
+        columns = []
+        for stream, part in zip(feature.streams, feature.parts.values()):
+            size = part.stop - part.start
+            values = loaded.get(stream)
+            mask = given_name(stream)
+            if values is None and mask is None:
+                raise UnknownNameError(f"Episode {episode.index} ({episode.path.name}) has no stream '{stream}', which the feature '{feature.name}' needs")
+            if mask is not None:
+                values = _held(values, loaded.get(mask), loaded.get(_measured(stream)), episode.length, size)
+            assert values is not None
+            columns.append(values.reshape(episode.length, size))
+        rows = np.concatenate(columns, 1).astype(feature.dtype, copy=False)
+        return rows[1:] if feature.of_step else rows
+
+
+def _measured(stream: str) -> str:
+    """The measured positions of the move group of an action."""
+    return f"obs/agent/qpos/{stream.rsplit('/', 1)[-1]}"
+
+
+def _held(values: np.ndarray | None, given: np.ndarray | None, measured: np.ndarray | None, length: int, size: int) -> np.ndarray:
+    """Actions in which rows without an action have the action before them."""
+    if measured is None or measured.size != length * size:
+        measured = np.zeros((length, size))
+    if values is None or given is None:
+        return measured
+    values = values.reshape(length, size)
+    last = np.maximum.accumulate(np.where(given, np.arange(length), -1))
+    return np.where((last >= 0)[:, None], values[last], measured)

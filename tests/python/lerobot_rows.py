@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a data set with LeRobot and compares every row and frame with what was exported. Run by test_lerobot.py in LeRobot's environment.
+
+    python lerobot_rows.py DATA_SET EXPECTED.npz STEP
+
+The episodes of EXPECTED.npz repeat in the data set. Of all rows but the last 1000, every STEP-th is read.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+try:
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+except ImportError:
+    from lerobot.datasets import LeRobotDataset
+
+root, expected, step = Path(sys.argv[1]), dict(np.load(sys.argv[2])), int(sys.argv[3])
+tasks = json.loads(str(expected.pop("tasks")))
+dataset = LeRobotDataset("local/data", root=root)
+read = [i for i in range(len(dataset)) if i % step == 0 or i >= len(dataset) - 1000]
+wrong = 0
+for i in read:
+    item, at = dataset[i], i % len(tasks)
+    right = item["task"] == tasks[at]
+    for name, values in expected.items():
+        value = item[name].numpy()
+        if name.startswith("observation.images."):
+            value = np.rint(value * 255).astype(np.uint8).transpose(1, 2, 0)
+        right = right and np.array_equal(value, values[at])
+    wrong += not right
+print(json.dumps({"rows": len(dataset), "read": len(read), "wrong": wrong, "stats": sorted(dataset.meta.stats["action"])}))
