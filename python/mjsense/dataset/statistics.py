@@ -25,14 +25,24 @@ def of_rows(rows: np.ndarray) -> dict[str, np.ndarray]:
     return result
 
 
-def of_images(frames: Iterable[np.ndarray]) -> dict[str, np.ndarray]:
-    """Statistics of each channel of uint8 images ``[H, W, 3]``, as 0..1, shape (3, 1, 1). ``count`` is the number of images."""
+def histograms(frames: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
+    """Histograms int64 [3, 256] of the channels of uint8 images ``[H, W, 3]``, and the number of images."""
     counts = np.zeros((3, 256), np.int64)
     images = 0
     for frame in frames:
         images += 1
         for c in range(3):
             counts[c] += np.bincount(frame[..., c].ravel(), minlength=256)
+    return counts, images
+
+
+def of_images(frames: Iterable[np.ndarray]) -> dict[str, np.ndarray]:
+    """Statistics of each channel of uint8 images ``[H, W, 3]``, as 0..1, shape (3, 1, 1). ``count`` is the number of images."""
+    return of_histograms(*histograms(frames))
+
+
+def of_histograms(counts: np.ndarray, images: int) -> dict[str, np.ndarray]:
+    """The same of the result of :func:`histograms`, or of the sums of several."""
     levels = np.arange(256) / 255
     below = np.cumsum(counts, 1)
     total = below[:, -1]

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping as Table
+from collections.abc import Iterable
+from collections.abc import Mapping as Table
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mjsense._arguments import checked
-from mjsense.dataset import Dataset, Episode, Video
+from mjsense.dataset import Dataset, Episode, Stream, Video
 from mjsense.dataset.episode import LARGE_ROW, VIDEOS, given_name
 from mjsense.errors import UnknownNameError
 
@@ -127,9 +128,12 @@ class Source:
         """Observations per second, exactly."""
         self.robot: str = str(self.episodes[0].settings.get("robot", "")) if self.episodes else ""
         """Name of the robot; empty if the recording does not state it."""
+        known = dict(chosen.streams)
         wanted = {"state": mapping.state, "action": mapping.action, **mapping.features, **_FLAGS}
-        self.features: dict[str, Feature] = {name: self._feature(name, streams) for name, streams in wanted.items()}
+        self.features: dict[str, Feature] = {name: self._feature(name, streams, known) for name, streams in wanted.items()}
         """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features."""
+        self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
+        """The distinct instructions, in the order of their first episode."""
         colour = [name[len(VIDEOS) :] for name, stream in chosen.streams.items() if stream.kind == "video" and len(stream.shape) == 3]
         self.cameras: dict[str, str] = {camera: camera for camera in colour} if mapping.cameras is None else dict(mapping.cameras)
         """Names of cameras in the recording by exported name."""
@@ -140,11 +144,6 @@ class Source:
     def __len__(self) -> int:
         return len(self.episodes)
 
-    @property
-    def tasks(self) -> list[str]:
-        """The distinct instructions, in the order of their first episode."""
-        return list(dict.fromkeys(episode.task for episode in self.episodes))
-
     def rows(self, episode: Episode) -> dict[str, np.ndarray]:
         """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
         that was taken at observation t.
@@ -152,7 +151,6 @@ class Source:
         A move group without an action keeps its last one; before its first action it has its measured position, or 0 if that has
         another size.
         """
-        loaded: dict[str, np.ndarray] = {}
         names = {stream for feature in self.features.values() for stream in feature.streams}
         names |= {mask for name in names if (mask := given_name(name))} | {_measured(name) for name in names}
         loaded = episode._load(sorted(names))
@@ -162,11 +160,8 @@ class Source:
         """Frames of a camera by its exported name."""
         return episode.video(self.cameras[camera])
 
-    def _feature(self, name: str, streams: tuple[str, ...]) -> Feature:
-        known = Dataset(self._chosen.root, episodes=[e.index for e in self._chosen.episodes], streams=streams).streams
-        found: list[str] = []
-        for stream in streams:  # in the mapping's order, groups in the order of their streams
-            found += [n for n in known if (n == stream or n.startswith(f"{stream}/")) and "/given/" not in n and n not in found]
+    def _feature(self, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
+        found = list(dict.fromkeys(stream for stream in self._chosen._expand_all(streams, known) if "/given/" not in stream))
         names: list[str] = []
         parts: dict[str, slice] = {}
         for stream in found:

@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: Apache-2.0
+"""LeRobot v3.0: episodes concatenated in Parquet and MP4 files. The videos are copied, not encoded again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjsense._arguments import checked
+from mjsense.dataset import Episode, statistics
+from mjsense.export.frame_statistics import frame_histograms
+from mjsense.export.mapping import Feature, Mapping, Source
+from mjsense.export.output import needs, new_output
+from mjsense.export.remux import Concatenation
+
+FILES_PER_CHUNK = 1000
+DATA_FILE_MB, VIDEO_FILE_MB = 100, 200
+_TOLERANCE_S = 1e-4  # LeRobot's tolerance of times of frames
+_PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+
+
+@checked
+def export_lerobot(
+    root: str | Path,
+    out: str | Path,
+    *,
+    map: Mapping | str | Path | dict[str, Any] | None = None,
+    episodes: Iterable[int] | None = None,
+    success: bool | None = None,
+    statistics_frames: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
+
+    Args:
+        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
+        out: Folder of the data set, which must not exist.
+        map: Features and cameras: a :class:`mjsense.export.Mapping`, a TOML file, or a dict of the same form.
+        episodes: Positions of episodes in the recording; by default all.
+        success: Only successful (True) or only failed (False) episodes.
+        statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all.
+        progress: Called with the number of written episodes and of all episodes.
+
+    Returns:
+        ``out``.
+    """
+    source = Source(root, map=map, episodes=episodes, success=success)
+    with new_output(out) as path:
+        writer = Writer(source, path, statistics_frames)
+        for n, episode in enumerate(source.episodes, 1):
+            writer.add(episode)
+            if progress:
+                progress(n, len(source))
+        writer.close()
+    return Path(out)
+
+
+def key_of(feature: Feature) -> str:
+    """LeRobot's name of a feature. A name with a dot stays as it is."""
+    if feature.name == "action" or "." in feature.name:
+        return feature.name
+    return f"{'next' if feature.of_step else 'observation'}.{feature.name}"
+
+
+def image_key(camera: str) -> str:
+    return f"observation.images.{camera}"
+
+
+def exported(source: Source) -> list[Feature]:
+    """The features that become columns. LeRobot has ``next.done`` instead of ``terminated`` and ``truncated``."""
+    return [feature for name, feature in source.features.items() if name not in ("terminated", "truncated")]
+
+
+def features_of(source: Source, codec: dict[str, Any]) -> dict[str, Any]:
+    """The entry ``features`` of ``meta/info.json``."""
+    found: dict[str, Any] = {}
+    for feature in exported(source):
+        found[key_of(feature)] = {"dtype": _dtype(feature.dtype), "shape": [feature.size], "names": list(feature.names)}
+    found["next.done"] = {"dtype": "bool", "shape": [1], "names": ["done"]}
+    for camera in source.cameras:
+        height, width = _stored_size(source.video(source.episodes[0], camera).shape)
+        info = {"video.height": height, "video.width": width, "video.fps": number(source.fps), "video.channels": 3,
+                "has_audio": False, "is_depth_map": False, **codec}  # fmt: skip
+        found[image_key(camera)] = {"dtype": "video", "shape": [height, width, 3], "names": ["height", "width", "channels"], "info": info}
+    found["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
+    for name in ("frame_index", "episode_index", "index", "task_index"):
+        found[name] = {"dtype": "int64", "shape": [1], "names": None}
+    return found
+
+
+def columns_of(source: Source, episode: Episode, position: int, first_index: int) -> dict[str, np.ndarray]:
+    """Columns of an episode: ``[T - 1, size]``, and ``[T - 1]`` of single numbers. The last observation has no action and is left out."""
+    rows = source.rows(episode)
+    length = episode.length - 1
+    columns = {key_of(feature): rows[feature.name][:length].astype(_dtype(feature.dtype)) for feature in exported(source)}
+    columns["next.done"] = np.arange(length) == length - 1
+    columns["timestamp"] = times(length, source.fps).astype(np.float32)
+    columns["frame_index"] = np.arange(length)
+    columns["episode_index"] = np.full(length, position)
+    columns["index"] = first_index + np.arange(length)
+    columns["task_index"] = np.full(length, source.tasks.index(episode.task))
+    return {name: column[:, 0] if column.ndim == 2 and column.shape[1] == 1 else column for name, column in columns.items()}
+
+
+def table_of(columns: dict[str, np.ndarray]) -> Any:
+    """An Arrow table; vectors are lists of fixed size."""
+    pa = needs("pyarrow")
+    arrays = {}
+    for name, values in columns.items():
+        flat = pa.array(np.ascontiguousarray(values).reshape(-1))
+        arrays[name] = flat if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
+    return pa.table(arrays)
+
+
+def times(length: int, fps: Fraction) -> np.ndarray:
+    """Times of frames, exact to one bit of float64. [s]"""
+    return np.arange(length) * fps.denominator / fps.numerator
+
+
+def number(fps: Fraction) -> int | float:
+    return int(fps) if fps.denominator == 1 else float(fps)
+
+
+def lists(stats: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Statistics as JSON and Arrow take them."""
+    return {name: value.tolist() for name, value in stats.items()}
+
+
+def write_json(path: Path, value: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(value, indent=4, ensure_ascii=False))
+
+
+def codec_of(path: Path) -> dict[str, Any]:
+    with needs("av").open(str(path)) as video:
+        context = video.streams.video[0].codec_context
+        return {"video.codec": context.codec.canonical_name, "video.pix_fmt": context.pix_fmt}
+
+
+class Statistics:
+    """Statistics of all columns and cameras, of each episode and of all of them together."""
+
+    def __init__(self, source: Source, frames: int) -> None:
+        self._source, self._frames = source, frames
+        self._columns: dict[str, list[np.ndarray]] = {}
+        self._histograms: dict[str, tuple[np.ndarray, int]] = {}
+
+    def add(self, episode: Episode, columns: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
+        """The statistics of an episode."""
+        result = {}
+        for name, values in columns.items():
+            self._columns.setdefault(name, []).append(values)
+            result[name] = statistics.of_rows(values)
+        for camera in self._source.cameras:
+            counts, images = frame_histograms(self._source.video(episode, camera).path, episode.length - 1, self._frames)
+            before = self._histograms.get(camera, (0, 0))
+            self._histograms[camera] = before[0] + counts, before[1] + images
+            result[image_key(camera)] = statistics.of_histograms(counts, images)
+        return result
+
+    def all(self) -> dict[str, dict[str, np.ndarray]]:
+        result = {name: statistics.of_rows(np.concatenate(parts)) for name, parts in self._columns.items()}
+        return result | {image_key(camera): statistics.of_histograms(*found) for camera, found in self._histograms.items()}
+
+
+class _Tables:
+    """Parquet files of at most about 100 MB."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._tables: list[Any] = []
+        self._bytes = 0
+        self._file = 0
+
+    @property
+    def place(self) -> dict[str, int]:
+        """The file that the next table is written to."""
+        if self._bytes > DATA_FILE_MB * 1e6:
+            self.flush()
+        return _place(self._file)
+
+    def add(self, table: Any) -> None:
+        self._tables.append(table)
+        self._bytes += table.nbytes
+
+    def flush(self) -> None:
+        if self._tables:
+            path = self._folder / (_PLACE.format(**_place(self._file)) + ".parquet")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            needs("pyarrow.parquet").write_table(needs("pyarrow").concat_tables(self._tables), path)
+            self._tables, self._bytes = [], 0
+            self._file += 1
+
+
+class _Videos:
+    """MP4 files of one camera of at most about 200 MB."""
+
+    def __init__(self, folder: Path, fps: Fraction) -> None:
+        self._folder, self._fps = folder, fps
+        self._file = 0
+        self._video = self._new()
+
+    def add(self, path: Path, length: int) -> tuple[dict[str, int], float]:
+        """Appends a video. Returns its file and the time of its first frame there. Its first ``length`` frames are used."""
+        first = self._video.frames
+        full = first and self._video.bytes + path.stat().st_size > VIDEO_FILE_MB * 1e6
+        if full or not self._found_by_time(length) or not self._video.add(path):
+            self.close()
+            self._file += 1
+            self._video = self._new()
+            first = 0
+            self._video.add(path)
+        return _place(self._file), first / float(self._fps)
+
+    def close(self) -> None:
+        self._video.__exit__(None, None, None)
+
+    def _new(self) -> Concatenation:
+        return Concatenation(self._folder / (_PLACE.format(**_place(self._file)) + ".mp4"), self._fps)
+
+    def _found_by_time(self, length: int) -> bool:
+        """Whether LeRobot's reader finds every frame. It adds times of 32 bits to the time of the first frame and compares the sum, in 32 bits,
+        with the time of the frame: late in a long file, a sum that is rounded to the other side differs by more than the tolerance."""
+        exact = (self._video.frames + np.arange(length)) * self._fps.denominator / self._fps.numerator
+        added = exact[0] + times(length, self._fps).astype(np.float32).astype(np.float64)
+        return bool((np.abs(added.astype(np.float32) - exact.astype(np.float32)) < _TOLERANCE_S).all())
+
+
+def _place(file: int) -> dict[str, int]:
+    return {"chunk_index": file // FILES_PER_CHUNK, "file_index": file % FILES_PER_CHUNK}
+
+
+class Writer:
+    """A data set that is being written."""
+
+    def __init__(self, source: Source, path: Path, statistics_frames: int) -> None:
+        self._source, self._path = source, path
+        self._data, self._episodes = _Tables(path / "data"), _Tables(path / "meta/episodes")
+        self._videos = {camera: _Videos(path / "videos" / image_key(camera), source.fps) for camera in source.cameras}
+        self._statistics = Statistics(source, statistics_frames)
+        self._count = self._frames = 0
+        self._codec: dict[str, Any] = {}
+
+    def add(self, episode: Episode) -> None:
+        pa = needs("pyarrow")
+        columns = columns_of(self._source, episode, self._count, self._frames)
+        length = episode.length - 1
+        entry: dict[str, Any] = {"episode_index": self._count, "tasks": [episode.task], "length": length}
+        entry |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + length}
+        entry |= {f"data/{name}": value for name, value in self._data.place.items()}
+        self._data.add(table_of(columns))
+        for camera, videos in self._videos.items():
+            path = self._source.video(episode, camera).path
+            self._codec = self._codec or codec_of(path)
+            place, first = videos.add(path, length)
+            prefix = f"videos/{image_key(camera)}/"
+            entry |= {prefix + name: value for name, value in place.items()}
+            entry |= {prefix + "from_timestamp": first, prefix + "to_timestamp": first + length / float(self._source.fps)}
+        for name, found in self._statistics.add(episode, columns).items():
+            entry |= {f"stats/{name}/{key}": value for key, value in lists(found).items()}
+        entry |= {f"meta/episodes/{name}": value for name, value in self._episodes.place.items()}
+        self._episodes.add(pa.Table.from_pylist([entry]))
+        self._count += 1
+        self._frames += length
+
+    def close(self) -> None:
+        self._data.flush()
+        self._episodes.flush()
+        for videos in self._videos.values():
+            videos.close()
+        _write_tasks(self._path / "meta/tasks.parquet", self._source.tasks)
+        write_json(self._path / "meta/stats.json", {name: lists(found) for name, found in self._statistics.all().items()})
+        info = {
+            "codebase_version": "v3.0", "robot_type": self._source.robot, "total_episodes": self._count, "total_frames": self._frames,
+            "total_tasks": len(self._source.tasks), "chunks_size": FILES_PER_CHUNK, "data_files_size_in_mb": DATA_FILE_MB,
+            "video_files_size_in_mb": VIDEO_FILE_MB, "fps": number(self._source.fps), "splits": {"train": f"0:{self._count}"},
+            "data_path": f"data/{_PLACE}.parquet", "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
+            "features": features_of(self._source, self._codec),
+        }  # fmt: skip
+        write_json(self._path / "meta/info.json", info)
+
+
+def _write_tasks(path: Path, tasks: list[str]) -> None:
+    """LeRobot reads this table with pandas and expects the instructions as its index."""
+    pa = needs("pyarrow")
+    column = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object", "metadata": None}
+    index = {"name": "task_index", "field_name": "task_index", "pandas_type": "int64", "numpy_type": "int64", "metadata": None}
+    about = {"index_columns": ["task"], "column_indexes": [], "columns": [index, column], "pandas_version": "2.0.0"}
+    table = pa.table({"task_index": list(range(len(tasks))), "task": tasks}).replace_schema_metadata({"pandas": json.dumps(about)})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    needs("pyarrow.parquet").write_table(table, path)
+
+
+def _dtype(dtype: np.dtype[Any]) -> str:
+    return "bool" if dtype.kind == "b" else "int64" if dtype.kind in "iu" else "float32"
+
+
+def _stored_size(shape: tuple[int, ...]) -> tuple[int, int]:
+    """Height and width of the stored frames: odd sizes have one more row or column."""
+    return shape[1] + shape[1] % 2, shape[2] + shape[2] % 2

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""LeRobot v2.1: one Parquet file and one MP4 file per episode, with GR00T's ``meta/modality.json``."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from mjsense._arguments import checked
+from mjsense.export.lerobot import (
+    FILES_PER_CHUNK,
+    Statistics,
+    codec_of,
+    columns_of,
+    exported,
+    features_of,
+    image_key,
+    key_of,
+    lists,
+    number,
+    table_of,
+    write_json,
+)
+from mjsense.export.mapping import Mapping, Source
+from mjsense.export.output import needs, new_output
+
+_DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
+_VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
+
+
+@checked
+def export_lerobot21(
+    root: str | Path,
+    out: str | Path,
+    *,
+    map: Mapping | str | Path | dict[str, Any] | None = None,
+    episodes: Iterable[int] | None = None,
+    success: bool | None = None,
+    statistics_frames: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``. See docs/export.md.
+
+    Args:
+        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
+        out: Folder of the data set, which must not exist.
+        map: Features and cameras: a :class:`mjsense.export.Mapping`, a TOML file, or a dict of the same form.
+        episodes: Positions of episodes in the recording; by default all.
+        success: Only successful (True) or only failed (False) episodes.
+        statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all.
+        progress: Called with the number of written episodes and of all episodes.
+
+    Returns:
+        ``out``.
+    """
+    source = Source(root, map=map, episodes=episodes, success=success)
+    with new_output(out) as path:
+        _write(source, path, Statistics(source, statistics_frames), progress)
+    return Path(out)
+
+
+def _write(source: Source, path: Path, statistics: Statistics, progress: Callable[[int, int], None] | None) -> None:
+    entries: list[dict[str, Any]] = []
+    found: list[dict[str, Any]] = []
+    codec: dict[str, Any] = {}
+    first = 0
+    for position, episode in enumerate(source.episodes):
+        place = {"episode_chunk": position // FILES_PER_CHUNK, "episode_index": position}
+        columns = columns_of(source, episode, position, first)
+        file = _made(path / _DATA.format(**place))
+        needs("pyarrow.parquet").write_table(table_of(columns), file)
+        for camera in source.cameras:
+            video = source.video(episode, camera).path
+            codec = codec or codec_of(video)
+            shutil.copyfile(video, _made(path / _VIDEO.format(video_key=image_key(camera), **place)))
+        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1})
+        stats = {name: lists(value) for name, value in statistics.add(episode, columns).items()}
+        found.append({"episode_index": position, "stats": stats})
+        first += episode.length - 1
+        if progress:
+            progress(position + 1, len(source))
+    _write_lines(path / "meta/episodes.jsonl", entries)
+    _write_lines(path / "meta/episodes_stats.jsonl", found)
+    _write_lines(path / "meta/tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(source.tasks)])
+    write_json(path / "meta/stats.json", {name: lists(value) for name, value in statistics.all().items()})
+    write_json(path / "meta/modality.json", modality_of(source))
+    count = len(source)
+    info = {
+        "codebase_version": "v2.1", "robot_type": source.robot, "total_episodes": count, "total_frames": first,
+        "total_tasks": len(source.tasks), "total_videos": count * len(source.cameras), "total_chunks": -(-count // FILES_PER_CHUNK),
+        "chunks_size": FILES_PER_CHUNK, "fps": number(source.fps), "splits": {"train": f"0:{count}"}, "data_path": _DATA,
+        "video_path": _VIDEO if source.cameras else None, "features": features_of(source, codec),
+    }  # fmt: skip
+    write_json(path / "meta/info.json", info)
+
+
+def modality_of(source: Source) -> dict[str, Any]:
+    """The parts of state and action by move group, the cameras, and the instruction, as GR00T's loader expects them."""
+    result: dict[str, Any] = {"state": {}, "action": {}}
+    for feature in exported(source):
+        if feature.name in ("reward", "success"):
+            continue
+        for name, part in feature.parts.items():
+            entry = {"start": part.start, "end": part.stop, "original_key": key_of(feature)}
+            result["action" if feature.of_step else "state"][name] = entry
+    result["video"] = {camera: {"original_key": image_key(camera)} for camera in source.cameras}
+    result["annotation"] = {"human.task_description": {"original_key": "task_index"}}
+    return result
+
+
+def _made(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def _write_lines(path: Path, entries: list[dict[str, Any]]) -> None:
+    _made(path).write_text("".join(json.dumps(entry, ensure_ascii=False) + "\n" for entry in entries))
