@@ -36,7 +36,7 @@ def export_mcap(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
-    reencode: bool = False,
+    encode_again: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
@@ -48,14 +48,14 @@ def export_mcap(
         map: Which streams become which topics: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        reencode: Encode videos again that have B-frames, which ``foxglove.CompressedVideo`` does not allow; other videos are copied.
+        encode_again: Encode videos again that have B-frames, which ``foxglove.CompressedVideo`` does not allow; other videos are copied.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
 
     Raises:
-        ValueError: A video has B-frames, and ``reencode`` is False.
+        ValueError: A video has B-frames, and ``encode_again`` is False.
     """
     writers, schemas = needs("mcap.writer", "mcap"), needs("mcap_protobuf.schema", "mcap")
     for module in ("foxglove_schemas_protobuf", "av"):
@@ -69,17 +69,17 @@ def export_mcap(
                 writer.start(library="mjsense")
                 about = {"task": episode.task, "outcome": episode.outcome, "seed": str(episode.seed), "robot": source.robot}
                 writer.add_metadata("episode", about | {"file": f"{episode.path.name}/{episode.trajectory}"})
-                _write(writer, schemas.register_schema, source, _messages(source, episode, reencode))
+                _write(writer, schemas.register_schema, source, _messages(source, episode, encode_again))
                 writer.finish()
             if progress is not None:
                 progress(i + 1, len(source))
     return Path(out)
 
 
-def _messages(source: Source, episode: Episode, reencode: bool) -> Iterator[_Message]:
+def _messages(source: Source, episode: Episode, encode_again: bool) -> Iterator[_Message]:
     """All messages of an episode in the order of their observations."""
     streams = [_feature(source, episode, name) for name in source.features]
-    streams += [_video(source, episode, name, reencode) for name in source.cameras]
+    streams += [_video(source, episode, name, encode_again) for name in source.cameras]
     streams += [_calibration(source, episode, name) for name in source.cameras]
     streams += [_depth(name, video) for name, video in depth_videos(source, episode).items()]
     shown = bodies(episode)
@@ -115,6 +115,11 @@ def _stamped(message: Any, time: int) -> Any:
     return message
 
 
+def _message(kind: str, **fields: Any) -> Any:
+    """A message of Foxglove's."""
+    return getattr(needs(f"foxglove_schemas_protobuf.{kind}_pb2", "mcap"), kind)(**fields)
+
+
 # Topics. Each function yields its messages in the order of the observations.
 
 
@@ -123,17 +128,15 @@ def _feature(source: Source, episode: Episode, name: str) -> Iterator[_Message]:
         yield t, f"/{name}", {n: value if np.isfinite(value) else None for n, value in zip(source.features[name].names, row.tolist())}
 
 
-def _video(source: Source, episode: Episode, name: str, reencode: bool) -> Iterator[_Message]:
-    from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
-
+def _video(source: Source, episode: Episode, name: str, encode_again: bool) -> Iterator[_Message]:
     video = source.video(episode, name)
     packets = _copied(video)
     if packets is None:
-        if not reencode:
-            raise ValueError(f"{video.path} has B-frames, which MCAP's CompressedVideo does not allow: record without B-frames, or pass reencode=True (--reencode)")
+        if not encode_again:
+            raise ValueError(f"{video.path} has B-frames, which MCAP's CompressedVideo does not allow: record without B-frames, or pass encode_again=True (--encode-again)")
         packets = _encoded(video)
     for t, packet in enumerate(packets):
-        yield t, f"/cameras/{name}/video", CompressedVideo(frame_id=name, data=packet, format="h264")
+        yield t, f"/cameras/{name}/video", _message("CompressedVideo", frame_id=name, data=packet, format="h264")
 
 
 def _copied(video: Video) -> list[bytes] | None:
@@ -165,39 +168,32 @@ def _encoded(video: Video) -> Iterator[bytes]:
 
 
 def _depth(name: str, video: Video) -> Iterator[_Message]:
-    from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-
     height, width = video.shape[1:3]
     for t in range(len(video)):
         data = video[t].astype("<f4").tobytes()
-        yield t, f"/cameras/{name}/depth", RawImage(frame_id=name, width=width, height=height, encoding="32FC1", step=4 * width, data=data)
+        yield t, f"/cameras/{name}/depth", _message("RawImage", frame_id=name, width=width, height=height, encoding="32FC1", step=4 * width, data=data)
 
 
 def _calibration(source: Source, episode: Episode, name: str) -> Iterator[_Message]:
-    from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
-
     place = f"obs/sensor_param/{source.cameras[name]}/intrinsic_cv"
     height, width = source.video(episode, name).shape[1:3]
     for t, matrix in enumerate(episode[place] if place in episode.streams else ()):
-        projection = np.hstack([matrix, np.zeros((3, 1))])
-        yield t, f"/cameras/{name}/calibration", CameraCalibration(frame_id=name, width=width, height=height, distortion_model="plumb_bob", D=[0.0] * 5,
-                                                                   K=matrix.ravel(), R=np.eye(3).ravel(), P=projection.ravel())  # fmt: skip
+        numbers = {"D": [0.0] * 5, "K": matrix.ravel(), "R": np.eye(3).ravel(), "P": np.hstack([matrix, np.zeros((3, 1))]).ravel()}
+        calibration = _message("CameraCalibration", frame_id=name, width=width, height=height, distortion_model="plumb_bob", **numbers)
+        yield t, f"/cameras/{name}/calibration", calibration
 
 
 def _joints(episode: Episode) -> Iterator[_Message]:
     """Positions and velocities by move group: ``arm_0``, ``arm_1``."""
-    from foxglove_schemas_protobuf.JointState_pb2 import JointState
-    from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-
     places = ("obs/agent/qpos", "obs/agent/qvel")
     if any(place not in episode for place in places):
         return
     positions, velocities = (episode[place] for place in places)
     groups = [group for group, rows in positions.items() if rows.ndim == 2 and velocities.get(group, rows[:0]).shape == rows.shape]
     for t in range(episode.length if groups else 0):
-        joints = [JointState(name=f"{group}_{i}", position=positions[group][t, i], velocity=velocities[group][t, i])
+        joints = [_message("JointState", name=f"{group}_{i}", position=positions[group][t, i], velocity=velocities[group][t, i])
                   for group in groups for i in range(positions[group].shape[1])]  # fmt: skip
-        yield t, "/joint_states", JointStates(joints=joints)
+        yield t, "/joint_states", _message("JointStates", joints=joints)
 
 
 def _pose(position: np.ndarray, quat: np.ndarray) -> dict[str, dict[str, float]]:
@@ -209,9 +205,6 @@ def _pose(position: np.ndarray, quat: np.ndarray) -> dict[str, dict[str, float]]
 
 def _transforms(source: Source, episode: Episode, shown: list[Body]) -> Iterator[_Message]:
     """Poses of cameras and bodies in the world; those of bodies that do not move only once."""
-    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
-    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-
     frames: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for name, camera in source.cameras.items():
         place = f"obs/sensor_param/{camera}/cam2world_gl"
@@ -224,9 +217,9 @@ def _transforms(source: Source, episode: Episode, shown: list[Body]) -> Iterator
         transforms = []
         for name, (positions, quats) in moved.items():
             pose = _pose(positions[t], quats[t])
-            transforms.append(FrameTransform(parent_frame_id=_WORLD, child_frame_id=name, translation=pose["position"], rotation=pose["orientation"]))
+            transforms.append(_message("FrameTransform", parent_frame_id=_WORLD, child_frame_id=name, translation=pose["position"], rotation=pose["orientation"]))
         if transforms:
-            yield t, "/tf", FrameTransforms(transforms=transforms)
+            yield t, "/tf", _message("FrameTransforms", transforms=transforms)
 
 
 def _frame(body: Body) -> str:
@@ -235,17 +228,14 @@ def _frame(body: Body) -> str:
 
 def _scene(shown: list[Body]) -> Iterator[_Message]:
     """The geoms of each body, once, in the frame of the body."""
-    from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
-    from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-
     entities = []
     for body in shown:
-        entity = SceneEntity(frame_id=_frame(body), id=body.name, frame_locked=True)
+        entity = _message("SceneEntity", frame_id=_frame(body), id=body.name, frame_locked=True)
         for shape in body.shapes:
             _draw(entity, shape)
         entities.append(entity)
     if entities:
-        yield 0, "/scene", SceneUpdate(entities=entities)
+        yield 0, "/scene", _message("SceneUpdate", entities=entities)
 
 
 def _draw(entity: Any, shape: Shape) -> None:

@@ -110,4 +110,5 @@ def quats_of(rotations: np.ndarray) -> np.ndarray:
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotations, 0, -1)
     matrix = np.array([[a - e - i, b + d, c + g, h - f], [b + d, e - a - i, f + h, c - g], [c + g, f + h, i - a - e, d - b], [h - f, c - g, d - b, a + e + i]])
     _, vectors = np.linalg.eigh(np.moveaxis(matrix, -1, 0))  # Bar-Itzhack: xyzw is the eigenvector of the largest eigenvalue
-    return vectors[:, [3, 0, 1, 2], 3]
+    quats = vectors[:, [3, 0, 1, 2], 3]
+    return quats * np.where(quats[:, :1] < 0, -1, 1)
