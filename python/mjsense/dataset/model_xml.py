@@ -49,7 +49,7 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
     """
     model = playback.model_of(episode)
     text, assets = playback.archive_of(episode)
-    spec = mujoco.MjSpec.from_string(text, assets)
+    spec = mujoco.MjSpec.from_string(text, assets=assets)
     archived = spec.compile()  # also gives the elements their ids
     changed = [field for field in playback.changed_fields(episode) if field not in _DERIVED]
     if {"geom_dataid", "geom_pos", "geom_quat"} & set(changed):

@@ -49,7 +49,7 @@ def export_robomimic(
     Returns:
         ``out``.
     """
-    h5py = needs("h5py", "dataset")
+    h5py = needs("h5py", "robomimic")
     source = Source(root, map=map, episodes=episodes, success=success)
     with new_output(out) as path, h5py.File(path, "w") as file:
         data = file.create_group("data")
