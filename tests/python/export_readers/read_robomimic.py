@@ -12,7 +12,6 @@ import robomimic.utils.obs_utils as obs_utils
 from robomimic.utils.dataset import SequenceDataset
 
 
-
 def as_read(values):
     """robomimic's cache has 32-bit floats."""
     return values.astype(np.float32) if values.dtype == np.float64 else values
