@@ -10,6 +10,7 @@ from mjsense.export import FORMATS
 EXAMPLES = [
     ("mjsense export lerobot data out", "Write the recording in data as a LeRobot v3.0 data set."),
     ("mjsense export lerobot data out --success --map map.toml", "Export the successful episodes with chosen features."),
+    ("mjsense export rerun data out && rerun out/*.rrd", "Show the videos, curves and the scene in the Rerun viewer."),
 ]
 
 
@@ -21,12 +22,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
+    parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
 
 
 def run(arguments: argparse.Namespace) -> int:
     import importlib
     import sys
 
+    if arguments.encode_again and arguments.format != "mcap":
+        raise ValueError("--encode-again is an option of the format mcap")
+    options = {"encode_again": True} if arguments.encode_again else {}
     function = getattr(importlib.import_module(f"mjsense.export.{arguments.format}"), f"export_{arguments.format}")
     shown = sys.stderr.isatty()
 
@@ -34,5 +39,6 @@ def run(arguments: argparse.Namespace) -> int:
         if shown:
             print(f"\r{done} of {total} episodes", end="" if done < total else "\n", file=sys.stderr, flush=True)
 
-    function(arguments.path, arguments.out, map=arguments.map, episodes=arguments.episodes, success=arguments.success or None, progress=progress)
+    success = arguments.success or None
+    function(arguments.path, arguments.out, map=arguments.map, episodes=arguments.episodes, success=success, progress=progress, **options)
     return 0

@@ -65,30 +65,40 @@ def _require_mujoco() -> None:
         raise RuntimeError(f"replay needs the series of MuJoCo that mjsense records with: {_libmujoco.explain()}")
 
 
-def _archived_model(episode: Episode) -> mujoco.MjModel:
+def archive_of(episode: Episode) -> tuple[str, dict[str, bytes]]:
+    """MJCF of the archived model, and the files that it names."""
     name = episode._recording.get("model_archive")
     if not name:
         inputs_of(episode)  # states the reason if there is no data for replay at all
         raise ValueError(f"{_where(episode)}: the attribute 'recording' names no model_archive")
     path = episode.path.parent / name
+    if not path.exists():
+        raise FileNotFoundError(f"{_where(episode)} needs the model archive {path}, which is missing; copy it from the recording's folder")
+    with zipfile.ZipFile(path) as archive:
+        assets = {file: archive.read(file) for file in archive.namelist() if file != _MODEL_FILE}
+        return archive.read(_MODEL_FILE).decode(), assets
 
+
+def archived_model(episode: Episode) -> mujoco.MjModel:
     def compile_model() -> tuple[mujoco.MjModel, int]:
-        if not path.exists():
-            raise FileNotFoundError(f"{_where(episode)} needs the model archive {path}, which is missing; copy it from the recording's folder")
-        with zipfile.ZipFile(path) as archive:
-            assets = {file: archive.read(file) for file in archive.namelist() if file != _MODEL_FILE}
-            text = archive.read(_MODEL_FILE).decode()
+        text, assets = archive_of(episode)
         try:
             return mujoco.MjModel.from_xml_string(text, assets), 1
         except ValueError as error:
-            raise ValueError(f"MuJoCo {mujoco.__version__} cannot compile {path}: {error}") from error
+            raise ValueError(f"MuJoCo {mujoco.__version__} cannot compile the model archive of {_where(episode)}: {error}") from error
 
-    return episode._store.models.get(path, compile_model)
+    return episode._store.models.get((episode.path.parent, episode._recording.get("model_archive")), compile_model)
+
+
+def changed_fields(episode: Episode) -> list[str]:
+    """Fields of mjModel in which the episode differs from the archived model."""
+    with open_h5(episode.path) as file:
+        return list(file[episode.trajectory].get("replay/model", ()))
 
 
 def model_of(episode: Episode) -> mujoco.MjModel:
     _require_mujoco()
-    model = copy.deepcopy(_archived_model(episode))
+    model = copy.deepcopy(archived_model(episode))
     with open_h5(episode.path) as file:
         for name, dataset in file[episode.trajectory].get("replay/model", {}).items():
             field = getattr(model, name)

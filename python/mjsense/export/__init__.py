@@ -4,11 +4,22 @@
 from mjsense.export.lerobot import export_lerobot
 from mjsense.export.lerobot21 import export_lerobot21
 from mjsense.export.mapping import Feature, Mapping, Source
+from mjsense.export.mcap import export_mcap
+from mjsense.export.rerun import export_rerun
+from mjsense.export.rlds import export_rlds
+from mjsense.export.robomimic import export_robomimic
+from mjsense.export.zarr import export_zarr
 
 FORMATS = {
     "lerobot": "LeRobot v3.0",
     "lerobot21": "LeRobot v2.1 with meta/modality.json, as GR00T reads it",
+    "robomimic": "one HDF5 file of robomimic, with simulator states and models",
+    "rlds": "RLDS for tensorflow-datasets",
+    "zarr": "Zarr 2, as Diffusion Policy reads it",
+    "rerun": "files for the Rerun viewer, one for each episode",
+    "mcap": "MCAP files with Foxglove's schemas, one for each episode",
 }
 """Names and one-line descriptions. The module ``mjsense.export.NAME`` has the function ``export_NAME``."""
 
-__all__ = ["FORMATS", "Feature", "Mapping", "Source", "export_lerobot", "export_lerobot21"]
+__all__ = ["FORMATS", "Feature", "Mapping", "Source", "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun", "export_rlds",
+           "export_robomimic", "export_zarr"]  # fmt: skip

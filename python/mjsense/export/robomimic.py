@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Export to robomimic's HDF5 files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense._arguments import checked
+from mjsense._gymnasium import env_id
+from mjsense.dataset.model_xml import model_xml
+from mjsense.export.images import FLAGS, depth_videos
+from mjsense.export.mapping import Source
+from mjsense.export.output import needs, new_output
+
+if TYPE_CHECKING:
+    from mjsense.dataset import Episode, Video
+    from mjsense.export.mapping import Mapping
+
+_GYM = 2  # robomimic's EnvType.GYM_TYPE
+_VALID_EVERY = 10
+
+
+@checked
+def export_robomimic(
+    root: str | Path,
+    out: str | Path,
+    *,
+    map: Mapping | str | Path | dict[str, Any] | None = None,
+    episodes: Iterable[int] | None = None,
+    success: bool | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
+    data for replay. Images are decoded, because robomimic reads arrays.
+
+    Args:
+        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
+        out: File to write. It must not exist.
+        map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
+        episodes: Positions of episodes in the recording; by default all.
+        success: Only successful (True) or only failed (False) episodes.
+        progress: Called with the number of written episodes and of all episodes.
+
+    Returns:
+        ``out``.
+    """
+    h5py = needs("h5py", "robomimic")
+    source = Source(root, map=map, episodes=episodes, success=success)
+    with new_output(out) as path, h5py.File(path, "w") as file:
+        data = file.create_group("data")
+        total = 0
+        written: dict[bytes, Any] = {}  # files of models, which demonstrations share
+        for i, episode in enumerate(source.episodes):
+            total += _write_demo(data.create_group(f"demo_{i}"), written, source, episode)
+            if progress is not None:
+                progress(i + 1, len(source))
+        data.attrs["total"] = total
+        data.attrs["env_args"] = json.dumps(_env_args(source.episodes[0]) if source.episodes else {})
+        demos = [f"demo_{i}" for i in range(len(source))]
+        masks = {
+            "train": [demo for i, demo in enumerate(demos) if i % _VALID_EVERY != _VALID_EVERY - 1],
+            "valid": demos[_VALID_EVERY - 1 :: _VALID_EVERY] or demos[-1:],
+            "success": [demo for demo, episode in zip(demos, source.episodes) if episode.success],
+        }
+        if len(demos) > 1 and len(masks["train"]) == len(demos):  # fewer than ten: the last one validates
+            masks["train"] = demos[:-1]
+        for name, chosen in masks.items():
+            file[f"mask/{name}"] = np.array(chosen, "S")
+    return Path(out)
+
+
+def _env_args(episode: Episode) -> dict[str, Any]:
+    """What robomimic creates the environment from: a task and a robot in gymnasium's registry."""
+    settings = episode.settings
+    task, robot = str(settings.get("task", "")), settings.get("robot")
+    return {"env_name": env_id(task, robot) if task else "", "type": _GYM, "env_kwargs": {}, "mjsense": settings}
+
+
+def _write_demo(demo: Any, written: dict[bytes, Any], source: Source, episode: Episode) -> int:
+    """Writes one episode; row t of everything is observation t and the step from it. Returns the number of steps."""
+    steps = episode.length - 1
+    demo.attrs["num_samples"] = steps
+    demo.attrs["ep_meta"] = json.dumps({"lang": episode.task, "seed": episode.seed, "outcome": episode.outcome})
+    rows = source.rows(episode)
+    demo["actions"], demo["rewards"] = rows["action"], rows["reward"][:, 0]
+    for name, feature in source.features.items():
+        if not feature.of_step:
+            demo[f"obs/{name}"], demo[f"next_obs/{name}"] = rows[name][:-1], rows[name][1:]
+        elif name not in ("action", *FLAGS):
+            demo[name] = rows[name]
+    dones = rows["terminated"][:, 0] | rows["truncated"][:, 0]
+    dones[-1] = True
+    demo["dones"] = dones.astype(np.int64)
+    for name in source.cameras:
+        _write_video(demo, f"{name}_image", source.video(episode, name))
+    for name, video in depth_videos(source, episode).items():
+        _write_video(demo, f"{name}_depth", video)
+    if "replay/state" in episode.streams:
+        _write_states(demo, written, episode)
+    return steps
+
+
+def _write_video(demo: Any, name: str, video: Video) -> None:
+    shape = video.shape if len(video.shape) == 4 else (*video.shape, 1)  # robomimic's depth images have one channel
+    options = dict(dtype=video.dtype, chunks=(1, *shape[1:]), compression="gzip", compression_opts=1, shuffle=video.dtype.itemsize > 1)
+    steps = len(video) - 1
+    now, after = (demo.create_dataset(f"{group}/{name}", (steps, *shape[1:]), **options) for group in ("obs", "next_obs"))
+    for t in range(steps + 1):
+        frame = video[t].reshape(shape[1:])
+        if t < steps:
+            now[t] = frame
+        if t > 0:
+            after[t - 1] = frame
+
+
+def _write_states(demo: Any, written: dict[bytes, Any], episode: Episode) -> None:
+    """``states`` as robosuite's ``MjSimState.flatten``: time, qpos, qvel. ``integration_states`` is all that MuJoCo's state contains."""
+    model = episode.model()
+    states = episode.states[:-1]
+    numbers = 1 + model.nq + model.nv  # mjSTATE_INTEGRATION begins with time, qpos, qvel
+    demo["states"] = states[:, :numbers]
+    demo.create_dataset("integration_states", data=states, compression="gzip", compression_opts=4)
+    demo.attrs["model_file"], assets = model_xml(episode)
+    for name, content in assets.items():
+        if content not in written:
+            written[content] = demo.create_dataset(f"assets/{name}", data=np.frombuffer(content, np.uint8))
+        else:
+            demo[f"assets/{name}"] = written[content]  # a link
