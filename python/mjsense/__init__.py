@@ -21,6 +21,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
     recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
+    in the browser               view: live worlds, tasks, recordings
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -76,6 +77,8 @@ from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
 from mjsense.vector import TaskVectorEnv, make_vec
+from mjsense.view import view
+from mjsense.view.viewer import Viewer
 
 assets.name_package_folders()
 
@@ -92,8 +95,8 @@ __all__ = [
     "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "ReplayReport", "Robot",
     "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
     "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
-    "Video", "WorldState", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names",
+    "Video", "Viewer", "WorldState", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names",
     "record", "register_policy", "register_task", "replay",
-    "robot_names", "task_names",
+    "robot_names", "task_names", "view",
     "__version__",
 ]

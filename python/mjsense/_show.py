@@ -98,21 +98,38 @@ def thumbnail(image: np.ndarray) -> str | None:
     if image.ndim != 3 or min(image.shape) < 1:
         return None
     step = -(-max(image.shape[:2]) // _THUMBNAIL)
-    pixels = _coloured(image[::step, ::step])
+    pixels = coloured(image[::step, ::step])
     return None if pixels is None else "data:image/png;base64," + base64.b64encode(_png(pixels)).decode("ascii")
 
 
-def _coloured(image: np.ndarray) -> np.ndarray | None:
-    """uint8 [H, W, 3] image for display: colours unchanged, depth with near surfaces bright, a colour per id, normals in the
-    usual colours."""
+_VIRIDIS = np.array([(68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121), (110, 206, 88),
+                     (181, 222, 43), (253, 231, 37)], np.float64)  # fmt: skip
+"""Samples of the colour map viridis at equal distances."""
+
+
+def colour_map(values: np.ndarray) -> np.ndarray:
+    """Colours float64 [..., 3], 0 to 255, of values from 0 (dark blue) to 1 (yellow)."""
+    at = np.clip(values, 0, 1) * (len(_VIRIDIS) - 1)
+    return np.stack([np.interp(at, np.arange(len(_VIRIDIS)), _VIRIDIS[:, c]) for c in range(3)], axis=-1)
+
+
+def is_image(shape: tuple[int, ...], dtype: Any) -> bool:
+    """Whether rows of this shape can be shown by :func:`coloured`."""
+    kind = np.dtype(dtype).kind
+    return len(shape) == 3 and min(shape) > 0 and (shape[2] in (1, 3) if kind == "f" else shape[2] in (1, 2) if kind == "i" else shape[2] == 3)
+
+
+def coloured(image: np.ndarray) -> np.ndarray | None:
+    """uint8 [H, W, 3] image for display: colours unchanged, depth by a colour map with near surfaces bright, a colour per id,
+    normals in the usual colours. None for other arrays."""
     channels = image.shape[2]
     if image.dtype == np.uint8 and channels == 3:
         return image
     if image.dtype.kind == "f" and channels == 1:
         seen = np.isfinite(image) & (image > 0)
         low, high = (image[seen].min(), image[seen].max()) if seen.any() else (0.0, 1.0)
-        grey = np.where(seen, 255 - 215 * (image - low) / max(high - low, 1e-9), 0)
-        return np.repeat(np.nan_to_num(grey).astype(np.uint8), 3, axis=2)
+        near = 1 - np.where(seen, image - low, 0) / max(high - low, 1e-9)
+        return np.where(seen, colour_map(near[..., 0]), 0).astype(np.uint8)
     if image.dtype.kind == "i" and channels in (1, 2):
         ids = image[..., :1].astype(np.int64)
         return np.where(ids < 0, 0, 64 + ids * np.array([73, 151, 211]) % 192).astype(np.uint8)

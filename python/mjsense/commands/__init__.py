@@ -14,6 +14,7 @@ import sys
 from types import ModuleType
 
 COMMANDS = {
+    "view": "Show a task, a scene, a recording or a model in the browser.",
     "replay": "Replay recorded episodes and compare them with the recording.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
