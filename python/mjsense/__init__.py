@@ -22,6 +22,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
     recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
     in the browser               view: live worlds, tasks, recordings
+    plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -65,6 +66,7 @@ from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
+from mjsense.plot import plot
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
@@ -95,7 +97,7 @@ __all__ = [
     "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "ReplayReport", "Robot",
     "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
     "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
-    "Video", "Viewer", "WorldState", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names",
+    "Video", "Viewer", "WorldState", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "plot", "policy_names",
     "record", "register_policy", "register_task", "replay",
     "robot_names", "task_names", "view",
     "__version__",

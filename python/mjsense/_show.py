@@ -7,7 +7,7 @@ import base64
 import inspect
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,18 +75,37 @@ def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
     """The same as HTML, with those images ``[H, W, C]`` that can be displayed."""
     import html  # slow to import, and needed in notebooks only
 
-    columns = ("field", "dtype", "shape", "unit", "frame", "")
-    body = "".join(
-        "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in rows
-    )
-    shown = "".join(
+    fields = grid(("field", "dtype", "shape", "unit", "frame", ""), [_cells(row) for row in rows]) if rows else ""
+    return f"<div><b>{html.escape(head)}</b>{fields}{figures(images)}</div>"
+
+
+def grid(header: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+    """An HTML table."""
+    import html
+
+    def line_of(tag: str, cells: Sequence[Any]) -> str:
+        return "<tr>" + "".join(f"<{tag} style='text-align:left'>{html.escape(printable(str(cell)))}</{tag}>" for cell in cells) + "</tr>"
+
+    return f"<table>{line_of('th', header)}{''.join(line_of('td', row) for row in rows)}</table>"
+
+
+def figures(images: Mapping[str, np.ndarray]) -> str:
+    """Those images ``[H, W, C]`` that can be displayed, with their names, as HTML."""
+    import html
+
+    return "".join(
         f"<figure style='display:inline-block;margin:4px'><img src='{source}'/><figcaption>{html.escape(name)}</figcaption></figure>"
         for name, image in images.items()
         if (source := thumbnail(image))
     )
-    header = "".join(f"<th style='text-align:left'>{column}</th>" for column in columns)
-    fields = f"<table><tr>{header}</tr>{body}</table>" if rows else ""
-    return f"<div><b>{html.escape(head)}</b>{fields}{shown}</div>"
+
+
+def block(head: str, content: str, folded: Mapping[str, str] | None = None) -> str:
+    """HTML with a bold first line, its content, and parts that open at a click."""
+    import html
+
+    parts = "".join(f"<details><summary>{html.escape(name)}</summary>{inner}</details>" for name, inner in (folded or {}).items() if inner)
+    return f"<div><b>{html.escape(printable(head))}</b>{content}{parts}</div>"
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mjsense._progress import tracked
 from mjsense.dataset import Dataset, Episode
 from mjsense.view import surfaces
+from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES
-from mjsense.view.poses import first_view, rotation_of
+from mjsense.view.poses import rotation_of
 from mjsense.view.source import LiveSource
 from mjsense.view.stage import MIN_REACH, VISIBLE_GROUPS, Stage, node
 from mjsense.view.viewer import serve, stop
@@ -33,12 +35,13 @@ class Moment(NamedTuple):
     images: dict[str, np.ndarray]
 
 
-def export(source: LiveSource | Dataset, path: str | Path, *, world: int = 0, episode: int = 0, seconds: float = 10.0) -> None:
+def export(source: LiveSource | Dataset, path: str | Path, *, world: int = 0, episode: int = 0, seconds: float = 10.0, progress: bool | None = None) -> None:
     """Writes an episode of a recording, or some seconds of a live world, to a file.
 
     Args:
         path: A file that ends in ``.viser`` (shapes only) or ``.rrd`` (with streams and images; needs rerun-sdk).
         seconds: Length of the export of a live world. [s]
+        progress: Show the progress on stderr; by default where it is a terminal or a notebook.
     """
     path = Path(path)
     writers = {".viser": _write_viser, ".rrd": _write_rerun}
@@ -47,16 +50,18 @@ def export(source: LiveSource | Dataset, path: str | Path, *, world: int = 0, ep
     if isinstance(source, Dataset):
         if not 0 <= episode < len(source.episodes):
             raise ValueError(f"episode {episode}: must be in [0, {len(source.episodes)})")
-        moments, period = _recorded(source, source.episodes[episode], path.suffix == ".rrd"), 1 / float(source.fps)
+        one = source.episodes[episode]
+        moments, period, count = _recorded(source, one, path.suffix == ".rrd"), 1 / float(source.fps), one.length
     else:
-        moments, period = _live(source, world, seconds, path.suffix == ".rrd"), source.period
-    writers[path.suffix](moments, period, path)
+        count = max(1, round(seconds / source.period))
+        moments, period = _live(source, world, count, path.suffix == ".rrd"), source.period
+    writers[path.suffix](tracked(moments, count, "steps", enabled=progress), period, path)
 
 
-def _live(source: LiveSource, world: int, seconds: float, full: bool) -> Iterator[Moment]:
+def _live(source: LiveSource, world: int, count: int, full: bool) -> Iterator[Moment]:
     streams, pictures = (list(source.streams()), source.pictures()) if full else ([], [])
     changed = True
-    for step in range(max(1, round(seconds / source.period))):
+    for step in range(count):
         values = {name: source.value(name, world) for name in streams}
         images = {name: source.picture(name, world) for name in pictures}
         yield Moment(step * source.period, source.model(world) if changed else None, *source.poses(world), values, images)

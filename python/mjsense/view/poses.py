@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Streams that are poses, drawn as frames; and the first view of a scene."""
+"""Streams that are poses, drawn as frames."""
 
 from __future__ import annotations
 
@@ -44,26 +44,3 @@ def rotation_of(quaternion: np.ndarray) -> np.ndarray:
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                      [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
                      [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])  # fmt: skip
-
-
-_BESIDE_ROBOT = np.array([1.5, -1.2, 1.5]), np.array([0.4, 0, 0.6])  # m, in the frame of a robot's base: a view from its side, and what it looks at
-View = tuple[np.ndarray, np.ndarray, float]
-"""Position of a view, the point that it looks at, and its vertical field of view in rad."""
-
-
-def first_view(model: Any, xpos: np.ndarray, xmat: np.ndarray) -> View:
-    """From the side of the first robot of an episode; in other models MuJoCo's free camera."""
-    names = [model.body(i).name for i in range(model.nbody)]
-    base = next((i for i, name in enumerate(names) if name.startswith("robot_0/")), None)
-    if base is None:
-        return free_camera(model)
-    position, target = (xpos[base] + xmat[base].reshape(3, 3) @ point for point in _BESIDE_ROBOT)
-    return position, target, float(np.radians(45))
-
-
-def free_camera(model: Any) -> View:
-    """MuJoCo's free camera."""
-    azimuth, elevation = np.radians([float(model.vis.global_.azimuth), float(model.vis.global_.elevation)])
-    forward = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    centre = np.array(model.stat.center)
-    return centre - 1.5 * float(model.stat.extent) * forward, centre, float(np.radians(float(model.vis.global_.fovy)))

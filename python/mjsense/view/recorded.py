@@ -11,9 +11,10 @@ import numpy as np
 from mjsense.dataset import Dataset, Episode
 from mjsense.dataset.episode import VIDEOS
 from mjsense.drawing import DebugShapes
+from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES, Curves, StreamInfo
 from mjsense.view.pictures import Pictures
-from mjsense.view.poses import POSE, PoseStream, first_view
+from mjsense.view.poses import POSE, PoseStream
 from mjsense.view.viewer import Viewer
 
 _LISTED = 200  # episodes in the list; the filters find the others

@@ -12,8 +12,9 @@ from mjsense._show import is_image
 from mjsense.drawing import DebugShapes
 from mjsense.simulation import Simulation
 from mjsense.vector import TaskVectorEnv
+from mjsense.view.camera import View, first_view
 from mjsense.view.curves import MAX_CURVES, StreamInfo
-from mjsense.view.poses import POSE, PoseStream, View, first_view
+from mjsense.view.poses import POSE, PoseStream
 
 _CONTACTS = "contacts"
 _CONTACT_COLOUR = (0.9, 0.3, 0.1, 1.0)
