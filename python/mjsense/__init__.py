@@ -24,6 +24,9 @@ Where to look (``help(mjs.Simulation)`` and so on):
     recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay; for other programs:
                                  export_lerobot, export_lerobot21
                                  export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
+    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
+    in the browser               view: live worlds, tasks, recordings
+    plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -70,6 +73,7 @@ from mjsense.export import export_mcap, export_rerun, export_rlds, export_robomi
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
+from mjsense.plot import plot
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
@@ -83,6 +87,8 @@ from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
 from mjsense.vector import TaskVectorEnv, make_vec
+from mjsense.view import view
+from mjsense.view.viewer import Viewer
 
 assets.name_package_folders()
 
@@ -98,9 +104,9 @@ __all__ = [
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
     "Recorder", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData",
     "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor",
-    "TerrainHeightSensor", "UnknownNameError", "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models",
-    "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "make",
-    "make_vec", "observations", "policy_names", "record", "register_policy", "register_task", "replay", "robot_names",
-    "task_names",
+    "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer", "WorldState", "attach", "check_replay", "effects",
+    "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun", "export_rlds", "export_robomimic",
+    "export_zarr", "make", "make_vec", "observations", "plot", "policy_names", "record", "register_policy", "register_task",
+    "replay", "robot_names", "task_names", "view",
     "__version__",
 ]

@@ -53,12 +53,14 @@ class Geom(IntEnum):
     """mjtGeom, as far as it is used here."""
 
     PLANE = 0
+    HFIELD = 1
     SPHERE = 2
     CAPSULE = 3
     ELLIPSOID = 4
     CYLINDER = 5
     BOX = 6
     MESH = 7
+    SDF = 8
     ARROW = 100
     LINE = 103
 

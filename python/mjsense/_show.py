@@ -7,7 +7,7 @@ import base64
 import inspect
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,18 +75,37 @@ def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
     """The same as HTML, with those images ``[H, W, C]`` that can be displayed."""
     import html  # slow to import, and needed in notebooks only
 
-    columns = ("field", "dtype", "shape", "unit", "frame", "")
-    body = "".join(
-        "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in rows
-    )
-    shown = "".join(
+    fields = grid(("field", "dtype", "shape", "unit", "frame", ""), [_cells(row) for row in rows]) if rows else ""
+    return f"<div><b>{html.escape(head)}</b>{fields}{figures(images)}</div>"
+
+
+def grid(header: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
+    """An HTML table."""
+    import html
+
+    def line_of(tag: str, cells: Sequence[Any]) -> str:
+        return "<tr>" + "".join(f"<{tag} style='text-align:left'>{html.escape(printable(str(cell)))}</{tag}>" for cell in cells) + "</tr>"
+
+    return f"<table>{line_of('th', header)}{''.join(line_of('td', row) for row in rows)}</table>"
+
+
+def figures(images: Mapping[str, np.ndarray]) -> str:
+    """Those images ``[H, W, C]`` that can be displayed, with their names, as HTML."""
+    import html
+
+    return "".join(
         f"<figure style='display:inline-block;margin:4px'><img src='{source}'/><figcaption>{html.escape(name)}</figcaption></figure>"
         for name, image in images.items()
         if (source := thumbnail(image))
     )
-    header = "".join(f"<th style='text-align:left'>{column}</th>" for column in columns)
-    fields = f"<table><tr>{header}</tr>{body}</table>" if rows else ""
-    return f"<div><b>{html.escape(head)}</b>{fields}{shown}</div>"
+
+
+def block(head: str, content: str, folded: Mapping[str, str] | None = None) -> str:
+    """HTML with a bold first line, its content, and parts that open at a click."""
+    import html
+
+    parts = "".join(f"<details><summary>{html.escape(name)}</summary>{inner}</details>" for name, inner in (folded or {}).items() if inner)
+    return f"<div><b>{html.escape(printable(head))}</b>{content}{parts}</div>"
 
 
 def _cells(row: Row) -> tuple[str, ...]:
@@ -98,21 +117,38 @@ def thumbnail(image: np.ndarray) -> str | None:
     if image.ndim != 3 or min(image.shape) < 1:
         return None
     step = -(-max(image.shape[:2]) // _THUMBNAIL)
-    pixels = _coloured(image[::step, ::step])
+    pixels = coloured(image[::step, ::step])
     return None if pixels is None else "data:image/png;base64," + base64.b64encode(_png(pixels)).decode("ascii")
 
 
-def _coloured(image: np.ndarray) -> np.ndarray | None:
-    """uint8 [H, W, 3] image for display: colours unchanged, depth with near surfaces bright, a colour per id, normals in the
-    usual colours."""
+_VIRIDIS = np.array([(68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121), (110, 206, 88),
+                     (181, 222, 43), (253, 231, 37)], np.float64)  # fmt: skip
+"""Samples of the colour map viridis at equal distances."""
+
+
+def colour_map(values: np.ndarray) -> np.ndarray:
+    """Colours float64 [..., 3], 0 to 255, of values from 0 (dark blue) to 1 (yellow)."""
+    at = np.clip(values, 0, 1) * (len(_VIRIDIS) - 1)
+    return np.stack([np.interp(at, np.arange(len(_VIRIDIS)), _VIRIDIS[:, c]) for c in range(3)], axis=-1)
+
+
+def is_image(shape: tuple[int, ...], dtype: Any) -> bool:
+    """Whether rows of this shape can be shown by :func:`coloured`."""
+    kind = np.dtype(dtype).kind
+    return len(shape) == 3 and min(shape) > 0 and (shape[2] in (1, 3) if kind == "f" else shape[2] in (1, 2) if kind == "i" else shape[2] == 3)
+
+
+def coloured(image: np.ndarray) -> np.ndarray | None:
+    """uint8 [H, W, 3] image for display: colours unchanged, depth by a colour map with near surfaces bright, a colour per id,
+    normals in the usual colours. None for other arrays."""
     channels = image.shape[2]
     if image.dtype == np.uint8 and channels == 3:
         return image
     if image.dtype.kind == "f" and channels == 1:
         seen = np.isfinite(image) & (image > 0)
         low, high = (image[seen].min(), image[seen].max()) if seen.any() else (0.0, 1.0)
-        grey = np.where(seen, 255 - 215 * (image - low) / max(high - low, 1e-9), 0)
-        return np.repeat(np.nan_to_num(grey).astype(np.uint8), 3, axis=2)
+        near = 1 - np.where(seen, image - low, 0) / max(high - low, 1e-9)
+        return np.where(seen, colour_map(near[..., 0]), 0).astype(np.uint8)
     if image.dtype.kind == "i" and channels in (1, 2):
         ids = image[..., :1].astype(np.int64)
         return np.where(ids < 0, 0, 64 + ids * np.array([73, 151, 211]) % 192).astype(np.uint8)

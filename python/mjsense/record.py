@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from mjsense import _core
+from mjsense import _core, _show
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
+from mjsense._progress import ProgressLine, interactive, of_recording
 from mjsense.assets import use_installed_meshes
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.simulation import Simulation
@@ -54,6 +55,16 @@ class RecordSummary(RecordProgress):
     published_bytes: int
     path: Path
     """Folder of the episodes."""
+
+    def _repr_html_(self) -> str:
+        """HTML for notebooks: the numbers, and the reasons of failures."""
+        ended = self.succeeded + self.failed
+        facts = [("episodes on disk", f"{self.kept} of {self.wanted}"), ("attempts of this run", f"{ended}, {self.succeeded} successful"),
+                 ("steps", f"{self.steps} in {self.seconds:.1f} s"), ("size", f"{self.published_bytes / 1e6:.1f} MB"), ("folder", self.path)]  # fmt: skip
+        failures = _show.grid(("attempts", "reason of the failure"), [(count, reason) for reason, count in self.failures.items()])
+        times = _show.grid(("activity", "s"), [(name, f"{seconds:.2f}") for name, seconds in self.times.items()])
+        state = " (interrupted)" if self.interrupted else ""
+        return _show.block(f"recording{state}", _show.grid(("", ""), facts) + (failures if self.failures else ""), {"times": times})
 
 
 @checked
@@ -103,7 +114,7 @@ def record(
     molmospaces_depth: bool = False,
     # end of options
     sensors: Iterable[Any] = (),
-    progress: Callable[[RecordProgress], None] | None = None,
+    progress: bool | Callable[[RecordProgress], None] | None = None,
 ) -> RecordSummary:
     """Records episodes of a task as HDF5 and MP4 files in ``out/house_<house>/``.
 
@@ -166,16 +177,22 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        progress: Called with the progress about ten times per second.
+        progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
+            True where stderr is a terminal or a notebook.
     """
     options = dict(locals())
     del options["sensors"], options["progress"]
     options["out"] = str(out)
     objects = parts_of(options, sensors)
-    report = None if progress is None else lambda p: progress(RecordProgress(**p))
+    line = ProgressLine() if progress is True or (progress is None and interactive()) else None
+    show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
+    report = None if show is None else lambda p: show(RecordProgress(**p))
     if meshes == "real":
         use_installed_meshes()
     use_installed_ffmpeg()
     made = _core.record(options, report, objects, Simulation._of)
     made["path"] = Path(made["path"])
-    return RecordSummary(**made)
+    summary = RecordSummary(**made)
+    if line is not None:
+        line.show(of_recording(summary), last=True)
+    return summary

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core, _mujoco
+from mjsense import _core, _mujoco, _show
 from mjsense._arguments import KnownAttributes, checked
 from mjsense.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
@@ -55,6 +55,12 @@ class Entity(KnownAttributes):
 
     def __repr__(self) -> str:
         return f"<entity '{self.name}': {len(self.body_names)} bodies, {len(self.joint_names)} joints>"
+
+    def _repr_html_(self) -> str:
+        """HTML for notebooks: the names of its elements."""
+        kinds = ("body", "joint", "actuator", "geom", "site", "tendon", "camera")
+        rows = [(kind, len(names), ", ".join(names)) for kind in kinds if (names := getattr(self, f"{kind}_names"))]
+        return _show.block(f"entity '{self.name}'", _show.grid(("elements", "count", "names"), rows))
 
 
 @checked
@@ -212,8 +218,11 @@ class Scene(KnownAttributes):
         return [*self._sensors, *self.entities]
 
     def _repr_html_(self) -> str:
-        """HTML for notebooks: the representation of each sensor."""
-        return "".join(sensor._repr_html_() for sensor in self._sensors.values())
+        """HTML for notebooks: the configured sensors, then, folded, the sensors of the models' XML."""
+        configured, found = [], []
+        for sensor in self._sensors.values():
+            (configured if isinstance(sensor, Sensor) or sensor.cfg is not None else found).append(sensor._repr_html_())
+        return _show.block(repr(self), "".join(configured), {f"{len(found)} sensors of the models": "".join(found)} if found else None)
 
     @property
     def sensors(self) -> Mapping[str, Any]:

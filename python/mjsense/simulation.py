@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsense import _core, _mujoco
+from mjsense import _core, _mujoco, _show
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.drawing import DebugShapes
 from mjsense.errors import UnknownNameError
@@ -139,6 +139,16 @@ class Simulation(KnownAttributes):
         if self._core.closed:
             return "<simulation, closed>"
         return f"<simulation: {self.num_worlds} worlds of {self.scene!r}, {self.step_dt:g} s a step>"
+
+    def _repr_html_(self) -> str:
+        """HTML for notebooks: the worlds, user-defined sensors, and the scene, folded."""
+        if self._core.closed:
+            return _show.block(repr(self), "")
+        facts = [("worlds", self.num_worlds), ("control step", f"{self.step_dt:g} s, {self.decimation} substeps"),
+                 ("time of world 0", f"{self.time[0]:g} s"), ("entities", ", ".join(self.scene.entities)), ("seed", self.seed)]  # fmt: skip
+        facts += [(f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {np.count_nonzero(counts)} worlds") for name, counts in self.warning_counts.items()]
+        own = "".join(sensor._repr_html_() for sensor in self._python)
+        return _show.block("simulation", _show.grid(("", ""), facts) + own, {"scene and its sensors": self.scene._repr_html_()})
 
     def __enter__(self) -> Simulation:
         return self

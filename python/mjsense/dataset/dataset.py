@@ -7,6 +7,7 @@ import bisect
 import difflib
 import fnmatch
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense import _show
 from mjsense._arguments import checked
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
@@ -149,6 +151,16 @@ class Dataset:
         lines = [f"Dataset({str(self.root)!r}): {len(self.episodes)} episodes, {len(self)} observations"]
         lines += [f"  {count} x {outcome}" for outcome, count in sorted(outcomes.items(), key=lambda item: -item[1])]
         return "\n".join(lines + [f"  {stream}" for stream in self.streams.values()])
+
+    def _repr_html_(self) -> str:
+        """HTML for notebooks: the outcomes, images of the first episode, and all streams, folded."""
+        outcomes = Counter(episode.outcome for episode in self.episodes)
+        rows = [(count, outcome) for outcome, count in outcomes.most_common()]
+        table = _show.grid(("episodes", "outcome"), rows)
+        streams = [(s.name, s.dtype, list(s.shape), s.unit, s.frame, s.description) for s in self.streams.values()]
+        folded = {f"{len(streams)} streams": _show.grid(("stream", "dtype", "shape", "unit", "frame", ""), streams)}
+        first = self.episodes[0]._film() if self.episodes else ""
+        return _show.block(f"data set {self.root}: {len(self.episodes)} episodes, {len(self)} observations", table + first, folded)
 
     def index_of(self, episode: int, frame: int = 0) -> int:
         """Number of an observation: ``frame`` of the episode at position ``episode`` in the recording."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from mjsense import _show
 from mjsense._arguments import checked
 from mjsense.dataset import json_rows, playback
 from mjsense.dataset.cache import Cache
@@ -177,6 +178,23 @@ class Episode:
 
     def __repr__(self) -> str:
         return f"Episode({self.index}, {self.task!r}, {self.length} observations, {self.outcome!r})"
+
+    def _repr_html_(self) -> str:
+        """HTML for notebooks: the episode's attributes, and images of its start, middle and end."""
+        facts = [("outcome", self.outcome), ("observations", f"{self.length}, {float(self.length / self.fps):.2f} s"), ("seed", self.seed), ("file", f"{self.path}, {self.trajectory}")]
+        return _show.block(f"episode {self.index}: {self.task}", _show.grid(("", ""), facts) + self._film())
+
+    def _film(self) -> str:
+        """Images of each camera at the start, the middle and the end, as HTML; empty where videos cannot be read."""
+        strips = []
+        for name in (name for name, stream in self.streams.items() if stream.kind == "video"):
+            video = self.video(name)
+            try:
+                images = {f"{name.removeprefix(VIDEOS)}, step {t}": video[t].reshape(*video.shape[1:3], -1) for t in (0, self.length // 2, self.length - 1)}
+            except (OSError, RuntimeError):
+                continue
+            strips.append(f"<div>{_show.figures(images)}</div>")
+        return "".join(strips)
 
     def __contains__(self, name: str) -> bool:
         return name in self.streams or any(stream.startswith(f"{name}/") for stream in self.streams)

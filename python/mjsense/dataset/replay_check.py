@@ -12,6 +12,7 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
+from mjsense._progress import tracked
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.playback import STATE, Stepper, inputs_of, model_of
 
@@ -169,12 +170,14 @@ def check_episode(episode: Episode) -> EpisodeCheck:
 
 
 @checked
-def check_replay(root: str | Path | Dataset, *, episodes: Sequence[int] | None = None) -> ReplayReport:
+def check_replay(root: str | Path | Dataset, *, episodes: Sequence[int] | None = None, progress: bool | None = None) -> ReplayReport:
     """Replays episodes in plain MuJoCo, stepwise from each recorded state and open loop from the first one, and compares all states bit
     for bit with the recorded ones. The report names the first deviation of each by step, part of the state, and joint, body or actuator.
 
     Args:
         root: Folder of a recording, or a :class:`Dataset`.
         episodes: Positions of episodes in the recording; by default all.
+        progress: Show the progress on stderr; by default where it is a terminal or a notebook.
     """
-    return ReplayReport([check_episode(episode) for episode in _dataset(root, episodes).episodes])
+    chosen = _dataset(root, episodes).episodes
+    return ReplayReport([check_episode(episode) for episode in tracked(chosen, len(chosen), "episodes", enabled=progress)])

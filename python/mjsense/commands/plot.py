@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjsense plot``"""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLES = [
+    ("mjsense plot data --stream tcp_pose qpos/arm", "Draw two streams of the first episode."),
+    ("mjsense plot data --stream obj_start wrist_camera --episode 0 1 --out two.png", "Two episodes, with a film strip of a camera."),
+    ("mjsense plot pick --stream tcp_pose --seconds 5", "Play a task for five seconds."),
+]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", help="A recording, or a task, a scene or an MJCF that is stepped: its name or path.")
+    parser.add_argument("--stream", nargs="+", required=True, metavar="NAME", help="Streams by name, last part of a name, or pattern.")
+    parser.add_argument("--episode", type=int, nargs="+", default=[0], metavar="I", help="Positions of episodes in the recording; by default the first.")
+    parser.add_argument("--world", type=int, default=0, metavar="K", help="World to draw, of live worlds.")
+    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="How long live worlds are stepped, s.")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="Seed of live worlds.")
+    parser.add_argument("--robot", help="Name or .toml of a live task's robot; by default the task's.")
+    parser.add_argument("--scene", help="Name or file of a live task's scene; by default the task's.")
+    parser.add_argument("--out", default="plot.png", metavar="FILE", help="File to write: PNG, PDF or SVG; by default plot.png.")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from mjsense.plot import plot
+    from mjsense.view.open import options_of
+
+    options = options_of({"robot": arguments.robot, "scene": arguments.scene})
+    plot(arguments.what, arguments.stream, episodes=arguments.episode, world=arguments.world, seconds=arguments.seconds, seed=arguments.seed,
+         out=arguments.out, **options)  # fmt: skip
+    print(f"Wrote {arguments.out}.")
+    return 0

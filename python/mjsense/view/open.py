@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Finds out what a word of the user means: a recording, an MJCF, a scene or a task."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from mjsense.configs import SceneCfg
+from mjsense.dataset import Dataset
+from mjsense.env import TaskEnv
+from mjsense.errors import UnknownNameError
+from mjsense.scene import Scene
+from mjsense.simulation import Simulation
+from mjsense.task import task_names
+from mjsense.vector import TaskVectorEnv, make_vec
+from mjsense.view.source import LiveSource, TaskSource
+
+_IMAGE = {"width": 320, "height": 240, "depth": True, "segmentation": True}
+_SUBSTEPS = 1 / 60  # s, about: period of a model that is viewed alone
+
+
+def is_recording(path: str | Path) -> bool:
+    """Whether this is an existing file or folder of a recording."""
+    path = Path(path)
+    return path.is_dir() or path.suffix in (".h5", ".hdf5")
+
+
+def options_of(given: dict[str, Any]) -> dict[str, Any]:
+    """The options that were given."""
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> LiveSource | Dataset:
+    """What a viewer can show.
+
+    Args:
+        thing: A simulation, an environment, a data set, the path of a recording or an MJCF, or the name or file of a scene or a task.
+        options: Options of :func:`mjsense.make_vec`, for tasks and scenes.
+    """
+    if isinstance(thing, (LiveSource, Dataset)):
+        return thing
+    if isinstance(thing, Simulation):
+        return LiveSource(thing)
+    if isinstance(thing, TaskEnv):
+        thing = thing.worlds
+    if isinstance(thing, TaskVectorEnv):
+        return TaskSource(thing)
+    if isinstance(thing, Path) or (isinstance(thing, str) and Path(thing).exists() and thing not in task_names()):
+        path = Path(thing)
+        if is_recording(path):
+            return Dataset(path)
+        if path.suffix in (".xml", ".mjcf"):
+            return _model(path, worlds, seed)
+    options = {"policy": "planner", "render_mode": "rgb_array", "num_envs": worlds, "seed": seed, **_IMAGE, **options}
+    if not isinstance(thing, Path) and (not isinstance(thing, str) or thing in task_names()):
+        return TaskSource(make_vec(thing, **options), str(thing))
+    try:
+        return TaskSource(make_vec(options.pop("task", "pick"), scene=thing, **options), str(thing))
+    except UnknownNameError as error:
+        raise UnknownNameError(f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}") from None
+
+
+def _model(path: Path, worlds: int, seed: int) -> LiveSource:
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist")
+    scene = Scene(SceneCfg(base=path))
+    timestep = float(scene.model.opt.timestep)
+    source = LiveSource(Simulation(scene, worlds, decimation=max(1, round(_SUBSTEPS / timestep)), seed=seed), path.name)
+    source.reset(seed)
+    return source

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Live worlds as the viewer reads them: a simulation, or a task that is played in one."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mjsense import _mujoco
+from mjsense._show import is_image
+from mjsense.drawing import DebugShapes
+from mjsense.simulation import Simulation
+from mjsense.vector import TaskVectorEnv
+from mjsense.view.camera import View, first_view
+from mjsense.view.curves import MAX_CURVES, StreamInfo
+from mjsense.view.poses import POSE, PoseStream
+
+_CONTACTS = "contacts"
+_CONTACT_COLOUR = (0.9, 0.3, 0.1, 1.0)
+
+
+class Control(NamedTuple):
+    """A number that the user sets with a slider."""
+
+    name: str
+    low: float
+    high: float
+
+
+class LiveSource:
+    """A simulation. ``Viewer`` calls all methods from one thread."""
+
+    def __init__(self, sim: Simulation, title: str = "") -> None:
+        self.sim = sim
+        self.title = title or "mjsense"
+        self.num_worlds = sim.num_worlds
+        self.period = sim.step_dt
+        """Time between two steps, s."""
+        self.can_seed = True
+        self.policy: bool | None = None
+        """Whether the policy acts; None: there is no policy."""
+
+    # ---------------------------------------------------------------------------------------------------------- stepping
+
+    def step(self) -> bool:
+        """Advances all worlds by one control step. Returns whether the models of worlds may have changed."""
+        self.sim.step()
+        return False
+
+    def reset(self, seed: int) -> None:
+        """Starts a new episode in all worlds."""
+        model = self.sim.model
+        keys = [model.key(i).name for i in range(model.nkey)]
+        key = "init_state" if "init_state" in keys else 0 if keys else None
+        self.sim.reset(seed=seed, key=key)
+
+    def time(self, world: int) -> float:
+        """Simulation time of a world, s."""
+        return float(self.sim.time[world])
+
+    # ----------------------------------------------------------------------------------------------------------- reading
+
+    def model(self, world: int) -> Any:
+        """The model with the values of one world."""
+        return self.sim.model_of(world)
+
+    def poses(self, world: int) -> tuple[np.ndarray, np.ndarray]:
+        """Positions [nbody, 3] and orientations [nbody, 4] of the bodies."""
+        data = self.sim.data
+        return data.xpos[world], data.xquat[world]
+
+    def streams(self) -> dict[str, StreamInfo]:
+        """Streams that can be drawn as curves, by name."""
+        found = {name: StreamInfo(spec.unit, rows[0].size) for name, (spec, rows) in self._sensor_rows().items()}
+        for name, unit in (("qpos", "m, rad"), ("qvel", "m/s, rad/s"), ("ctrl", "")):
+            found.setdefault(name, StreamInfo(unit, getattr(self.sim, name).shape[1]))
+        return {name: info for name, info in found.items() if 0 < info.width <= MAX_CURVES}
+
+    def value(self, name: str, world: int) -> np.ndarray:
+        """Current values of a stream, float64 [width]."""
+        rows = self._row(name)
+        return np.asarray(getattr(self.sim, name) if rows is None else rows, np.float64)[world].reshape(-1)
+
+    def pictures(self) -> list[str]:
+        """Names of images."""
+        found = []
+        for name, sensor in self.sim.scene.sensors.items():
+            if getattr(sensor, "kind", "") == "camera":
+                found += [f"{name}/{field}" for field, spec in sensor.specs.items() if is_image(spec.shape, spec.dtype)]
+        return found
+
+    def picture(self, name: str, world: int) -> np.ndarray:
+        """An image [H, W, C]. Only images that are shown are read, and with them computed."""
+        sensor, _, field = name.rpartition("/")
+        return self.sim.scene[sensor].fields[field][world]
+
+    def _row(self, name: str) -> np.ndarray | None:
+        sensors = self.sim.scene.sensors
+        if name in sensors:
+            data = sensors[name].data
+            return data if isinstance(data, np.ndarray) else None
+        sensor, _, field = name.rpartition("/")
+        return sensors[sensor].fields[field] if sensor in sensors else None
+
+    def _sensor_rows(self) -> dict[str, tuple[Any, np.ndarray]]:
+        """Numeric fields of the scene's sensors: name -> (spec, rows). Reads no images."""
+        found = {}
+        for name, sensor in self.sim.scene.sensors.items():
+            specs = getattr(sensor, "specs", None)
+            if specs is None or getattr(sensor, "kind", "") == "camera":
+                continue
+            for field, spec in specs.items():
+                if np.dtype(spec.dtype).kind in "fiub":
+                    found[f"{name}/{field}" if field else name] = spec, np.empty((1, *spec.shape), spec.dtype)
+        return found
+
+    # ----------------------------------------------------------------------------------------------------------- drawing
+
+    def shape_names(self) -> list[str]:
+        """Names of everything that can be drawn: sensors with shapes, streams of poses, and contacts."""
+        found = []
+        for name in self.sim.scene.sensors:
+            try:
+                self.sim.debug_shapes(0, [name])
+            except (ValueError, TypeError, RuntimeError):
+                continue  # this sensor never has anything to draw
+            found.append(name)
+        return [*found, *self._pose_rows(), _CONTACTS]
+
+    def shapes(self, world: int, names: list[str]) -> DebugShapes:
+        """The shapes of one world."""
+        poses = self._pose_rows()
+        sensors = [name for name in names if name not in poses and name != _CONTACTS]
+        shapes = self.sim.debug_shapes(world, sensors) if sensors else DebugShapes(world, float(self.sim.model.stat.meansize))
+        if poses:
+            model, data = self.sim.model, self.sim.data
+            for name in (name for name in names if name in poses):
+                frame, rows = poses[name]
+                PoseStream(name, frame).draw(shapes, rows[world], model, data.xpos[world], data.xmat[world])
+        if _CONTACTS in names:
+            for contact in self._contacts(world):
+                shapes.add_sphere(contact[:3], 0.05 * shapes.meansize, _CONTACT_COLOUR)
+                shapes.add_arrow(contact[:3], contact[:3] + 0.5 * shapes.meansize * contact[3:], _CONTACT_COLOUR, 0.02 * shapes.meansize)
+        return shapes
+
+    def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
+        return {}
+
+    def _contacts(self, world: int) -> np.ndarray:
+        """Point and normal of each contact, float64 [n, 6]."""
+        contacts = self.sim.env.mj_datas[world].contact
+        return np.concatenate([np.asarray(contacts.pos).reshape(-1, 3), np.asarray(contacts.frame).reshape(-1, 9)[:, :3]], 1)
+
+    # ----------------------------------------------------------------------------------------------------------- control
+
+    def controls(self) -> list[Control]:
+        """Controls of the actuators."""
+        model = self.sim.model
+        found = []
+        for i in range(model.nu):
+            low, high = model.actuator_ctrlrange[i] if model.actuator_ctrllimited[i] else (-1.0, 1.0)
+            found.append(Control(model.actuator(i).name or f"actuator {i}", float(low), float(high)))
+        return found
+
+    def control(self, world: int) -> np.ndarray:
+        """Current values of the controls."""
+        return self.sim.ctrl[world]
+
+    def set_control(self, world: int, index: int, value: float) -> None:
+        self.sim.ctrl[world, index] = value
+
+    def joints(self) -> list[Control]:
+        """Hinges and slides, whose positions can be set."""
+        model = self.sim.model
+        found = []
+        for joint in self._joint_ids():
+            hinge = int(model.jnt_type[joint]) == _mujoco.Joint.HINGE
+            low, high = model.jnt_range[joint] if model.jnt_limited[joint] else ((-np.pi, np.pi) if hinge else (-1.0, 1.0))
+            found.append(Control(model.joint(joint).name or f"joint {joint}", float(low), float(high)))
+        return found
+
+    def joint_positions(self, world: int) -> np.ndarray:
+        return self.sim.qpos[world, self.sim.model.jnt_qposadr[self._joint_ids()]]
+
+    def set_joint(self, world: int, index: int, value: float) -> None:
+        """Moves a joint without physics."""
+        qpos = self.sim.qpos[world].copy()
+        qpos[self.sim.model.jnt_qposadr[self._joint_ids()[index]]] = value
+        self.sim.set_state([world], qpos=qpos)
+
+    def _joint_ids(self) -> np.ndarray:
+        return np.flatnonzero(np.isin(self.sim.model.jnt_type, (_mujoco.Joint.HINGE, _mujoco.Joint.SLIDE)))
+
+    def camera(self, world: int) -> View:
+        """The first view."""
+        return first_view(self.sim.model, self.sim.data.xpos[world], self.sim.data.xmat[world])
+
+
+class TaskSource(LiveSource):
+    """A task: worlds that run episodes, with the task's policy or with actions that the user sets."""
+
+    def __init__(self, env: TaskVectorEnv, title: str = "") -> None:
+        super().__init__(env.sim, title)
+        self._env = env
+        env.reset(seed=env._seed)
+        self._action = self._held()
+        try:
+            env.expert_action()
+            self.policy = True
+        except ValueError:  # it has no policy
+            self.policy = None
+
+    def step(self) -> bool:
+        env = self._env
+        begins = bool(env._ended.any())
+        done = None
+        if self.policy:
+            self._action = env.expert_action().astype(np.float64)
+            done = env.expert_done
+        env.step(self._action, done)
+        if begins:
+            self._action = self._held()
+        return begins
+
+    def reset(self, seed: int) -> None:
+        self._env.reset(seed=seed)
+        self._action = self._held()
+
+    def _held(self) -> np.ndarray:
+        """Actions that keep the worlds' present joint positions, as far as the observation tells them."""
+        env = self._env
+        space: Any = env.action_space
+        action = np.clip(np.zeros(space.shape), space.low, space.high)
+        for group, columns in env.action_groups.items():
+            for name in (f"actions/joint_pos/{group}", f"qpos/{group}"):
+                rows = env.rows.get(name)
+                if rows is not None and rows.shape[1:] == (columns.stop - columns.start,):
+                    action[:, columns] = rows
+                    break
+        return action
+
+    def _sensor_rows(self) -> dict[str, tuple[Any, np.ndarray]]:
+        own = {name: (self._env.specs[name], rows) for name, rows in self._env.rows.items() if rows.dtype.kind in "fiub" and rows.ndim < 4}
+        return {**own, **super()._sensor_rows()}
+
+    def _row(self, name: str) -> np.ndarray | None:
+        return self._env.rows[name] if name in self._env.rows else super()._row(name)
+
+    def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
+        return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()
+                if spec.unit == POSE and PoseStream.can_draw(spec.frame)}  # fmt: skip
+
+    def controls(self) -> list[Control]:
+        space: Any = self._env.single_action_space
+        low, high = (np.nan_to_num(limit.astype(np.float64), posinf=1.0, neginf=-1.0) for limit in (space.low, space.high))
+        return [Control(f"{group} {i - columns.start}", float(low[i]), float(high[i]))
+                for group, columns in self._env.action_groups.items() for i in range(columns.start, columns.stop)]  # fmt: skip
+
+    def control(self, world: int) -> np.ndarray:
+        return self._action[world]
+
+    def set_control(self, world: int, index: int, value: float) -> None:
+        self._action[world, index] = value
+
+    def joints(self) -> list[Control]:
+        return []  # the task writes the state

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bodies of one world in the browser: meshes sent once, and poses sent when they change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mjsense.view import surfaces
+
+VISIBLE_GROUPS = (0, 1, 2)
+"""Geom groups that MuJoCo shows by default."""
+MIN_REACH = 10.0
+"""Half side of planes without an end, at least. [m]"""
+_DIRECTIONAL = 1  # mjtLightType
+_MIN_CHANGE = 1e-6  # m, or of a quaternion's components: smaller changes of a pose are not sent
+
+
+def node(model: Any, kind: str, index: int) -> str:
+    """Name of an element without slashes, which separate levels of the browser's scene tree."""
+    name = getattr(model, kind)(index).name
+    return name.replace("/", "|") if name else f"{kind}_{index}"
+
+
+class Stage:
+    """Draws a model into a viser server."""
+
+    def __init__(self, server: Any) -> None:
+        self._server, self._model = server, None
+        self._frames: dict[int, Any] = {}
+        self._geoms: dict[int, tuple[Any, tuple[Any, ...]]] = {}
+        self._lights: list[Any] = []
+        self._light_key: bytes = b""
+        self._sent = np.zeros((0, 7))
+        self.groups: set[int] = set(VISIBLE_GROUPS)
+        """Geom groups that are shown."""
+
+    def set_model(self, model: Any) -> None:
+        """Shows a model with its sizes, colours and lights. Unchanged geoms are not sent again."""
+        with self._server.atomic():
+            if self._model is None or self._structure(model) != self._structure(self._model):
+                self._clear()
+                self._model = model
+                self._sent = np.full((model.nbody, 7), np.nan)
+            self._model = model
+            reach = max(MIN_REACH, 2 * float(model.stat.extent))
+            for geom in range(model.ngeom):
+                self._set_geom(model, geom, reach)
+            self._set_lights(model)
+
+    def set_poses(self, positions: np.ndarray, quaternions: np.ndarray) -> int:
+        """Moves the bodies. Returns how many poses were sent.
+
+        Args:
+            positions: float [nbody, 3] m, world frame.
+            quaternions: float [nbody, 4], wxyz.
+        """
+        poses = np.concatenate([positions, quaternions], axis=1)
+        changed = np.flatnonzero(~(np.abs(poses - self._sent) < _MIN_CHANGE).all(1))
+        count = 0
+        with self._server.atomic():
+            for body in changed.tolist():
+                frame = self._frames.get(body)
+                if frame is not None:
+                    frame.position, frame.wxyz = poses[body, :3], poses[body, 3:]
+                    count += 1
+        self._sent[changed] = poses[changed]
+        return count
+
+    def show_groups(self, groups: set[int]) -> None:
+        """Shows the geoms of these groups, and hides the others."""
+        self.groups = groups
+        if self._model is not None:
+            self.set_model(self._model)
+
+    def _structure(self, model: Any) -> tuple[Any, ...]:
+        return model.nbody, model.ngeom, model.nlight, model.geom_bodyid.tobytes(), bytes(model.names)
+
+    def _clear(self) -> None:
+        for frame in self._frames.values():
+            frame.remove()
+        for light in self._lights:
+            light.remove()
+        self._frames, self._geoms, self._lights, self._light_key = {}, {}, [], b""
+
+    def _frame(self, model: Any, body: int) -> str:
+        name = f"/bodies/{node(model, 'body', body)}"
+        if body not in self._frames:
+            self._frames[body] = self._server.scene.add_frame(name, show_axes=False)
+        return name
+
+    def _set_geom(self, model: Any, geom: int, reach: float) -> None:
+        pose = model.geom_pos[geom], model.geom_quat[geom]
+        shown = int(model.geom_group[geom]) in self.groups
+        old, old_key = self._geoms.get(geom, (None, None))
+        key = surfaces.key_of(model, geom) if shown else ()
+        if key == old_key:
+            if old is not None and not (np.allclose(old.position, pose[0]) and np.allclose(old.wxyz, pose[1])):
+                old.position, old.wxyz = pose
+            return
+        surface = surfaces.of_geom(model, geom, reach) if shown else None
+        if surface is None:
+            if old is not None:
+                old.remove()
+            self._geoms[geom] = None, key
+            return
+        name = f"{self._frame(model, int(model.geom_bodyid[geom]))}/{node(model, 'geom', geom)}"
+        scene = self._server.scene  # a node of the same name is replaced
+        if surface.glb is not None:
+            handle = scene.add_glb(name, surface.glb, position=pose[0], wxyz=pose[1])
+        else:
+            rgb, alpha = (np.clip(surface.rgba[:3], 0, 1) * 255).round().astype(int), float(surface.rgba[3])
+            handle = scene.add_mesh_simple(name, surface.shape.vertices, surface.shape.faces, color=tuple(rgb.tolist()),
+                                           opacity=alpha if alpha < 1 else None, position=pose[0], wxyz=pose[1])  # fmt: skip
+        self._geoms[geom] = handle, key
+
+    def _set_lights(self, model: Any) -> None:
+        names = ("active", "type", "pos", "dir", "diffuse", "castshadow", "bodyid")
+        key = b"".join(getattr(model, f"light_{name}").tobytes() for name in names) + model.vis.headlight.diffuse.tobytes()
+        if key == self._light_key:
+            return
+        self._light_key = key
+        for light in self._lights:
+            light.remove()
+        self._lights = []
+        scene, head = self._server.scene, model.vis.headlight
+        ambient = np.zeros(3)
+        if int(head.active):
+            ambient += np.array(head.ambient)
+            # The light at the camera becomes one from all sides that is brighter from above.
+            bright = _light(np.array(head.diffuse))
+            ground = tuple(component // 2 for component in bright["color"])
+            self._lights.append(scene.add_light_hemisphere("/lights/head", sky_color=bright["color"], ground_color=ground, intensity=bright["intensity"]))
+        for light in np.flatnonzero(model.light_active).tolist():
+            ambient += model.light_ambient[light]
+            direction, shadow = model.light_dir[light], bool(model.light_castshadow[light])
+            name, bright = f"/lights/{node(model, 'light', light)}", _light(model.light_diffuse[light])
+            if int(model.light_type[light]) == _DIRECTIONAL:
+                made = scene.add_light_directional(name, **bright, cast_shadow=shadow, position=tuple(-10 * direction))
+            else:
+                parent = self._frame(model, int(model.light_bodyid[light]))
+                angle = min(np.radians(float(model.light_cutoff[light])), np.pi / 2)
+                made = scene.add_light_spot(f"{parent}{name}", **bright, cast_shadow=shadow, direction=tuple(direction), decay=0.0,
+                                            angle=angle, penumbra=0.5, position=model.light_pos[light])  # fmt: skip
+            self._lights.append(made)
+        self._lights.append(scene.add_light_ambient("/lights/ambient", **_light(ambient)))
+
+
+def _light(colour: np.ndarray) -> dict[str, Any]:
+    """Colour and intensity of a light, as viser names them. The browser's unit is pi times MuJoCo's."""
+    strength = float(colour.max())
+    rgb = (255 * colour / strength).round().astype(int).tolist() if strength > 0 else [255] * 3
+    return {"color": tuple(rgb), "intensity": np.pi * strength}

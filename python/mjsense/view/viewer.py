@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer: a server, the scene of one world, and panels next to it."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+import warnings
+import webbrowser
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from mjsense.view.layer import ShapeLayer
+from mjsense.view.stage import Stage
+
+_FRAME = 1 / 30  # s between two frames
+_IDLE = 0.1  # s between two looks for a browser or for events while nothing moves
+
+
+def import_viser() -> Any:
+    """viser, or an error that says how to install it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import viser  # pyright: ignore[reportMissingImports]  # optional
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"The viewer needs viser: pip install 'mjsense[view]' ({error})", name=error.name) from error
+    return viser
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the messages that viser prints."""
+    import rich  # pyright: ignore[reportMissingImports]  # a dependency of viser
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        console.quiet = before
+
+
+def serve(title: str, host: str, port: int) -> Any:
+    """A viser server without its own lights. It prints nothing."""
+    viser = import_viser()
+    with _quiet():
+        server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+    server.request_share_url = lambda *_: None  # a page may not ask for a public address
+    server.scene.set_up_direction("+z")
+    server.scene.configure_default_lights(False)
+    server.scene.configure_environment_map(None)
+    return server
+
+
+def stop(server: Any) -> None:
+    """Stops a server without a message."""
+    with _quiet():
+        server.stop()
+
+
+class Viewer:
+    """A web page that shows one world at a time. Base class of the viewers of live worlds and of recordings.
+
+    All work is done in the thread that calls :meth:`update` or :meth:`run`: the browser's events wait until then.
+    """
+
+    def __init__(self, title: str, host: str, port: int) -> None:
+        self._server = serve(title, host, port)
+        self.port: int = self._server.get_port()
+        """The port of the server."""
+        self.url: str = f"http://{'127.0.0.1' if host in ('', '0.0.0.0') else host}:{self.port}"
+        """The address of the page."""
+        if self.port != port:
+            print(f"Port {port} is taken: the viewer uses port {self.port}.", flush=True)
+        self._server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+        self._stage, self._layer = Stage(self._server), ShapeLayer(self._server)
+        self._events: dict[int, Callable[[], None]] = {}
+        self._lock = threading.Lock()
+        self._closed = False
+
+    def _later(self, handle: Any, action: Callable[[], None]) -> None:
+        """Runs ``action`` in the viewer's thread after the user has changed or clicked a control; of several changes the last counts."""
+
+        def note(event: Any) -> None:
+            if event.client is not None:  # None: the program has set the value
+                with self._lock:
+                    self._events[id(handle)] = action
+
+        (handle.on_click if hasattr(handle, "on_click") else handle.on_update)(note)
+
+    def _add_groups(self, gui: Any) -> None:
+        boxes = [gui.add_checkbox(f"Geom group {k}", initial_value=k in self._stage.groups) for k in range(6)]
+        for box in boxes:
+            self._later(box, lambda: self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}))
+
+    def _look(self, position: np.ndarray, target: np.ndarray, fov: float) -> None:
+        camera = self._server.initial_camera
+        camera.position, camera.look_at, camera.fov = position, target, fov
+
+    def _handle_events(self) -> bool:
+        with self._lock:
+            events, self._events = self._events, {}
+        for action in events.values():
+            action()
+        return bool(events)
+
+    @property
+    def watched(self) -> bool:
+        """Whether a browser shows the page."""
+        return bool(self._server.get_clients())
+
+    def update(self) -> None:
+        """Handles the user's input and shows the present state. Call it after each step of a loop of your own."""
+        self._handle_events()
+        self._show()
+
+    def open(self, open_browser: bool = True) -> None:
+        """Opens the page in the default browser. Without one, the address is to be opened by hand."""
+        if open_browser and not webbrowser.open(self.url):
+            print(f"There is no browser: open {self.url} yourself.", flush=True)
+
+    def run(self, open_browser: bool = True) -> None:
+        """Shows the worlds until Ctrl-C or :meth:`close`."""
+        print(f"Viewer: {self.url} (Ctrl-C ends it)", flush=True)
+        self.open(open_browser)
+        try:
+            while not self._closed:
+                began = time.perf_counter()
+                busy = self._handle_events()
+                if self._closed:
+                    break
+                busy |= self._advance(began) if self.watched else False
+                rest = (_FRAME if busy else _IDLE) - (time.perf_counter() - began)
+                if not busy:
+                    self._wait(began + _IDLE)
+                elif rest > 0:
+                    time.sleep(rest)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.close()
+
+    def _wait(self, until: float) -> None:
+        """Returns at the next event, or at this time."""
+        while time.perf_counter() < until and not self._events and not self._closed:
+            time.sleep(0.005)
+
+    def close(self) -> None:
+        """Stops the server."""
+        if not self._closed:
+            self._closed = True
+            stop(self._server)
+
+    def __enter__(self) -> Viewer:
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        self.close()
+
+    def _advance(self, now: float) -> bool:
+        """Moves on to this time of ``perf_counter``. Returns whether there is something new to see soon."""
+        raise NotImplementedError
+
+    def _show(self) -> None:
+        raise NotImplementedError

@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer: its triangles, its server, and its page in headless Chromium."""
+
+import importlib.util
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import devtools
+import mujoco
+import numpy as np
+import pytest
+from scenes import BALL
+
+import mjsense as mjs
+from mjsense.view import geometry, surfaces
+from mjsense.view.poses import PoseStream
+
+needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
+needs_browser = pytest.mark.skipif(devtools.chromium() is None, reason="there is no Chromium")
+ROBOTS = ("quadruped", "bimanual_yam/stand", "floating_rum/rum", "franka/fr3", "franka_hand/hand", "i2rt_yam/yam", "mobile_franka/base", "rby1/rby1")
+
+
+@pytest.fixture
+def port():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+@pytest.fixture
+def live(port):
+    """A viewer of a simulation with two worlds, which the test updates."""
+    pytest.importorskip("viser")
+    scene = mjs.Scene(mjs.SceneCfg(entities={"ball": mjs.EntityCfg(model=BALL)}, terrain=mjs.TerrainCfg(), sensors=(
+        mjs.CameraSensorCfg(name="eye", width=32, height=24, data_types=("rgb", "depth")),
+        mjs.RayCastSensorCfg(name="scan", frame=mjs.ObjRef("body", "ball", "ball")))))  # fmt: skip
+    sim = mjs.Simulation(scene, num_worlds=2)
+    with mjs.view(sim, port=port, block=False, open_browser=False) as viewer:
+        viewer.sim = sim
+        yield viewer
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    out = tmp_path_factory.mktemp("pick")
+    mjs.record("pick", out=out, horizon=30, episodes=2, worlds=2, keep_failures=True, width=48, height=32, depth=True)
+    return out
+
+
+# ------------------------------------------------------------------------------------------------------------------ triangles
+
+
+def shape_of(kind, size):
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><geom type='{kind}' size='{size}'/></worldbody></mujoco>")
+    return geometry.of_geom(model, 0, 1.0)
+
+
+@pytest.mark.parametrize("kind, size, volume", [
+    ("sphere", ".2", 4 / 3 * np.pi * 0.2**3), ("ellipsoid", ".1 .2 .3", 4 / 3 * np.pi * 0.006), ("box", ".1 .2 .3", 8 * 0.006),
+    ("cylinder", ".1 .3", np.pi * 0.01 * 0.6), ("capsule", ".1 .3", np.pi * 0.01 * 0.6 + 4 / 3 * np.pi * 0.001)])  # fmt: skip
+def test_primitives_are_closed_and_face_outwards(kind, size, volume):
+    shape = shape_of(kind, size)
+    a, b, c = (shape.vertices[shape.faces[:, k]].astype(np.float64) for k in range(3))
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=0.015)
+    across = np.cross(b - a, c - a)
+    assert (np.einsum("ij,ij->i", across, shape.normals[shape.faces].mean(1)) > -1e-9).all()
+    assert shape.uv.min() >= -1e-6 and shape.uv.max() <= 1 + 1e-6
+    welded = geometry.welded(shape)
+    assert len(welded.vertices) <= len(shape.vertices) and (welded.vertices[welded.faces].round(4) == shape.vertices[shape.faces].round(4)).all()
+
+
+def test_height_fields_and_meshes_are_those_of_the_model():
+    scene = mjs.Scene(mjs.SceneCfg(terrain=mjs.TerrainCfg(terrain_type="generator", levels=2)))
+    model = scene.model
+    field = next(g for g in range(model.ngeom) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_HFIELD)
+    shape = geometry.of_geom(model, field, 1.0)
+    rx, ry, top, base = model.hfield_size[model.geom_dataid[field]]
+    assert np.abs(shape.vertices).max(0)[:2] == pytest.approx((rx, ry)) and shape.vertices[:, 2].min() == pytest.approx(-base)
+    assert shape.vertices[:, 2].max() == pytest.approx(model.hfield_data.max() * top)
+    model = mujoco.MjModel.from_xml_string("""<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>
+        <worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>""")
+    shape = geometry.of_geom(model, 0, 1.0)
+    assert len(shape.faces) == 4 and set(map(tuple, shape.vertices)) == set(map(tuple, model.mesh_vert))
+
+
+def test_textures_of_boxes():
+    """A cube texture with one colour for each face: every triangle of a box reads the texels of its face."""
+    faces = {"right": (1, 0, 0), "left": (-1, 0, 0), "up": (0, 1, 0), "down": (0, -1, 0), "front": (0, 0, 1), "back": (0, 0, -1)}
+    model = mujoco.MjModel.from_xml_string("""<mujoco><asset><texture name="t" type="cube" builtin="flat" width="16" height="16" mark="edge"
+        markrgb="1 1 1" rgb1="1 0 0" rgb2="0 0 1"/><material name="m" texture="t"/></asset>
+        <worldbody><geom type="box" size=".1 .2 .3" material="m"/></worldbody></mujoco>""")
+    surface = surfaces.of_geom(model, 0, 1.0)
+    assert surface.glb.startswith(b"glTF") and surface.texture.shape == (96, 16, 3)
+    rows = (surface.shape.uv[surface.shape.faces][..., 1].mean(1) * 6).astype(int)
+    normals = surface.shape.normals[surface.shape.faces].mean(1)
+    expected = [list(faces.values()).index(tuple(map(int, n.round()))) for n in normals]
+    assert rows.tolist() == expected
+
+
+def test_poses_in_frames_of_bodies():
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='b' pos='1 2 3' euler='0 0 90'><geom size='.1'/></body></worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    shapes = mjs.DebugShapes()
+    PoseStream("p", "body b").draw(shapes, np.array([1.0, 0, 0, 1, 0, 0, 0]), model, data.xpos, data.xmat)
+    np.testing.assert_allclose(shapes.positions[0], (1, 3, 3), atol=1e-9)
+    np.testing.assert_allclose(shapes.vectors[0] / np.linalg.norm(shapes.vectors[0]), (0, 1, 0), atol=1e-9)
+    PoseStream("p", "world").draw(shapes, np.full((2, 7), np.nan), model, data.xpos, data.xmat)
+    assert len(shapes) == 3
+
+
+# --------------------------------------------------------------------------------------------------------------------- server
+
+
+def messages(viewer):
+    return dict(viewer._server._websock_server._broadcast_buffer.message_from_id)
+
+
+@needs_viser
+def test_only_what_has_changed_is_sent(live):
+    before = {m.name for m in messages(live).values() if type(m).__name__ in ("MeshMessage", "GlbMessage")}
+    assert any("ball" in name for name in before)
+    assert live._stage.set_poses(*live._source.poses(0)) == 0
+    live.sim.step()
+    assert live._stage.set_poses(*live._source.poses(0)) == 1
+    ball = next(i for i in range(live.sim.model.ngeom) if live.sim.model.geom(i).name.startswith("ball/"))
+    colours = np.tile(live.sim.model.geom_rgba, (2, 1, 1))
+    colours[1, ball] = 0.2, 0.4, 0.6, 1
+    live.sim.randomize("geom_rgba", colours)
+    old = set(messages(live))
+    live._picker.value = 1
+    live._pick()
+    new = [m for key, m in messages(live).items() if key not in old and type(m).__name__ == "MeshMessage"]
+    assert [m.props.color for m in new] == [(51, 102, 153)]
+
+
+@needs_viser
+def test_a_taken_port_and_the_address(live, capsys):
+    assert live.url == f"http://127.0.0.1:{live.port}"
+    with mjs.view(live._source, port=live.port, block=False, open_browser=False) as other:
+        assert other.port != live.port
+    assert f"Port {live.port} is taken: the viewer uses port {other.port}." in capsys.readouterr().out
+
+
+@needs_viser
+def test_controls_shapes_and_curves(live):
+    live._curves.choose("scan/hit_pos_w" if "scan/hit_pos_w" in live._source.streams() else "qpos")
+    for box in live._drawn.values():
+        box.value = True
+    live._draw()
+    for _ in range(5):
+        live.sim.step()
+        live.update()
+    assert len(live._curves._history["qpos"]) >= 5
+    names = {m.name for m in messages(live).values() if hasattr(m, "name")}
+    assert {"/shapes/sphere", "/shapes/arrow"} <= names
+    live._source.set_joint(0, 0, 0.1) if live._source.joints() else None
+
+
+@needs_viser
+def test_memory_stays_bounded(live):
+    """The number of messages that a browser receives when it connects does not grow with time."""
+
+    def run(steps):
+        for k in range(steps):
+            live.sim.step()
+            live.update()
+            if k % 10 == 0:
+                live._reset()
+        live._server._run_garbage_collector(force=True)
+        return len(messages(live))
+
+    for box in live._drawn.values():
+        box.value = True
+    live._draw()
+    live._curves.choose("qpos")
+    first = run(40)
+    assert run(200) <= first + 10
+
+
+@needs_viser
+def test_wrong_things_are_named(live, tmp_path):
+    with pytest.raises(ValueError, match=r"world 2: must be in \[0, 2\)"):
+        mjs.view(live._source, world=2, block=False, open_browser=False)
+    with pytest.raises(mjs.UnknownNameError, match="'pikc' is neither a file nor the name of a task"):
+        mjs.view("pikc")
+    with pytest.raises(FileNotFoundError, match=r"no\.xml does not exist"):
+        mjs.view(tmp_path / "no.xml")
+
+
+@needs_viser
+def test_recordings(recording, port):
+    with mjs.view(recording, port=port, block=False, open_browser=False) as viewer:
+        assert "Pick up" in viewer._about.content and viewer._time.max == 30
+        took = []
+        for t in (30, 3, 17, 8, 25, 0):
+            began = time.perf_counter()
+            viewer.seek(t)
+            took.append(time.perf_counter() - began)
+        assert np.median(took) < 0.05
+        model, data = viewer._model, mujoco.MjData(viewer._model)
+        viewer.seek(20)
+        viewer._episode.set_state(model, data, 20)
+        np.testing.assert_allclose(viewer._stage._sent[:, :3], data.xpos, atol=2e-6)
+        viewer._choice.value = viewer._choice.options[1]
+        viewer._choose()
+        assert viewer._episode.index == 1
+        viewer._text.value = "no such instruction"
+        viewer._filter()
+        assert viewer._choice.options == ("no episode matches",)
+
+
+@needs_viser
+def test_a_recording_without_replay_data(tmp_path, port, capsys):
+    mjs.record("pick", out=tmp_path, horizon=5, keep_failures=True, width=32, height=24, replay=False)
+    with mjs.view(tmp_path, port=port, block=False, open_browser=False) as viewer:
+        assert "There is no 3D scene, only videos and curves" in viewer._about.content
+        viewer.seek(3)
+        viewer.update()
+        assert viewer._pictures._panels
+    assert "has no data for replay" in capsys.readouterr().out
+
+
+@needs_viser
+def test_ctrl_c_ends_the_program(port):
+    command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
+        assert process.stdout.readline() == f"Viewer: http://127.0.0.1:{port} (Ctrl-C ends it)\n"
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=20)
+    assert (process.returncode, out, errors) == (0, "", "")
+
+
+@needs_viser
+def test_export(recording, tmp_path):
+    run = [sys.executable, "-m", "mjsense", "view"]
+    done = subprocess.run([*run, str(recording), "--export", "a.viser", "-q"], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "Wrote a.viser.\n", "")
+    assert (tmp_path / "a.viser").stat().st_size > 20_000
+    wrong = subprocess.run([*run, "pick", "--export", "a.mp4"], cwd=tmp_path, capture_output=True, text=True)
+    assert wrong.returncode == 2 and "ends in neither .viser nor .rrd" in wrong.stderr
+
+
+# -------------------------------------------------------------------------------------------------------------------- browser
+
+
+class Running:
+    """A viewer that runs in a thread, and its page."""
+
+    def __init__(self, viewer):
+        self.viewer = viewer
+        self._thread = threading.Thread(target=viewer.run, args=(False,))
+        self._thread.start()
+        self.page = devtools.Page(viewer.url)
+        while not viewer.watched:
+            self.page.run("1")
+            assert time.monotonic() - self.page.opened < 60
+            time.sleep(0.02)
+        self.seconds = time.monotonic() - self.page.opened
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.viewer.close()
+        self._thread.join()
+        self.page.close()
+
+
+def silhouette(viewer, position, target, size):
+    """Where the browser draws something, bool [H, W]."""
+    (client,) = viewer._server.get_clients().values()
+    back = (position - target) / np.linalg.norm(position - target)
+    right = np.cross((0, 0, 1), back)
+    right /= np.linalg.norm(right)
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.stack([right, -np.cross(back, right), -back], 1).ravel())  # viser's cameras: x right, y down, z forward
+    image = client.get_render(*size, wxyz=quaternion, position=position, fov=np.radians(45), transport_format="png")
+    return image[..., 3] > 127
+
+
+def own_silhouette(model, data, position, target, size):
+    camera = mujoco.MjvCamera()
+    offset = target - position
+    camera.lookat, camera.distance = target, np.linalg.norm(offset)
+    camera.azimuth, camera.elevation = np.degrees(np.arctan2(offset[1], offset[0])), np.degrees(np.arcsin(offset[2] / camera.distance))
+    model.vis.global_.fovy = 45
+    renderer = mjs.Renderer(model, *size)
+    renderer.enable_segmentation_rendering()
+    option = mujoco.MjvOption()
+    option.sitegroup[:] = 0
+    renderer.update_scene(data, camera, option)
+    return renderer.render()[..., 0] >= 0
+
+
+@needs_viser
+@needs_browser
+def test_silhouettes_equal_those_of_the_renderer(port):
+    size = 240, 320
+    for robot in ROBOTS:
+        scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=f"embedded:robots/{robot}.xml")}))
+        sim = mjs.Simulation(scene)
+        with Running(mjs.view(sim, port=port, block=False, open_browser=False)) as running:
+            model, data = sim.model_of(0), sim.env.mj_datas[0]
+            target = np.array(model.stat.center)
+            position = target + 1.4 * model.stat.extent * np.array([0.8, -0.5, 0.4])
+            time.sleep(1.5)
+            seen = silhouette(running.viewer, position, target, size)
+            expected = own_silhouette(model, data, position, target, size)
+            overlap = (seen & expected).sum() / (seen | expected).sum()
+            assert expected.sum() > 2000 and overlap >= 0.97, (robot, overlap)
+            assert not running.page.console
+
+
+@needs_viser
+@needs_browser
+def test_the_page_of_a_task(port, tmp_path):
+    with Running(mjs.view("pick", port=port, block=False, open_browser=False)) as running:
+        viewer, page = running.viewer, running.page
+        page.click("button", "Step")
+        page.click("[role=tab]", "Curves")
+        viewer._events[1] = lambda: viewer._curves.choose("tcp_pose")
+        time.sleep(1)
+        assert viewer._source.time(0) == pytest.approx(viewer._source.period)
+        page.click("[role=tab]", "Cameras")
+        time.sleep(0.5)
+        assert page.run("[...document.querySelectorAll('img')].some((image) => image.naturalWidth == 320)")
+        page.click("[role=tab]", "Play")
+        time.sleep(0.5)
+        page.run("document.querySelectorAll('input[type=checkbox]')[0].click()")
+        time.sleep(2)
+        assert viewer._playing.value and viewer._source.time(0) > 0.5
+        page.screenshot(tmp_path / "page.png")
+        assert not page.console
+
+
+@needs_viser
+@needs_browser
+def test_the_page_of_a_recording(recording, port):
+    with Running(mjs.view(recording, port=port, block=False, open_browser=False)) as running:
+        viewer, page = running.viewer, running.page
+        viewer._events[1] = lambda: viewer.seek(12)
+        page.click("[role=tab]", "Videos")
+        time.sleep(1.5)
+        assert viewer._shown == 12
+        assert page.run("[...document.querySelectorAll('img')].filter((image) => image.naturalWidth == 48).length") == 2
+        page.click("[role=tab]", "Curves")
+        time.sleep(0.5)
+        viewer._events[2] = lambda: viewer._curves.choose("obs/extra/tcp_pose")
+        time.sleep(1.5)
+        assert page.run("document.querySelector('.uplot canvas').width") > 100
+        assert not page.console
+
+
