@@ -43,8 +43,12 @@ class PyRecorder {
       value = nb::cast<int>(options[name]);
       options.attr("pop")(name);
     }
-    cfg.resume = nb::cast<bool>(options["resume"]);
-    options.attr("pop")("resume");
+    for (const auto& [name, value] : {std::pair{"resume", &cfg.resume},
+                                      {"append", &cfg.append},
+                                      {"overwrite", &cfg.overwrite}}) {
+      *value = nb::cast<bool>(options[name]);
+      options.attr("pop")(name);
+    }
     read_options(options, struct_of<VideoCfg>(), &cfg.video);
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
@@ -172,6 +176,7 @@ void bind_recorder(nb::module_& m) {
       .def("complete", &PyRecorder::complete)
       .def("recording", &PyRecorder::recording, world)
       .def("decided", [](PyRecorder& r, std::int64_t n) { return r.recorder().decided(n); })
+      .def_prop_ro("first_attempt", [](PyRecorder& r) { return r.recorder().first_attempt(); })
       .def_prop_ro("kept", [](PyRecorder& r) { return r.recorder().kept(); })
       .def_prop_ro("discarded", [](PyRecorder& r) { return r.recorder().discarded(); })
       .def_prop_ro("enough", [](PyRecorder& r) { return r.recorder().has_all_episodes(); })

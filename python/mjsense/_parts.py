@@ -54,7 +54,7 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
     code: Code = {}
     if "resume" in options:
         owners = {"task": composed or task, "policy": policy, **{f"sensor '{sensor.uuid}'": sensor for sensor in (*given, *of_robot)}}
-        code = {place: checksums(owner, place, options["resume"]) for place, owner in owners.items() if owner is not None}
+        code = {place: checksums(owner, place, options["resume"] or options["append"]) for place, owner in owners.items() if owner is not None}
     if composed is None or not options.get("use_sensors", True):
         return task, policy, given, scene, code, of_robot, None
     return task, policy, Composition(composed, given), scene, code, of_robot, composed._mjs_select

@@ -79,20 +79,27 @@ def record(
     shadows: bool = True,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
+    policy_dt_ms: int | None = None,
     action_noise: bool = True,
     perturb: float = 0.0,
     terminate_upon_success: bool = False,
     episodes: int = 1,
     max_attempts: int = 0,
+    num_attempts: int = 0,
+    first_attempt: int = 0,
+    shard: str = "",
     keep_failures: bool = False,
     resume: bool = False,
+    append: bool = False,
+    overwrite: bool = False,
     replay: bool = True,
     house: int = 0,
     batches: int = 0,
     gzip: int = 4,
     ffmpeg: str = "",
-    crf: int = 24,
+    crf: int = 25,
     preset: str = "veryfast",
+    keyint: int = 20,
     molmospaces_depth: bool = False,
     # end of options
     sensors: Iterable[Any] = (),
@@ -129,20 +136,30 @@ def record(
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.
+        policy_dt_ms: Duration of one action of the policy, a multiple of the controllers' period; by default the
+            robot's or the task's. 50 ms gives 20 observations per second. [ms]
         action_noise: Add noise to the commands of the arm.
         perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
         terminate_upon_success: End an episode at its first success.
         episodes: Number of episodes to keep.
         max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
+        num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
+        first_attempt: Number of the first attempt.
+        shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
+            directory; requires ``num_attempts``, the number of attempts of all shards.
         keep_failures: Keep failed episodes too.
         resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        append: Add new episodes to a completed recording; all settings that affect the data must be unchanged.
+        overwrite: Replace an existing recording of this house.
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
-        house: Number of the ``house_N`` folder in the output directory.
+        house: Number of the ``house_N`` folder in the output directory. Each house has its own random numbers.
         batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
         gzip: Compression level of arrays, 0 to 9.
         ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
         crf: Quality of the videos, from 0 (lossless) to 51 (worst).
         preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         Others:
         sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones

@@ -32,7 +32,7 @@ class Recorder(KnownAttributes):
                 recorder.append([0], reward=[1.0])
             recorder.finish_episode(0, {"task_description": "walk"})
 
-    Episodes are identified by their numbers, from 0 without gaps; each is kept, discarded or abandoned. A finished episode is
+    Episodes are identified by their numbers, from ``first_attempt`` (0) without gaps; each is kept, discarded or abandoned. A finished episode is
     safe on disk. One that was not finished when the program died can be attempted again with ``resume=True``. The recording is
     completed at the end of the ``with`` block, unless an exception ends it.
     """
@@ -46,12 +46,15 @@ class Recorder(KnownAttributes):
         episodes: int = 1,
         fps: float | Fraction | None = None,
         resume: bool = False,
+        append: bool = False,
+        overwrite: bool = False,
         house: int = 0,
         batches: int = 0,
         gzip: int = 4,
         ffmpeg: str = "",
-        crf: int = 24,
+        crf: int = 25,
         preset: str = "veryfast",
+        keyint: int = 20,
         molmospaces_depth: bool = False,
         settings: Mapping[str, Any] | None = None,
     ) -> None:
@@ -65,12 +68,15 @@ class Recorder(KnownAttributes):
             episodes: Number of episodes to keep.
             fps: Rows per second; by default one row per control step.
             resume: Continue an interrupted recording with the same settings.
+            append: Add episodes to a completed recording with the same settings. Their numbers begin at ``first_attempt``.
+            overwrite: Replace an existing recording of this house.
             house: Number of the ``house_N`` folder.
             batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
             gzip: Compression level of arrays, 0 to 9.
             ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
             crf: Quality of the videos, from 0 (lossless) to 51 (worst).
             preset: Speed preset of the video encoder, from ultrafast to veryslow.
+            keyint: Maximum number of frames between key frames.
             molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read.
             settings: Settings that produced the data, as JSON. They are stored in every file and must be equal when a recording
                 is resumed.
@@ -85,8 +91,8 @@ class Recorder(KnownAttributes):
         SensorSuite(chosen)  # raises if names are not unique
         rate = _rate(fps, simulation)
         options = {
-            "episodes": episodes, "resume": resume, "house": house, "batches": batches, "gzip": gzip, "ffmpeg": ffmpeg, "crf": crf,
-            "preset": preset, "molmospaces_depth": molmospaces_depth,
+            "episodes": episodes, "resume": resume, "append": append, "overwrite": overwrite, "house": house, "batches": batches, "gzip": gzip, "ffmpeg": ffmpeg, "crf": crf,
+            "preset": preset, "keyint": keyint, "molmospaces_depth": molmospaces_depth,
         }  # fmt: skip
         handles = [sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle for sensor in chosen]
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
@@ -184,6 +190,11 @@ class Recorder(KnownAttributes):
     def decided(self, episode: int) -> bool:
         """Whether this attempt was kept or discarded, now or before the recording was resumed."""
         return self._core.decided(episode)
+
+    @property
+    def first_attempt(self) -> int:
+        """Number of the first episode: 0, or with ``append`` the one after those that are recorded."""
+        return self._core.first_attempt
 
     @property
     def kept(self) -> int:

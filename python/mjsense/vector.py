@@ -323,6 +323,7 @@ def make_vec(
     shadows: bool = True,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
+    policy_dt_ms: int | None = None,
     action_noise: bool = False,
     perturb: float = 0.0,
     terminate_upon_success: bool = False,
@@ -361,6 +362,8 @@ def make_vec(
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.
+        policy_dt_ms: Duration of one action of the policy, a multiple of the controllers' period; by default the
+            robot's or the task's. 50 ms gives 20 observations per second. [ms]
         action_noise: Add noise to the commands of the arm.
         perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
         terminate_upon_success: End an episode at its first success.

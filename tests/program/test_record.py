@@ -102,7 +102,9 @@ def test_absent_objects_are_marked(mjsense):
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
         for traj in file.values():
             present = {name: flags[()] for name, flags in traj["env_states/present"].items()}
-            assert set(present) == set(traj["env_states/actors"]) and len(present) == 12
+            articulations = set(traj["env_states/articulations"])
+            assert set(present) == set(traj["env_states/actors"]) | articulations and len(present) - len(articulations) == 12
+            assert all(present.pop(name).all() for name in articulations)
             assert all(flags.dtype == bool and (flags == flags[0]).all() for flags in present.values())
             assert 6 <= sum(flags[0] for flags in present.values()) <= 10
             for name, flags in present.items():
@@ -139,10 +141,105 @@ def test_bytes_do_not_depend_on_worlds_and_threads(mjsense):
     assert a["house_0/trajectories_batch_1_of_1.h5"] != c["house_0/trajectories_batch_1_of_1.h5"]
 
 
+def episodes_of(root):
+    """{number of the attempt: its attributes, arrays and videos}"""
+    found = {}
+    for path in root.rglob("*.h5"):
+        with h5py.File(path) as file:
+            for traj in file.values():
+                one = {"attributes": dict(traj.attrs.items())}
+
+                def visit(name, item, one=one, path=path):
+                    if not isinstance(item, h5py.Dataset):
+                        return
+                    value = item[()]
+                    one[name] = (str(item.dtype), item.shape, value if isinstance(value, bytes) else value.tobytes(),
+                                 dict(item.attrs.items()))  # fmt: skip
+                    if name.startswith("obs/sensor_data/"):
+                        video = value.tobytes().rstrip(b"\0").decode()
+                        one[video] = (path.parent / video).read_bytes()
+
+                traj.visititems(visit)
+                assert one["attributes"]["episode"] not in found
+                found[one["attributes"]["episode"]] = one
+    return found
+
+
+def test_shards_have_the_episodes_of_one_run(mjsense):
+    import mjsense as mjs
+
+    job = ["record", "pick", "--size", "64x48", "--scene", "shelf", "--no-sheet", "-q", "--num-attempts", 5]
+    mjsense(*job, "--worlds", 2, "--out", "one")
+    for k in range(2):
+        mjsense(*job, "--worlds", 1 + k, "--shard", f"{k}/2", "--out", "parts")
+    one, parts = episodes_of(mjsense.folder / "one"), episodes_of(mjsense.folder / "parts")
+    assert one == parts and len(one) > 0
+    archives = {path.read_bytes() for path in mjsense.folder.rglob("model_*.zip")}
+    assert len(archives) == 1
+    mjsense("verify", "parts")
+    read = mjs.Dataset(mjsense.folder / "parts")
+    assert [episode.number for episode in read.episodes] == [episode.number for episode in mjs.Dataset(mjsense.folder / "one").episodes] == sorted(one)
+    # A shard can be resumed, and is complete when all its attempts are decided.
+    summary = json.loads(mjsense(*job, "--shard", "1/2", "--out", "parts", "--overwrite", "--json").stdout)
+    assert summary["attempts"] == 2 and summary["kept"] <= summary["wanted"] <= 2
+    assert "shard '0/8': num_attempts is 5" in mjsense(*job, "--shard", "0/8", "--out", "parts", rc=2).stderr
+    assert "leave out episodes" in mjsense(*job, "--episodes", 2, "--out", "no", rc=2).stderr
+
+
+def test_append_and_overwrite(mjsense):
+    job = [*QUICK, "--cameras", "none", "--no-sheet"]
+    mjsense(*job, "--episodes", 3, "--out", "whole")
+    mjsense(*job, "--episodes", 2, "--out", "data")
+    assert "append to it" in mjsense(*job, "--out", "data", rc=2).stderr
+    assert "'settings/seed' was 0 and is now 1" in mjsense(*job, "--seed", 1, "--append", "--out", "data", rc=2).stderr
+    mjsense(*job, "--append", "--out", "data")
+    assert episodes_of(mjsense.folder / "data") == episodes_of(mjsense.folder / "whole")
+    mjsense("verify", "data")
+    mjsense(*job, "--episodes", 3, "--overwrite", "--out", "data")
+    assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
+
+
+def test_houses_have_their_own_random_numbers(mjsense):
+    job = [*QUICK, "--cameras", "none", "--no-sheet", "--no-replay"]
+    mjsense(*job, "--out", "data")
+    mjsense(*job, "--house", 1, "--out", "data")
+    mjsense(*job, "--house", 1, "--out", "again")
+    a, b, c = (episodes_of(mjsense.folder / path)[0] for path in ("data/house_0", "data/house_1", "again"))
+    assert b == c and a["obs/extra/obj_start"] != b["obs/extra/obj_start"]
+    assert a["attributes"]["seed"] == 0 and b["attributes"]["seed"] != 0
+
+
+def test_policy_period(mjsense):
+    mjsense(*QUICK, "--policy-dt", 50, "--keyint", 3, "--cameras", "wrist_camera", "--no-sheet", "--out", "data")
+    house = mjsense.folder / "data/house_0"
+    assert video_of(house / "episode_00000000_wrist_camera.mp4")["r_frame_rate"] == "20/1"
+    with h5py.File(house / "trajectories_batch_1_of_1.h5") as file:
+        recording = json.loads(file.attrs["recording"])
+        assert recording["fps"] == "20" and recording["settings"]["policy_dt_ms"] == 50 and recording["video"]["keyint"] == 3
+        assert json.loads(file["traj_0/obs_scene"][()])["policy_dt_ms"] == 50
+    frames = subprocess.run(["ffprobe", "-v", "error", "-select_streams", "v", "-show_entries", "frame=pict_type", "-of", "csv=p=0",
+                             house / "episode_00000000_wrist_camera.mp4"], capture_output=True, text=True, check=True).stdout
+    assert "".join(frames.replace(",", "").split()) == "IPPIPPI"
+    assert "policy_dt_ms = 5 must be a positive multiple" in mjsense(*QUICK, "--policy-dt", 5, "--out", "no", rc=2).stderr
+
+
+def test_every_dataset_is_described(mjsense):
+    mjsense(*QUICK, "--depth", "--segmentation", "--out", "data")
+    with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
+
+        def described(name, item):
+            if isinstance(item, h5py.Dataset):
+                assert {"unit", "frame", "description"} <= set(item.attrs) and item.attrs["description"], name
+
+        file["traj_0"].visititems(described)
+        for name in ("numbers/actions/joint_pos/arm", "replay/state", "env_states/present/franka", "rewards", "obs_scene"):
+            assert name in file["traj_0"]
+
+
 def test_depth_is_kept(mjsense):
     mjsense(*QUICK, "--depth", "--cameras", "wrist_camera", "--out", "data")
     names = [p.name for p in (mjsense.folder / "data/house_0").iterdir()]
-    assert [n for n in names if n.startswith("episode_00000000_wrist_camera_depth_")]
+    assert [n for n in names if n == "episode_00000000_wrist_camera_depth.mkv"]
     mjsense("verify", "data", "--decode")
 
 

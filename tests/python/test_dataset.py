@@ -4,6 +4,7 @@
 import json
 import multiprocessing
 import pickle
+import shutil
 import subprocess
 import sys
 from fractions import Fraction
@@ -227,18 +228,38 @@ def test_filters_and_names(root, dataset):
         dataset.episodes[0]["obs/extra/tcp_pos"]
     with pytest.raises(FileNotFoundError, match="contains no recording"):
         mjs.Dataset(root / "house_3")
-    assert "63 observations" in repr(dataset) and "obs/agent/qpos/arm: float64 [7] [rad or m]" in repr(dataset)
+    assert "63 observations" in repr(dataset) and "obs/agent/qpos/arm: float32 [7] [rad]" in repr(dataset)
+
+
+def without_numbers(file):
+    """Makes it a file of an older version, which has JSON rows only."""
+    for trajectory in file.values():
+        del trajectory["numbers"]
+
+
+def test_older_recordings_are_read_from_their_json_rows(tmp_path, root):
+    shutil.copytree(root / "house_0", tmp_path / "house_0")
+    for path in (tmp_path / "house_0").glob("*.h5"):
+        with h5py.File(path, "a") as file:
+            without_numbers(file)
+    new, old = mjs.Dataset(root / "house_0"), mjs.Dataset(tmp_path)
+    names = [name for name in old.streams if name.startswith(("obs/agent/", "actions/"))]
+    assert "actions/joint_pos/given/arm" in names and set(old.streams) <= set(new.streams)
+    assert {old.streams[name].kind for name in names} == {"json"} and {new.streams[name].kind for name in names} == {"array"}
+    for i in range(0, len(old), 5):
+        a, b = old[i], new[i]
+        for name in names:
+            np.testing.assert_array_equal(a[name], b[name], err_msg=name)
 
 
 def test_a_move_group_that_only_some_episodes_command(tmp_path, root, monkeypatch):
     """A few episodes define a sample; other leaves cause a warning, and are in the sample if they are named."""
-    import shutil
-
     from mjsense.dataset import dataset as module
 
     shutil.copytree(root / "house_0", tmp_path / "house_0")
     for i, path in enumerate(sorted((tmp_path / "house_0").glob("*.h5"))):
         with h5py.File(path, "a") as file:
+            without_numbers(file)
             if i == 0:
                 file.copy("traj_0", "traj_1")
                 rows = file["traj_1/actions/joint_pos"]

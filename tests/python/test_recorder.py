@@ -51,7 +51,7 @@ def test_user_defined_loop(tmp_path):
     np.testing.assert_array_equal(rows[1:, 0], np.array(heights)[:, 0])
     assert rewards.tolist() == [0, 2, 2, 2, 2, 2] and success.tolist() == [False] * 5 + [True] and truncated.tolist() == success.tolist()
     assert json.loads(scene) == {"task_description": "fall"}
-    names = sorted(path.name.split("_batch")[0] for path in recorder.path.glob("episode_00000000*"))
+    names = sorted(path.stem for path in recorder.path.glob("episode_00000000*"))
     assert names == ["episode_00000000_eye", "episode_00000000_eye_depth"]
     with h5py.File(next(recorder.path.glob("*.h5"))) as file:
         assert '"gravity":9.81' in file.attrs["recording"] and file["traj_0"].attrs["outcome"] == "success"

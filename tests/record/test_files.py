@@ -28,8 +28,8 @@ def files(house):
 
 def test_names(house, files):
     assert [f.name for f in files] == ["trajectories_batch_1_of_2.h5", "trajectories_batch_2_of_2.h5"]
-    videos = {f"episode_{i:08d}_wrist_camera{k}_batch_{b}_of_2{e}" for i in range(4) for b in (1, 2)
-              for k, e in (("", ".mp4"), ("_depth", ".mp4"), ("_depth", ".mkv"))}  # fmt: skip
+    kept = [i for i in range(9) if i != 4]  # attempt 4 was discarded
+    videos = {f"episode_{i:08d}_wrist_camera{k}" for i in kept for k in (".mp4", "_depth.mp4", "_depth.mkv")}
     assert {p.name for p in house.iterdir()} == videos | {f.name for f in files}
 
 
@@ -105,10 +105,29 @@ def test_attributes(files):
         assert (depth["encoding"], depth["metres_per_unit"], depth["unit"]) == ("depth16", 0.0002, "m")
 
         def described(name, item):
-            if isinstance(item, h5py.Dataset) and name.startswith(("obs/", "actions/", "env_states/")):
-                assert {"unit", "frame", "description", "spec"} <= set(item.attrs), name
+            if isinstance(item, h5py.Dataset):
+                assert {"unit", "frame", "description"} <= set(item.attrs) and item.attrs["description"], name
 
         traj.visititems(described)
+        assert traj.attrs["steps"] == len(traj["success"]) - 1
+
+
+def test_numbers_equal_the_json_rows(files):
+    """The numbers of a sensor that MolmoSpaces stores as JSON rows are also arrays, with their type, unit and mask."""
+    with h5py.File(files[0]) as f:
+        for traj in f.values():
+            leaves = {}
+            traj["numbers"].visititems(lambda name, item: leaves.update({name: item}) if isinstance(item, h5py.Dataset) else None)
+            assert {"obs/agent/qpos/arm", "obs/agent/qvel/arm", "actions/joint_pos/arm"} <= set(leaves)
+            for name, numbers in leaves.items():
+                place, _, group = name.rpartition("/")
+                if place.endswith("/given"):
+                    continue
+                given = leaves.get(f"{place}/given/{group}", np.ones(len(numbers), bool))
+                decoded = readers.rows(traj[place])
+                for row, values, is_given in zip(decoded, numbers, given, strict=True):
+                    assert (group in row) == is_given, name
+                    np.testing.assert_array_equal(values, row[group] if is_given else np.zeros_like(values), err_msg=name)
 
 
 def test_checksums(house, files):
@@ -269,9 +288,9 @@ def test_verify_finds_damage(record_fake, house, tmp_path, name, change, complai
 def test_verify_finds_broken_videos(record_fake, house, tmp_path):
     for path in house.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
-    victims = sorted(tmp_path.glob("*_wrist_camera_batch_1_of_2.mp4"))
+    victims = sorted(tmp_path.glob("*_wrist_camera.mp4"))
     victims[0].write_bytes(victims[0].read_bytes()[:-400])
-    victims[1].write_bytes(victims[0].with_name("episode_00000001_wrist_camera_batch_2_of_2.mp4").read_bytes())
+    victims[1].write_bytes(victims[5].read_bytes())
     done = record_fake("verify", tmp_path, check=False)
     assert done.returncode == 1
     assert f"'{victims[0].name}' cannot be read" in done.stdout, done.stdout

@@ -32,7 +32,7 @@ class Dataset:
     workers, forked or spawned. Row t of ``actions/*`` is the action that led to observation t.
 
     Args:
-        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
+        root: Output directory of a recording or of its shards, one of the ``house_N`` folders, or one HDF5 file.
         episodes: Positions of episodes in the recording; by default all.
         delta_timestamps: Windows: seconds relative to the observation, by stream or group. The stream becomes ``[n, ...]``, and
             ``{stream}_is_pad`` says which entries lie outside the episode; those repeat its first or last row.
@@ -183,7 +183,8 @@ class Dataset:
             loaded = episode._load([*arrays, *masks.values()])
             for name in arrays:
                 if name in loaded:
-                    parts[name].append(loaded[name][loaded[masks[name]]] if name in masks else loaded[name])
+                    given = loaded.get(masks.get(name, ""))
+                    parts[name].append(loaded[name] if given is None else loaded[name][given])
         result = {name: statistics.of_rows(rows) for name in arrays if parts[name] and len(rows := np.concatenate(parts[name]))}
         chosen = np.unique(np.linspace(0, len(self) - 1, min(frames, len(self))).astype(int))
         places = [self._place(int(i)) for i in chosen]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 VIDEOS = "obs/sensor_data/"
 REPLAY = "replay/"
+NUMBERS = "numbers/"  # the fields of JSON rows as arrays; older recordings have only the JSON rows
 LARGE_ROW = 1 << 16  # bytes; rows of at least this size (segmentation) are read one by one and not kept
 
 
@@ -68,7 +69,10 @@ def _is_json(dataset: Any) -> bool:
 
 
 def _place_of(trajectory: Any, name: str) -> str | None:
-    """The dataset that contains a stream: the stream itself or, for a leaf or a mask, a prefix of its name."""
+    """The dataset that contains a stream: the stream itself or, for a leaf or a mask, its array of numbers or the JSON rows of a prefix
+    of its name."""
+    if NUMBERS + name in trajectory:
+        return NUMBERS + name if hasattr(trajectory[NUMBERS + name], "dtype") else None
     while name:
         if name in trajectory:
             return name if hasattr(trajectory[name], "dtype") else None
@@ -234,12 +238,15 @@ class Episode:
             if not hasattr(dataset, "dtype") or name in ("obs_scene", REPLAY + "held") or name.startswith(REPLAY + "model/"):
                 return
             about = {key: text_of(dataset.attrs.get(key, "")) for key in ("unit", "frame", "description")}
+            name = name.removeprefix(NUMBERS)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
                     dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
                     streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
             elif _is_json(dataset):
+                if NUMBERS + name in file[self.trajectory]:
+                    return
                 for leaf, values in self._decode(name, dataset).items():
                     unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
                     streams[leaf] = Stream(leaf, values.dtype, values.shape[1:], unit, about["frame"], about["description"], "json")
@@ -290,7 +297,7 @@ class Episode:
                         found.update(self._decode(place, dataset))
                     if (values := cache.find((self.index, name))) is not None:
                         found[name] = values
-                elif place == name:
+                elif place.removeprefix(NUMBERS) == name:
                     found[name] = dataset[:]
                     if found[name].nbytes < LARGE_ROW * max(1, self.length):
                         cache.add((self.index, name), found[name], found[name].nbytes)
@@ -299,7 +306,8 @@ class Episode:
     def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:
         """Rows of a stream whose rows are too large to keep all of them."""
         with open_h5(self.path) as file:
-            dataset = file[self.trajectory][name]
+            trajectory = file[self.trajectory]
+            dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name]
             return np.stack([dataset[t] for t in rows])
 
     # Replay

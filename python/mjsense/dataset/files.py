@@ -44,14 +44,15 @@ class EpisodeEntry:
 
 
 def _batches(root: Path) -> list[Path]:
-    """HDF5 files of a recording's folder, of one of its houses, or the file itself, in the order of houses and batches."""
+    """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and batches."""
     if root.is_file():
         return [root]
-    found = [*root.glob("trajectories_batch_*.h5"), *root.glob("house_*/trajectories_batch_*.h5")]
+    found = [path for folder in ("", "house_*/", "shard_*/house_*/") for path in root.glob(f"{folder}trajectories_batch_*.h5")]
 
-    def order(path: Path) -> tuple[str, int, int]:
+    def order(path: Path) -> tuple[str, int, int, int]:
         house, batch = re.fullmatch(r"house_(\d+)", path.parent.name), BATCH.fullmatch(path.name)
-        return "" if house else path.parent.name, int(house[1]) if house else 0, int(batch[1]) if batch else 0
+        shard = re.fullmatch(r"shard_(\d+)", path.parent.parent.name)
+        return "" if house else path.parent.name, *(int(match[1]) if match else 0 for match in (house, shard, batch))
 
     if not found:
         waiting = any(root.glob("**/.recording"))

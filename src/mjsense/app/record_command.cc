@@ -60,7 +60,9 @@ std::string title(const RecordJobCfg& job) {
     text += fmt::format(" with {}{}", cfg.robot, named ? "" : " (the task's robot)");
   }
   if (!cfg.scene.empty()) text += " in " + cfg.scene;
-  return text + fmt::format(": {} episode{} into {}", job.episodes, job.episodes == 1 ? "" : "s",
+  const std::int64_t count = job.num_attempts > 0 ? job.num_attempts : job.episodes;
+  return text + fmt::format(": {} {}{} into {}", count,
+                            job.num_attempts > 0 ? "attempt" : "episode", count == 1 ? "" : "s",
                             job.out.string());
 }
 
@@ -143,8 +145,9 @@ std::string summary_json(const RecordSummary& s, const Sheet& sheet) {
 }  // namespace
 
 int run_record(const RecordOptions& options) {
-  const RecordJobCfg& job = options.job;
-  if (job.out.empty()) throw ValueError("record: the output directory is missing: pass --out DIR");
+  if (options.job.out.empty())
+    throw ValueError("record: the output directory is missing: pass --out DIR");
+  const RecordJobCfg job = without_shard(options.job);
   RecordSummary summary;
   {
     const StopOnSignal signals;

@@ -9,6 +9,11 @@
 #include "mjsense/observe/frame.h"
 
 namespace mjsense {
+namespace {
+
+constexpr const char* kWhileAbsent = " While the body is absent: zeros, and NaN in a recording.";
+
+}  // namespace
 
 EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
                                  std::vector<JointGroup> groups, int length, std::string robot_body,
@@ -62,6 +67,8 @@ std::vector<EnvStatesSensor::Articulation> EnvStatesSensor::find_articulations(
       if (m->body_rootid[m->jnt_bodyid[j]] != root) continue;
       const int type = m->jnt_type[j];
       inside |= type != mjJNT_FREE;
+      if (type == mjJNT_FREE && std::ranges::count(presence_.bodies, m->jnt_bodyid[j]) > 0)
+        each.body = m->jnt_bodyid[j];
       const int nq = type == mjJNT_FREE ? 7 : type == mjJNT_BALL ? 4 : 1;
       const int nv = type == mjJNT_FREE ? 6 : type == mjJNT_BALL ? 3 : 1;
       for (int k = 0; k < nq; ++k) each.qpos.push_back(m->jnt_qposadr[j] + k);
@@ -92,7 +99,7 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
     spec.unit = "m, wxyz, m/s, rad/s";
     spec.frame = "world (angular velocity: body)";
     spec.description = "Free joint of the body: position, quaternion, linear and angular velocity.";
-    if (leaves) spec.description += " While the body is absent: zeros, and NaN in a recording.";
+    if (leaves) spec.description += kWhileAbsent;
     add_field(fmt::format("actors/{}", actor), spec, init.num_worlds);
   }
   articulations_.clear();
@@ -103,6 +110,7 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
     spec.shape = {static_cast<std::int64_t>(each.qpos.size() + each.dof.size())};
     spec.unit = "rad or m, rad/s or m/s";
     spec.description = "qpos of all its joints in the model's order, then their qvel.";
+    if (each.body >= 0) spec.description += kWhileAbsent;
     add_field(fmt::format("articulations/{}", each.name), spec, init.num_worlds);
   }
   if (!articulation_.empty()) {
@@ -114,27 +122,41 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
   }
   for (std::size_t i = 0; i < actors_.size(); ++i) {
     if (actors_[i].body < 0) continue;
-    SensorSpec spec;
-    spec.dtype = DType::kBool;
-    spec.shape = {};
-    spec.description = "Whether the body takes part in the episode.";
-    actors_[i].field = static_cast<int>(fields().size());
     const std::string actor = fields()[i].name.substr(std::string_view("actors/").size());
-    add_field(fmt::format("present/{}", actor), spec, init.num_worlds);
+    actors_[i].field = flag_of(actor, init.num_worlds);
   }
+  for (Articulation& each : articulations_) {
+    if (each.body >= 0) each.field = flag_of(each.name, init.num_worlds);
+  }
+}
+
+// The field "present/<name>", which is added unless it exists.
+int EnvStatesSensor::flag_of(const std::string& name, int num_worlds) {
+  const std::string flag = "present/" + name;
+  const auto found = std::ranges::find(fields(), flag, &Field::name);
+  if (found != fields().end()) return static_cast<int>(found - fields().begin());
+  SensorSpec spec;
+  spec.dtype = DType::kBool;
+  spec.shape = {};
+  spec.description = "Whether the body takes part in the episode.";
+  add_field(flag, spec, num_worlds);
+  return static_cast<int>(fields().size()) - 1;
+}
+
+bool EnvStatesSensor::note_presence(int world, int body, int flag) {
+  if (body < 0) return true;
+  const bool present = presence_.present(world, body);
+  fields()[flag].data.row<bool>(world)[0] = present;
+  return present;
 }
 
 void EnvStatesSensor::compute(const World& world) {
   const mjData* d = world.data;
   for (std::size_t i = 0; i < actors_.size(); ++i) {
     const auto row = fields()[i].data.row<float>(world.id);
-    if (actors_[i].body >= 0) {
-      const bool present = presence_.present(world.id, actors_[i].body);
-      fields()[actors_[i].field].data.row<bool>(world.id)[0] = present;
-      if (!present) {
-        std::ranges::fill(row, 0.0f);
-        continue;
-      }
+    if (!note_presence(world.id, actors_[i].body, actors_[i].field)) {
+      std::ranges::fill(row, 0.0f);
+      continue;
     }
     for (int k = 0; k < 7; ++k) row[k] = static_cast<float>(d->qpos[actors_[i].qpos + k]);
     for (int k = 0; k < 6; ++k) row[7 + k] = static_cast<float>(d->qvel[actors_[i].dof + k]);
@@ -142,6 +164,10 @@ void EnvStatesSensor::compute(const World& world) {
   for (std::size_t i = 0; i < articulations_.size(); ++i) {
     const Articulation& each = articulations_[i];
     const auto row = fields()[actors_.size() + i].data.row<double>(world.id);
+    if (!note_presence(world.id, each.body, each.field)) {
+      std::ranges::fill(row, 0.0);
+      continue;
+    }
     std::size_t n = 0;
     for (int address : each.qpos) row[n++] = d->qpos[address];
     for (int address : each.dof) row[n++] = d->qvel[address];

@@ -36,7 +36,8 @@ std::vector<std::pair<int, std::string>> actors_of(const mjModel* model, int rob
 //                                     One stream for each free body outside the robot. Zeros while
 //                                     the body is absent
 //   env_states/present/<name>         bool []: whether the actor is present in the episode; one
-//                                     stream for each actor that can be absent
+//                                     stream for each actor, and for each articulation with a free
+//                                     joint, that can be absent. Recordings have one for everything
 //   env_states/articulations/<peer>   float32 [N]: qpos of all groups in order, then their qvel,
 //                                     then zeros: MolmoSpaces' row, only if it is configured
 // The name of an actor is that of its body without the entity's prefix ("mug" for "mug/mug"). If
@@ -65,8 +66,12 @@ class EnvStatesSensor final : public Sensor {
   struct Articulation {
     std::string name;
     std::vector<int> qpos, dof;
+    int body = -1;   // the body with the free joint, if it can be absent
+    int field = -1;  // its flag
   };
   std::vector<Articulation> find_articulations(const mjModel* model, int robot_body) const;
+  int flag_of(const std::string& name, int num_worlds);
+  bool note_presence(int world, int body, int flag);
 
   std::string articulation_, robot_;
   std::vector<JointGroup> groups_;

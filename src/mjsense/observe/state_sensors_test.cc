@@ -189,6 +189,28 @@ TEST(EnvStates, AbsentActorsAreMasked) {
   EXPECT_FALSE(states.fields()[3].data.row<bool>(0)[0]);
 }
 
+// The same for an object that has joints of its own: none of its rows contains a pose.
+TEST(EnvStates, AbsentArticulationsAreMasked) {
+  TestWorld w(R"(<mujoco><worldbody>
+    <body name="robot/base"><joint axis="0 0 1"/><geom size=".1"/></body>
+    <body name="box" pos="2 0 0"><freejoint/><geom size=".1"/>
+      <body pos="0 0 .2"><joint/><geom size=".1"/></body></body></worldbody></mujoco>)");
+  bool there = true;
+  EnvStatesSensor states("env_states", "", {}, 0, "robot/base", "arm",
+                         {{2}, [&](int /*world*/, int body) { return body != 2 || there; }});
+  w.compute(states);
+  std::vector<std::string> names;
+  for (const Field& f : states.fields()) names.push_back(f.name);
+  EXPECT_THAT(names,
+              ElementsAre("actors/box", "articulations/arm", "articulations/box", "present/box"));
+  EXPECT_EQ(values<double>(states, "articulations/box")[0], 2);
+  there = false;
+  states.compute(w.world());
+  EXPECT_THAT(values<double>(states, "articulations/box"),
+              ::testing::ElementsAreArray(std::vector<double>(15)));
+  EXPECT_FALSE(states.fields()[3].data.row<bool>(0)[0]);
+}
+
 // Every tree of joints, with the precision of the simulation: the robot, and other articulated objects.
 TEST(EnvStates, ArticulationsHaveAllTheirJoints) {
   TestWorld w(R"(<mujoco><worldbody>

@@ -24,8 +24,10 @@ std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
   add({"-an", "-threads", fmt::format("{}", cfg.threads)});
   switch (video.kind) {
     case VideoKind::kRgb:
+      // Without B-frames, every frame needs only frames before it: random access decodes fewer
+      // frames, and the order in the file is the order in time, as MCAP's readers require.
       add({"-c:v", "libx264", "-pix_fmt", pixels, "-preset", cfg.preset, "-crf",
-           fmt::format("{}", cfg.crf), "-g", fmt::format("{}", cfg.keyint)});
+           fmt::format("{}", cfg.crf), "-bf", "0", "-g", fmt::format("{}", cfg.keyint)});
       break;
     case VideoKind::kDepth16:
       add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", pixels});

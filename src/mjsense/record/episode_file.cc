@@ -15,12 +15,18 @@
 namespace mjsense {
 namespace {
 
-void describe(hid_t object, std::string_view sensor, std::string_view kind,
+// Every dataset has these attributes; "" means that it has no unit or no frame.
+void describe(hid_t dataset, std::string_view unit, std::string_view frame,
+              std::string_view description) {
+  h5::set_attribute(dataset, "unit", unit);
+  h5::set_attribute(dataset, "frame", frame);
+  h5::set_attribute(dataset, "description", description);
+}
+
+void describe(hid_t dataset, std::string_view sensor, std::string_view kind,
               const SensorSpec& spec) {
-  h5::set_attribute(object, "unit", spec.unit);
-  h5::set_attribute(object, "frame", spec.frame);
-  h5::set_attribute(object, "description", spec.description);
-  h5::set_attribute(object, "spec", spec_json(sensor, kind, spec));
+  describe(dataset, spec.unit, spec.frame, spec.description);
+  h5::set_attribute(dataset, "spec", spec_json(sensor, kind, spec));
 }
 
 void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& video) {
@@ -71,6 +77,17 @@ std::string_view own_path(int stream) {
 
 DType own_dtype(int stream) { return stream == kRewards ? DType::kFloat32 : DType::kBool; }
 
+std::string_view own_description(int stream) {
+  constexpr std::string_view kDescriptions[kOwnStreams] = {
+      "Reward of the step that led to the observation; that of the first observation is of no "
+      "step.",
+      "Whether the observation is a success. It may become false again.",
+      "The opposite of success.",
+      "Whether the task or the policy ends the episode at this observation.",
+      "Whether the episode ends at this observation because its horizon is reached."};
+  return kDescriptions[stream];
+}
+
 EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string& name,
                          const RecordingCfg& cfg, const RecordingPlan& plan,
                          const EpisodeMeta& meta)
@@ -89,8 +106,10 @@ EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string
     describe(datasets_.back().id, stream.sensor->name(), stream.kind(), stream.spec);
     if (stream.spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
   }
-  for (int i = 0; i < kOwnStreams; ++i)
+  for (int i = 0; i < kOwnStreams; ++i) {
     add_dataset(own_path(i), own_dtype(i), Shape{}, chunk_rows(dtype_size(own_dtype(i))));
+    describe(datasets_.back().id, "", "", own_description(i));
+  }
   for (const VideoStream& video : plan.videos) add_file_name(trajectory_, cfg, video);
 }
 
@@ -169,13 +188,16 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   h5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
 }
 
-void EpisodeFile::write_scene(std::string_view obs_scene, std::string_view outcome) {
+void EpisodeFile::write_scene(std::string_view obs_scene, std::string_view outcome,
+                              std::int64_t steps) {
   Checksum sum;
   sum.add(obs_scene.data(), obs_scene.size());
   const h5::H5Lock lock;
-  h5::set_attribute(h5::write_text(trajectory_, "obs_scene", obs_scene), kChecksumAttribute,
-                    sum.text());
+  const h5::Id dataset = h5::write_text(trajectory_, "obs_scene", obs_scene);
+  describe(dataset, "", "", "The episode's task, instruction, objects and cameras as JSON text.");
+  h5::set_attribute(dataset, kChecksumAttribute, sum.text());
   h5::set_attribute(trajectory_, "outcome", outcome);
+  h5::set_attribute(trajectory_, "steps", steps);
 }
 
 void EpisodeFile::write_array(const EpisodeArray& array) {
@@ -196,7 +218,7 @@ void EpisodeFile::write_array(const EpisodeArray& array) {
   h5::check(H5Dwrite(dataset, h5::memory_type(array.dtype), H5S_ALL, H5S_ALL, H5P_DEFAULT,
                      array.values.data()),
             path);
-  h5::set_attribute(dataset, "description", array.description);
+  describe(dataset, array.unit, array.frame, array.description);
   h5::set_attribute(dataset, kChecksumAttribute, sum.text());
 }
 

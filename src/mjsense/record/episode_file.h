@@ -21,6 +21,7 @@ namespace mjsense {
 enum OwnStream { kRewards, kSuccess, kFail, kTerminated, kTruncated, kOwnStreams };
 std::string_view own_path(int stream);
 DType own_dtype(int stream);
+std::string_view own_description(int stream);
 
 class EpisodeFile {
  public:
@@ -36,7 +37,8 @@ class EpisodeFile {
   // rows; JSON text is generated from it here. The chunks of a stream must come in order, and all
   // but the last must be full.
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
-  void write_scene(std::string_view obs_scene, std::string_view outcome);
+  // `steps`: policy steps of the episode, which is one less than its observations.
+  void write_scene(std::string_view obs_scene, std::string_view outcome, std::int64_t steps);
   void write_array(const EpisodeArray& array);
   // Checksums and sizes of the videos, in the order of the plan. finish() writes them and closes
   // the file; it throws if the disk reports an error.

@@ -37,7 +37,7 @@ void add(const char* name, const T* world, const T* scene, std::int64_t rows, st
     }
   }
   out.push_back({std::string("model/") + name,
-                 "Values of this episode's model; NaN: the value of the archived model.",
+                 "Values of this episode's model; NaN: the value of the archived model.", "", "",
                  stored_type<T>(), columns == 1 ? Shape{rows} : Shape{rows, columns},
                  std::move(values)});
 }

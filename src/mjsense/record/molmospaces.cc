@@ -55,6 +55,10 @@ std::string path_of(std::string_view stream) {
   return fmt::format("obs/extra/{}", stream);
 }
 
+std::string numbers_path(std::string_view text, std::string_view field) {
+  return fmt::format("numbers/{}/{}", text, field);
+}
+
 std::span<const char* const> standard_groups() {
   static constexpr const char* kGroups[] = {
       "actions",   "env_states/actors", "env_states/articulations", "obs/agent",

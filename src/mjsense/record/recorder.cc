@@ -25,6 +25,12 @@ void validate(const RecordingCfg& cfg) {
                                  printable(cfg.out_dir.string())));
   require(cfg.num_worlds > 0, "num_worlds", cfg.num_worlds, "at least 1");
   require(cfg.house >= 0, "house", cfg.house, "0 or more");
+  require(cfg.first_attempt >= 0, "first_attempt", cfg.first_attempt, "0 or more");
+  require(cfg.num_attempts >= 0, "num_attempts", cfg.num_attempts, "0 (any) or more");
+  if (cfg.resume + cfg.append + cfg.overwrite > 1)
+    throw ValueError("recording: choose one of resume, append and overwrite");
+  if (cfg.append && cfg.first_attempt > 0)
+    throw ValueError("recording: append determines first_attempt; leave it out");
   require(cfg.fps.num > 0 && cfg.fps.den > 0, "fps", fmt::format("{}/{}", cfg.fps.num, cfg.fps.den),
           "a positive fraction");
   require(cfg.gzip >= 0 && cfg.gzip <= 9, "gzip", cfg.gzip, "0 to 9");
@@ -44,11 +50,13 @@ void validate(const RecordingCfg& cfg) {
 Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   validate(cfg);
   batches_of(cfg.episodes, cfg.batches);
+  const std::filesystem::path dir = cfg.out_dir / fmt::format("house_{}", cfg.house);
+  set_start(dir);
   plan = plan_recording(cfg);
   check_names();
   check_ffmpeg(cfg.video, plan.videos);
-  house = std::make_unique<RecordingFolder>(cfg.out_dir / fmt::format("house_{}", cfg.house),
-                                            plan.fingerprint, cfg.resume);
+  if (cfg.overwrite) remove_recordings(dir);
+  house = std::make_unique<RecordingFolder>(dir, plan.fingerprint, cfg.resume);
   if (!house->ended()) {
     if (!cfg.archive_name.empty()) house->store(cfg.archive_name, cfg.archive);
     house->publish_ready();
@@ -89,10 +97,18 @@ Recorder::Impl::~Impl() {
   pool.reset();
 }
 
+// Finds where a recording begins that continues others of the same folder.
+void Recorder::Impl::set_start(const std::filesystem::path& dir) {
+  if (!cfg.append && !cfg.resume) return;
+  const RecordingStart start = cfg.append ? start_after(dir) : start_of_last(dir);
+  if (start.batch == 0) return;
+  cfg.first_attempt = start.attempt;
+  cfg.first_batch = start.batch;
+}
+
 void Recorder::Impl::check_names() const {
-  const int batches = batches_of(cfg.episodes, cfg.batches).count;
   for (const VideoStream& video : plan.videos) {
-    const std::string name = video_file(video, cfg.episodes, batches - 1, batches);
+    const std::string name = video_file(cfg.first_attempt, video.stem + video.extension);
     if (name.size() > kFileNameBytes) {
       throw ValueError(fmt::format(
           "sensor '{}': its video would be named '{}', {} bytes long; the maximum is {}",
@@ -155,7 +171,10 @@ void Recorder::Impl::check_begin(int world, std::int64_t number) const {
   }
   if (house->ended())
     throw ValueError(fmt::format("'{}' is complete: no more episodes", house->dir().string()));
-  if (number < 0) throw ValueError(fmt::format("recording: episode {} is negative", number));
+  if (number < cfg.first_attempt) {
+    throw ValueError(fmt::format("recording: episode {} is before the first one, {}", number,
+                                 cfg.first_attempt));
+  }
   if (decisions.contains(number))
     throw ValueError(fmt::format("recording: episode {} is already recorded or discarded", number));
   for (const EpisodePtr& other : worlds) {
@@ -299,6 +318,8 @@ int Recorder::kept() const {
 }
 
 int Recorder::saved() const { return impl_->saved; }
+
+std::int64_t Recorder::first_attempt() const { return impl_->cfg.first_attempt; }
 
 std::vector<std::string> Recorder::damage() const { return impl_->house->damage(); }
 

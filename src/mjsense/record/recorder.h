@@ -75,6 +75,9 @@ class Recorder {
   [[nodiscard]] bool decided(std::int64_t episode) const;
   int kept() const;   // episodes finished so far, published or not
   int saved() const;  // those of them that are completely on disk and safe from later faults
+  // Number of the first attempt. It is not that of the configuration if the recording continues
+  // others of the same folder.
+  std::int64_t first_attempt() const;
   // Episodes of an earlier process that were found damaged, one sentence each. They were moved
   // aside and are attempted again.
   [[nodiscard]] std::vector<std::string> damage() const;

@@ -12,15 +12,23 @@
 namespace mjsense {
 namespace {
 
+template <class T>
+void fill_with_nan(std::uint8_t* to, std::size_t bytes) {
+  constexpr T kNaN = std::numeric_limits<T>::quiet_NaN();
+  for (std::size_t at = 0; at < bytes; at += sizeof kNaN) std::memcpy(to + at, &kNaN, sizeof kNaN);
+}
+
 void copy_row(const ArrayStream& stream, int world, std::uint8_t* to) {
   if (stream.text) return stream.text->copy(world, to);
+  if (!stream.field) {
+    *to = 1;
+    return;
+  }
   const std::byte* from = stream.field->data.row_data(world);
   const std::size_t maximum = stream.row_bytes();
   if (stream.present && stream.present->data.row_data(world)[0] == std::byte{0}) {
-    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-    for (std::size_t at = 0; at < maximum; at += sizeof kNaN)
-      std::memcpy(to + at, &kNaN, sizeof kNaN);
-    return;
+    return stream.spec.dtype == DType::kFloat32 ? fill_with_nan<float>(to, maximum)
+                                                : fill_with_nan<double>(to, maximum);
   }
   // Only the text of a dict row is copied; the rest is zero in both buffers.
   const bool text = stream.spec.is_dict;
@@ -69,7 +77,7 @@ void Recorder::Impl::append(int world, const StepRow& row) {
 
 void Recorder::Impl::check_texts(int world, Episode& episode) const {
   for (const ArrayStream& stream : plan.arrays) {
-    if (stream.text || !stream.spec.is_dict) continue;
+    if (!stream.field || !stream.spec.is_dict) continue;
     const char* text = reinterpret_cast<const char*>(stream.field->data.row_data(world));
     const std::size_t maximum = stream.field->data.row_bytes();
     const std::size_t size = strnlen(text, maximum);

@@ -92,6 +92,7 @@ struct Recorder::Impl {
 
   explicit Impl(const RecordingCfg& cfg_);
   ~Impl();
+  void set_start(const std::filesystem::path& dir);
   void check_names() const;
 
   // ---- the caller's side

@@ -9,11 +9,13 @@
 
 #include <csignal>
 #include <functional>
+#include <map>
 #include <thread>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/record/video_file.h"
@@ -53,9 +55,14 @@ TEST(Recorder, StoresTheArchiveAndTheArraysOfAnEpisode) {
   recorder.append(0, {});
   const std::vector<double> sizes{1, 2, 3, 4, 5, 6};
   const auto bytes = std::as_bytes(std::span(sizes));
-  recorder.finish_episode(
-      0, "{}", "success",
-      {{"model/geom_size", "Sizes.", DType::kFloat64, {2, 3}, {bytes.begin(), bytes.end()}}});
+  recorder.finish_episode(0, "{}", "success",
+                          {{"model/geom_size",
+                            "Sizes.",
+                            "m",
+                            "",
+                            DType::kFloat64,
+                            {2, 3},
+                            {bytes.begin(), bytes.end()}}});
   recorder.complete();
   const h5::H5Lock lock;
   const h5::Id file = h5::open_file(out.path / "house_0/trajectories_batch_1_of_1.h5");
@@ -107,6 +114,133 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
             record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
 }
 
+// The contents of each episode by its number: attributes, datasets by their checksums, and videos.
+std::map<std::int64_t, std::string> episodes_of(const fs::path& house) {
+  std::map<std::int64_t, std::string> episodes;
+  const h5::H5Lock lock;
+  for (const std::string& name : tree(house)) {
+    if (!name.ends_with(".h5")) continue;
+    const h5::Id file = h5::open_file(house / name);
+    for (const std::string& trajectory : h5::children(file)) {
+      const h5::Id group = h5::open_group(file, trajectory);
+      std::string text = h5::text_attribute(group, "outcome");
+      h5::each_dataset(group, [&](const std::string& path) {
+        const h5::Id dataset = h5::open_dataset(group, path);
+        text += fmt::format("\n{} {}", path, h5::text_attribute(dataset, kChecksumAttribute));
+        if (!path.starts_with("obs/sensor_data/")) return;
+        std::string video = h5::read_bytes(group, path, kFileNameBytes);
+        video.resize(video.find('\0'));
+        text += " " + video + " " + read_file(house / video);
+      });
+      const std::int64_t number = h5::int_attribute(group, "episode", -1);
+      EXPECT_TRUE(episodes.emplace(number, text).second) << number;
+    }
+  }
+  return episodes;
+}
+
+// Recordings of attempts [a, b) have together the episodes of a recording of all attempts.
+TEST(Recorder, RangesOfAttemptsHaveTheEpisodesOfTheWhole) {
+  TempDir whole, parts;
+  record(whole.path, 6, {.worlds = 2}, true);
+  std::map<std::int64_t, std::string> together;
+  for (const auto& [first, count] : {std::pair{0, 4}, {4, 2}}) {
+    const fs::path out = parts.path / fmt::format("{}", first);
+    record(out, count, {.worlds = 1}, true, [&](RecordingCfg& c) {
+      c.first_attempt = first;
+      c.num_attempts = count;
+    });
+    together.merge(episodes_of(out / "house_0"));
+    EXPECT_TRUE(verify(out).ok()) << verify(out).text();
+  }
+  EXPECT_EQ(together.size(), 6u);
+  EXPECT_EQ(together, episodes_of(whole.path / "house_0"));
+  FakeSuite suite(without_video(1));
+  RecordingCfg cfg = fake_recording(parts.path / "later", suite, 1, 1);
+  cfg.first_attempt = 4;
+  Recorder recorder(cfg);
+  EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {.episode = 3}); }),
+              HasSubstr("episode 3 is before the first one, 4"));
+}
+
+TEST(Recorder, AppendContinuesACompletedRecording) {
+  const auto append = [](RecordingCfg& c) { c.append = true; };
+  const auto resume = [](RecordingCfg& c) { c.resume = true; };
+  const auto other = [](RecordingCfg& c) {
+    c.append = true;
+    c.settings = R"({"seed":8})";
+  };
+  TempDir whole, dir;
+  record(whole.path, 9, {.discard_every = 3}, true);
+  record(dir.path, 4, {.discard_every = 3}, true, append);  // there is nothing to continue yet
+  EXPECT_THAT(error_of([&] { record(dir.path, 2, {}, true); }),
+              HasSubstr("already contains recorded trajectories; resume it, append to it"));
+  EXPECT_THAT(error_of([&] { record(dir.path, 2, {}, true, other); }),
+              HasSubstr("different recording: 'settings/seed' was 7 and is now 8"));
+  record(dir.path, 2, {.discard_every = 3}, true, append);
+  record(dir.path, 3, {.discard_every = 3, .stop_after = 2}, true, append);
+  EXPECT_THAT(error_of([&] { record(dir.path, 3, {}, true, append); }),
+              HasSubstr("contains an unfinished recording; resume it"));
+  record(dir.path, 3, {.discard_every = 3}, true, resume);
+  EXPECT_EQ(episodes_of(dir.path / "house_0"), episodes_of(whole.path / "house_0"));
+  for (const char* name : {"1_of_1", "2_of_2", "3_of_3"}) {
+    EXPECT_TRUE(fs::exists(dir.path / fmt::format("house_0/trajectories_batch_{}.h5", name)));
+  }
+  EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
+  // A complete recording can be resumed, which changes nothing.
+  const std::vector<std::string> files = tree(dir.path);
+  record(dir.path, 3, {}, true, resume);
+  EXPECT_EQ(tree(dir.path), files);
+}
+
+// `repair` publishes the finished episodes of an interrupted recording that continues another one.
+TEST(Recorder, AppendedEpisodesCanBeRepaired) {
+  TempDir whole, dir;
+  record(whole.path, 4, {.worlds = 1}, true);
+  record(dir.path, 2, {.worlds = 1}, true);
+  record(dir.path, 3, {.worlds = 1, .stop_after = 2}, true, [](auto& c) { c.append = true; });
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("published 2 finished episodes"));
+  EXPECT_EQ(episodes_of(dir.path / "house_0"), episodes_of(whole.path / "house_0"));
+}
+
+TEST(Recorder, OverwriteRemovesTheRecordingOnly) {
+  TempDir fresh, dir;
+  const auto overwrite = [](RecordingCfg& c) { c.overwrite = true; };
+  const std::string bytes = record(fresh.path, 2, {}, true);
+  const fs::path notes = dir.path / "house_0/notes.txt";
+  record(dir.path, 5, {}, true);
+  std::ofstream(notes) << "mine";
+  record(dir.path, 4, {.stop_after = 1}, true, overwrite);
+  record(dir.path, 2, {}, true, overwrite);
+  EXPECT_EQ(read_file(notes), "mine");
+  fs::remove(notes);
+  std::string again;
+  for (const std::string& name : tree(dir.path)) again += read_file(dir.path / name);
+  EXPECT_EQ(again, bytes);
+  const auto both = [](RecordingCfg& c) { c.overwrite = c.resume = true; };
+  EXPECT_THAT(error_of([&] { record(dir.path, 2, {}, true, both); }),
+              HasSubstr("choose one of resume, append and overwrite"));
+}
+
+// A reader knows what a dataset contains without the program that wrote it.
+TEST(Recorder, EveryDatasetHasUnitFrameAndDescription) {
+  TempDir dir;
+  record(dir.path, 1, {.worlds = 1}, true);
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
+  const h5::Id trajectory = h5::open_group(file, "traj_0");
+  EXPECT_EQ(h5::int_attribute(trajectory, "steps", -1), length_of(0, 6) - 1);
+  h5::each_dataset(trajectory, [&](const std::string& path) {
+    const h5::Id dataset = h5::open_dataset(trajectory, path);
+    for (const char* name : {"unit", "frame", "description"})
+      EXPECT_TRUE(h5::has_attribute(dataset, name)) << path << " " << name;
+    const bool own = path.find('/') == std::string::npos;
+    if (own) {
+      EXPECT_NE(h5::text_attribute(dataset, "description"), "") << path;
+    }
+  });
+}
+
 // A recording that ended before anything was decided leaves no files; decided episodes are kept.
 TEST(Recorder, UndecidedRecordingLeavesNoFiles) {
   TempDir dir;
@@ -152,7 +286,7 @@ TEST(Recorder, InterruptedPublicationIsCompleted) {
       std::ofstream(staging / "ending").flush();
       for (int e = 0; e < moved; ++e) {
         const fs::path episode = staging / fmt::format("episode_{:08d}", e);
-        const std::string name = fmt::format("episode_{:08d}_wrist_camera_batch_1_of_2.mp4", e);
+        const std::string name = fmt::format("episode_{:08d}_wrist_camera.mp4", e);
         ASSERT_TRUE(fs::exists(episode / "wrist_camera.mp4"));
         fs::rename(episode / "wrist_camera.mp4", house / name);
       }
@@ -251,8 +385,7 @@ TEST(Recorder, SlowEncoderBlocksTheProducerWithoutLoss) {
   }
   recorder.finish_episode(0, "{}");
   recorder.complete();
-  const Fd video =
-      open_plain(dir.path / "house_0", "episode_00000000_wrist_camera_batch_1_of_1.mp4");
+  const Fd video = open_plain(dir.path / "house_0", "episode_00000000_wrist_camera.mp4");
   EXPECT_EQ(read_video_facts(video.get()).frames, kSteps);
   EXPECT_GT(recorder.stats().frames, 0);
 }
@@ -273,8 +406,7 @@ TEST(Recorder, ProducerWaitsForABlockedEncoder) {
   EXPECT_GT(recorder.stats().wait_s, 0.2);
   recorder.finish_episode(0, "{}");
   recorder.complete();
-  const Fd video =
-      open_plain(dir.path / "house_0", "episode_00000000_wrist_camera_batch_1_of_1.mp4");
+  const Fd video = open_plain(dir.path / "house_0", "episode_00000000_wrist_camera.mp4");
   EXPECT_EQ(read_video_facts(video.get()).frames, kFrames);
 }
 
@@ -501,7 +633,7 @@ TEST(RecorderFaults, InvalidCallsThrow) {
   EXPECT_THAT(error_of([&] {
                 recorder.begin_episode(0, {-1, 0});
               }),
-              HasSubstr("episode -1 is negative"));
+              HasSubstr("episode -1 is before the first one, 0"));
   recorder.begin_episode(0, {0, 0});
   EXPECT_THAT(error_of([&] {
                 recorder.begin_episode(0, {1, 0});

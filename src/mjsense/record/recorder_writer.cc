@@ -64,7 +64,7 @@ void Recorder::Impl::run(Job& job, bool failed) {
       break;
     case Job::kClose:
       if (!failed && episode.file && episode.outcome == Outcome::kKept) {
-        episode.file->write_scene(job.obs_scene, job.outcome);
+        episode.file->write_scene(job.obs_scene, job.outcome, episode.rows - 1);
         for (const EpisodeArray& array : job.arrays) episode.file->write_array(array);
       }
       break;

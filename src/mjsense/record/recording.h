@@ -34,9 +34,9 @@ struct VideoCfg {
   int max_encoders = 0;
   int queue_frames = 3;
   int threads = 1;
-  int crf = 24;
+  int crf = 25;
   std::string preset = "veryfast";
-  int keyint = 250;
+  int keyint = 20;
   double depth_unit = 0.0002;
   double ffmpeg_timeout = 60;
   bool molmospaces_depth = false;
@@ -49,6 +49,10 @@ void visit_fields(V& v, VideoCfg& c) {
   v("crf", c.crf, "Quality of the videos, from 0 (lossless) to 51 (worst).").within(0, 51);
   v("preset", c.preset,
     "Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.");
+  v("keyint", c.keyint,
+    "Maximum number of frames between key frames. A small value makes random access faster, a "
+    "large value makes files smaller.")
+      .at_least(1);
   v("molmospaces_depth", c.molmospaces_depth,
     "Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.");
   v("max_encoders", c.max_encoders,
@@ -64,11 +68,6 @@ void visit_fields(V& v, VideoCfg& c) {
   v("encoder_threads", c.threads,
     "Number of threads of each encoder. The bytes of a video depend on it, so it does not follow "
     "the number of CPUs.")
-      .at_least(1)
-      .hidden();
-  v("keyint", c.keyint,
-    "Maximum number of frames between key frames. A small value makes seeking faster, a large "
-    "value makes files smaller.")
       .at_least(1)
       .hidden();
   v("ffmpeg_timeout", c.ffmpeg_timeout,
@@ -101,7 +100,16 @@ struct RecordingCfg {
   // resumed with another model.
   const mjModel* model = nullptr;
   bool resume = false;  // continue an existing recording; otherwise existing output is an error
-  int gzip = 4;         // compression level, 0 (none) to 9
+  // Add to a completed recording with the same settings: the numbers of attempts and of HDF5 files
+  // follow those that exist.
+  bool append = false;
+  bool overwrite = false;  // remove an existing recording first
+  // Number of the first attempt. Attempts before it are not part of this recording. `append` sets
+  // it.
+  std::int64_t first_attempt = 0;
+  std::int64_t num_attempts = 0;  // number of attempts, if it is fixed; 0: it is not
+  int first_batch = 0;            // HDF5 files of the recordings that `append` continues; set by it
+  int gzip = 4;                   // compression level, 0 (none) to 9
   // File for replay, stored in the house once: its name, "model_1a2b3c4d.zip", and its bytes. Empty:
   // none. Recordings with the same model have the same name.
   std::string archive_name, archive;
@@ -111,9 +119,9 @@ struct RecordingCfg {
   const std::atomic<int>* stop = nullptr;
 };
 
-// One attempt. Episode numbers start at 0 without gaps. They, and not the order in which episodes
-// finish, determine the order on disk, so the files do not depend on the number of worlds or on
-// interruptions.
+// One attempt. Episode numbers start at RecordingCfg::first_attempt without gaps. They, and not the
+// order in which episodes finish, determine the order on disk, so the files do not depend on the
+// number of worlds or on interruptions.
 struct EpisodeMeta {
   std::int64_t episode = 0;
   std::uint64_t seed = 0;
@@ -123,6 +131,7 @@ struct EpisodeMeta {
 struct EpisodeArray {
   std::string path;  // "model/geom_size", "held"
   std::string description;
+  std::string unit, frame;
   DType dtype = DType::kFloat64;
   Shape shape;
   std::vector<std::byte> values;

@@ -108,18 +108,68 @@ std::string describe_published(const Fd& published, const std::string& shown) {
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-std::string final_name_of(const StagedVideo& video, int index, int batch, int batches) {
-  const fs::path name = video.name;
-  return video_file(name.stem().string(), name.extension().string(), index, batch, batches);
+// "trajectories_batch_2_of_3.h5" -> 2; 0 for other names.
+int batch_in(const std::string& name) {
+  int batch = 0, batches = 0;
+  const bool numbers =
+      std::sscanf(name.c_str(), "trajectories_batch_%9d_of_%9d.h5", &batch, &batches) == 2;
+  return numbers && batch >= 1 && name == batch_file(batch - 1, batches) ? batch : 0;
 }
 
-// Writes the final names of the videos of traj_{index} into the file, and appends the moves that
-// this requires.
-void name_videos(hid_t trajectory, const std::string& episode, int index, int batch, int batches,
-                 std::vector<Move>& moves) {
+// A published HDF5 file.
+struct Published {
+  int batch = 0;
+  std::string recording;  // "" if it was not recorded by mjsense
+  std::vector<std::int64_t> episodes;
+};
+
+Published read_published(const Folder& house, const std::string& name) {
+  const Fd file = open_plain(house.fd(), name);
+  const std::string shown = house.display_path(name);
+  const auto found =
+      nlohmann::json::parse(h5::in_child(
+                                shown, static_cast<std::uint64_t>(size_of(file)),
+                                [&] { return describe_published(file, shown); }, 0, file.get()),
+                            nullptr, false);
+  Published published{.batch = batch_in(name)};
+  if (found.is_object()) {
+    published.recording = found.at("recording").get<std::string>();
+    published.episodes = found.at("episodes").get<std::vector<std::int64_t>>();
+  }
+  return published;
+}
+
+// A number of a description, which may come from an untrusted file.
+std::int64_t number_of(const nlohmann::json& description, const char* name) {
+  constexpr std::int64_t kMaximum = std::int64_t{1} << 53;
+  const bool valid = description.is_object() && description.contains(name) &&
+                     description[name].is_number_integer() && description[name] >= 0 &&
+                     description[name] <= kMaximum;
+  return valid ? description[name].get<std::int64_t>() : 0;
+}
+
+RecordingStart start_in(const std::string& description) {
+  const nlohmann::json json = parse_description(description);
+  constexpr std::int64_t kMaxBatches = 1 << 30;
+  return {number_of(json, "first_attempt"),
+          static_cast<int>(std::min(number_of(json, "first_batch"), kMaxBatches))};
+}
+
+// A description without the numbers in which recordings of the same settings may differ.
+std::string settings_of(const std::string& description) {
+  nlohmann::json json = parse_description(description);
+  if (!json.is_object()) return "";
+  for (const char* count : {"episodes", "batches", "first_attempt", "num_attempts", "first_batch"})
+    json.erase(count);
+  return json.dump();
+}
+
+// Writes the final names of an episode's videos into the file, and appends the moves that this
+// requires.
+void name_videos(hid_t trajectory, std::int64_t number, std::vector<Move>& moves) {
   const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
   for (const StagedVideo& video : staged_videos(trajectory)) {
-    const std::string final_name = final_name_of(video, index, batch, batches);
+    const std::string final_name = video_file(number, video.name);
     std::array<char, kFileNameBytes> bytes{};
     std::memcpy(bytes.data(), final_name.data(), std::min(final_name.size(), bytes.size()));
     const h5::Id dataset = h5::open_dataset(names, video.key);
@@ -128,7 +178,7 @@ void name_videos(hid_t trajectory, const std::string& episode, int index, int ba
                                      kFileNameBytes));
     h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()),
               video.key);
-    moves.push_back({episode, video.name, final_name});
+    moves.push_back({episode_name(number), video.name, final_name});
   }
 }
 
@@ -158,6 +208,9 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
                                    (dir / kStagingDir / kDescription).string()));
   const nlohmann::json description = parse_description(fingerprint);
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
+  first_attempt_ = start_in(fingerprint).attempt;
+  first_batch_ = start_in(fingerprint).batch;
+  decisions_ = Decisions(first_attempt_);
 
   make_dir(dir);
   dir_ = Folder::open(dir);
@@ -165,13 +218,15 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
   lock_ = lock_recording(dir_, false);
   staging_ = dir_.find_dir(kStagingDir);
   const std::vector<std::string> published = published_files(dir_);
-  const bool any_published = !published.empty();
-  load_published(published, fingerprint);
+  const bool any_published =
+      !std::ranges::all_of(published, [&](const std::string& name) { return is_continued(name); });
+  if (resume || !any_published) load_published(published, fingerprint);
   const std::string unfinished = staging_ ? unfinished_recording(staging_) : "";
   if (!resume && (any_published || !unfinished.empty())) {
     throw ValueError(fmt::format(
-        "'{}' already contains {}; resume it, or choose another directory", dir.string(),
-        any_published ? "recorded trajectories" : "an unfinished recording"));
+        "'{}' already contains {}; {}, or choose another directory", dir.string(),
+        any_published ? "recorded trajectories" : "an unfinished recording",
+        any_published ? "resume it, append to it, overwrite it" : "resume it, overwrite it"));
   }
   if (const std::string difference =
           unfinished.empty() ? "" : fingerprint_difference(unfinished, fingerprint);
@@ -228,44 +283,39 @@ void RecordingFolder::throw_moved(const fs::path& path) const {
 void RecordingFolder::load_published(const std::vector<std::string>& files,
                                      const std::string& fingerprint) {
   for (const std::string& name : files) {
-    const Fd file = open_plain(dir_.fd(), name);
-    const std::string shown = dir_.display_path(name);
-    const auto found =
-        nlohmann::json::parse(h5::in_child(
-                                  shown, static_cast<std::uint64_t>(size_of(file)),
-                                  [&] { return describe_published(file, shown); }, 0, file.get()),
-                              nullptr, false);
-    const std::string was = found.is_object() ? found.at("recording").get<std::string>() : "";
-    const auto difference =
-        was.empty() ? "it was not recorded by mjsense" : fingerprint_difference(was, fingerprint);
+    const Published file = read_published(dir_, name);
+    const std::string difference =
+        file.recording.empty() ? "it was not recorded by mjsense"
+        : is_continued(name)
+            ? fingerprint_difference(settings_of(file.recording), settings_of(fingerprint))
+            : fingerprint_difference(file.recording, fingerprint);
     if (!difference.empty()) {
-      throw ValueError(fmt::format("'{}' belongs to a different recording: {}", shown, difference));
+      throw ValueError(fmt::format("'{}' belongs to a different recording: {}",
+                                   dir_.display_path(name), difference));
     }
-    int batch = 0, batches = 0;
-    if (std::sscanf(name.c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) == 2 &&
-        batch >= 1 && batch <= batches_.count && name == batch_file(batch - 1, batches_.count))
-      published_.insert(batch - 1);
-    for (const std::int64_t episode : found.at("episodes")) decisions_.add(episode, true);
+    if (is_continued(name)) continue;
+    const int batch = file.batch - 1 - first_batch_;
+    if (batch >= 0 && name == file_of(batch)) published_.insert(batch);
+    for (const std::int64_t episode : file.episodes) decisions_.add(episode, true);
   }
 }
 
+bool RecordingFolder::is_continued(const std::string& name) const {
+  return batch_in(name) >= 1 && batch_in(name) <= first_batch_;
+}
+
+std::string RecordingFolder::file_of(int batch) const {
+  return batch_file(first_batch_ + batch, first_batch_ + batches_.count);
+}
+
 // Moves the videos of an interrupted publication back. Afterwards every episode is either complete
-// in its folder or damaged, and a damaged episode takes no files of others.
-void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
-  Decisions then = decisions_;
-  for (const auto& [episode, found] : staged) then.add(episode, true);
-  const std::vector<std::int64_t> order = ending ? then.all_kept() : then.settled();
-  int batch = 0;
-  for (std::size_t at = 0; at < order.size(); ++at) {
-    const auto found = staged.find(order[at]);
-    if (found == staged.end()) continue;
-    while (batch + 1 < batches_.count && batches_.first(batch + 1) <= static_cast<std::int64_t>(at))
-      ++batch;
-    const int index = static_cast<int>(static_cast<std::int64_t>(at) - batches_.first(batch));
-    for (const StagedVideo& video : found->second.videos) {
-      const Folder home = staging_.open_dir(episode_name(found->first));
-      const std::string away = final_name_of(video, index, batch, batches_.count);
-      if (!published_.contains(batch) && !home.contains(video.name) && dir_.is_plain_file(away))
+// in its folder or damaged.
+void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& staged) {
+  for (const auto& [number, episode] : staged) {
+    const Folder home = staging_.open_dir(episode_name(number));
+    for (const StagedVideo& video : episode.videos) {
+      const std::string away = video_file(number, video.name);
+      if (!home.contains(video.name) && dir_.is_plain_file(away))
         dir_.rename(away, home, video.name);
     }
   }
@@ -284,7 +334,6 @@ void RecordingFolder::set_aside(const std::string& name, const std::string& why)
 
 void RecordingFolder::load_staged() {
   std::map<std::int64_t, StagedEpisode> staged;
-  const bool ending = staging_.contains(kEndingFile);
   for (const std::string& name : staging_.names()) {
     if (name == kLockFile || name == kDescription || name == kEndingFile) continue;
     const auto finished = episode_number(name, ""), discarded = episode_number(name, ".discarded");
@@ -308,7 +357,7 @@ void RecordingFolder::load_staged() {
       staging_.remove(name);
     }
   }
-  bring_back(staged, ending);
+  bring_back(staged);
   for (const auto& [number, episode] : staged) {
     const std::string name = episode_name(number);
     try {
@@ -392,7 +441,6 @@ void RecordingFolder::publish_all() {
 
 void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episodes) {
   require_in_place();
-  const int batches = batches_.count;
   const std::string part = "batch.part";
   const std::string what = fmt::format("cannot write '{}'", staging_.display_path(part));
   // If writing fails, incomplete files are removed to free their disk space. Their episodes stay
@@ -422,8 +470,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
       h5::check(H5Ocopy(source, "traj_0", file, name.c_str(), H5P_DEFAULT, h5::link_properties()),
                 what);
       const h5::Id trajectory = h5::open_group(file, name);
-      name_videos(trajectory, episode_name(episodes[i]), static_cast<int>(i), batch, batches,
-                  moves);
+      name_videos(trajectory, episodes[i], moves);
     }
     file.close(what);
   }
@@ -437,7 +484,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
     published_bytes_ += dir_.size_of(move.final_name);
   }
   dir_.sync();
-  const std::string final_name = batch_file(batch, batches);
+  const std::string final_name = file_of(batch);
   staging_.rename(part, dir_, final_name);
   dir_.sync();
   published_.insert(batch);
@@ -503,6 +550,60 @@ std::vector<fs::path> finished_episodes(const fs::path& house) {
   const Folder staging = Folder::open(house / kStagingDir);
   for (const std::string& name : finished_names(staging)) found.push_back(staging.path() / name);
   return found;
+}
+
+RecordingStart start_after(const fs::path& house) {
+  RecordingStart start;
+  if (!fs::is_directory(house)) return start;
+  const Folder folder = Folder::open(house);
+  if (folder.find_dir(kStagingDir)) {
+    throw ValueError(
+        fmt::format("'{}' contains an unfinished recording; resume it before you append to it",
+                    house.string()));
+  }
+  for (const std::string& name : published_files(folder)) {
+    const Published file = read_published(folder, name);
+    start.batch = std::max(start.batch, file.batch);
+    for (const std::int64_t episode : file.episodes)
+      start.attempt = std::max(start.attempt, episode + 1);
+    const nlohmann::json description = parse_description(file.recording);
+    start.attempt = std::max(start.attempt, number_of(description, "first_attempt") +
+                                                number_of(description, "num_attempts"));
+  }
+  return start;
+}
+
+RecordingStart start_of_last(const fs::path& house) {
+  if (!fs::is_directory(house)) return {};
+  const Folder folder = Folder::open(house);
+  if (const Folder staging = folder.find_dir(kStagingDir)) {
+    const std::string unfinished = unfinished_recording(staging);
+    if (!unfinished.empty()) return start_in(unfinished);
+  }
+  Published last;
+  for (const std::string& name : published_files(folder)) {
+    Published file = read_published(folder, name);
+    if (file.batch > last.batch) last = std::move(file);
+  }
+  return start_in(last.recording);
+}
+
+void remove_recordings(const fs::path& house) {
+  if (!fs::is_directory(house)) return;
+  const Folder folder = Folder::open(house);
+  const Fd lock = lock_recording(folder, false);
+  // First the HDF5 files, so that none of them names a video that is gone.
+  std::vector<std::string> names = published_files(folder);
+  for (const std::string& name : folder.names()) {
+    const bool video = name.ends_with(".mp4") || name.ends_with(".mkv");
+    if ((name.starts_with("episode_") && video) ||
+        (name.starts_with("model_") && name.ends_with(".zip")))
+      names.push_back(name);
+  }
+  for (const std::string& name : names) folder.remove(name);
+  folder.remove(kDamagedDir);
+  folder.remove(kStagingDir);
+  folder.sync();
 }
 
 }  // namespace mjsense

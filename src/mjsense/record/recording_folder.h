@@ -44,10 +44,13 @@ class Decisions {
   const std::vector<std::int64_t>& settled() const { return settled_; }
   std::vector<std::int64_t> all_kept() const;
 
+  // `first`: the first attempt of the recording.
+  explicit Decisions(std::int64_t first = 0) : next_(first) {}
+
  private:
   std::map<std::int64_t, bool> kept_by_episode_;
   std::vector<std::int64_t> settled_;
-  std::int64_t next_ = 0;  // lowest undecided episode
+  std::int64_t next_;  // lowest undecided episode
   int kept_ = 0;
 };
 
@@ -55,7 +58,8 @@ class RecordingFolder {
  public:
   // Opens or creates a recording. Throws ValueError if there is one and `resume` is false, if it
   // has another fingerprint, or if another process records into it. Throws RuntimeError if the
-  // directory cannot be written.
+  // directory cannot be written. Completed recordings that this one continues (Start::batch) must
+  // have the same settings.
   RecordingFolder(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
   // Removes the recording if nothing was decided, so that a run that failed at its first step does
   // not block later ones.
@@ -87,9 +91,12 @@ class RecordingFolder {
  private:
   void load_published(const std::vector<std::string>& files, const std::string& fingerprint);
   void load_staged();
-  void bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending);
+  void bring_back(const std::map<std::int64_t, StagedEpisode>& staged);
   void set_aside(const std::string& name, const std::string& why);
   void publish(int batch, const std::vector<std::int64_t>& episodes);
+  // Whether a published file belongs to a recording that this one continues.
+  bool is_continued(const std::string& name) const;
+  std::string file_of(int batch) const;
   std::vector<std::int64_t> batch_of(int batch, const std::vector<std::int64_t>& kept) const;
   bool end();  // false: the recording's folder was moved elsewhere and is empty
   void end_or_throw();
@@ -100,6 +107,8 @@ class RecordingFolder {
   Folder dir_, staging_;
   std::string fingerprint_;
   Batches batches_;
+  std::int64_t first_attempt_ = 0;
+  int first_batch_ = 0;
   std::set<int> published_;
   int next_batch_ = 0;  // batches before it are published
   Decisions decisions_;
@@ -109,6 +118,22 @@ class RecordingFolder {
   std::string stored_;  // name of the file that store() has written
   Fd lock_;
 };
+
+// Where a recording begins in a house that contains completed recordings: the number of its first
+// attempt, and the number of their HDF5 files.
+struct RecordingStart {
+  std::int64_t attempt = 0;
+  int batch = 0;
+};
+// Start of a recording that continues those of this house. Throws ValueError if one of them is
+// unfinished.
+RecordingStart start_after(const std::filesystem::path& house);
+// Start of the unfinished recording or, if there is none, of the last completed one.
+RecordingStart start_of_last(const std::filesystem::path& house);
+
+// Removes the recordings of a house and nothing else. Throws ValueError if another process records
+// into it.
+void remove_recordings(const std::filesystem::path& house);
 
 // Names that a house uses for unpublished files.
 inline constexpr const char* kStagingDir = ".recording";

@@ -80,13 +80,41 @@ void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& fiel
   videos.push_back(video);
 }
 
-// The field "present/mug" that belongs to the float field "actors/mug" of the same sensor, or null.
+// False for the field of a move group without joints, and for the flag of such a group.
+bool has_numbers(const Sensor& sensor, const Field& field) {
+  constexpr std::string_view kGiven = "given/";
+  if (!field.name.starts_with(kGiven)) return field.spec.shape.size() > 0;
+  const auto group =
+      std::ranges::find(sensor.fields(), field.name.substr(kGiven.size()), &Field::name);
+  return group == sensor.fields().end() || group->spec.shape.size() > 0;
+}
+
+// "mug" for the float fields "actors/mug" and "articulations/mug", which are the state of a thing of
+// the scene; "" for other fields.
+std::string thing_of(const Field& field) {
+  const bool number = field.spec.dtype == DType::kFloat32 || field.spec.dtype == DType::kFloat64;
+  for (const std::string_view group : {"actors/", "articulations/"}) {
+    if (number && field.name.starts_with(group)) return field.name.substr(group.size());
+  }
+  return "";
+}
+
+// The field "present/mug" that belongs to the field "actors/mug" of the same sensor, or null.
 const Field* presence_of(const Sensor& sensor, const Field& field) {
-  constexpr std::string_view kActors = "actors/";
-  if (!field.name.starts_with(kActors) || field.spec.dtype != DType::kFloat32) return nullptr;
-  const std::string flag = "present/" + field.name.substr(kActors.size());
-  const auto found = std::ranges::find(sensor.fields(), flag, &Field::name);
+  const std::string thing = thing_of(field);
+  if (thing.empty()) return nullptr;
+  const auto found = std::ranges::find(sensor.fields(), "present/" + thing, &Field::name);
   return found != sensor.fields().end() && found->spec.dtype == DType::kBool ? &*found : nullptr;
+}
+
+// Flag of a thing that is present in every episode. Observations do not have it.
+SensorSpec always_present(const Sensor& sensor, const std::string& thing) {
+  SensorSpec spec;
+  spec.name = fmt::format("{}/present/{}", sensor.name(), thing);
+  spec.dtype = DType::kBool;
+  spec.shape = {};
+  spec.description = "Whether the body takes part in the episode.";
+  return spec;
 }
 
 // Two datasets cannot have the same path, and a dataset cannot be a group.
@@ -120,6 +148,9 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
                    {"settings", settings},
                    {"versions", {{"mjsense", MJSENSE_VERSION}, {"mujoco", mj_versionString()}}}};
   if (!cfg.archive_name.empty()) j["model_archive"] = cfg.archive_name;
+  if (cfg.first_attempt > 0) j["first_attempt"] = cfg.first_attempt;
+  if (cfg.num_attempts > 0) j["num_attempts"] = cfg.num_attempts;
+  if (cfg.first_batch > 0) j["first_batch"] = cfg.first_batch;
   if (cfg.model) j["model"] = model_checksums(*cfg.model);
   if (!plan.videos.empty()) {
     const VideoCfg& v = cfg.video;
@@ -184,7 +215,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
     const std::string owner = fmt::format("sensor '{}'", sensor->name());
     const auto add_array = [&](ArrayStream stream) {
       stream.sensor = sensor;
-      stream.path = path_of(stream.spec.name);
+      if (stream.path.empty()) stream.path = path_of(stream.spec.name);
       stream.chunk_rows = chunk_rows(stream.row_bytes());
       claim(stream.path, owner);
       plan.arrays.push_back(std::move(stream));
@@ -204,6 +235,12 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
     if (const auto text = text_of(*sensor)) {
       note(*text);
       add_array({.spec = *text, .text = std::make_shared<JsonRows>(*sensor, text->str_max_len)});
+      for (const Field& field : sensor->fields()) {
+        if (!has_numbers(*sensor, field)) continue;
+        ArrayStream numbers{.spec = field.spec, .field = &field};
+        numbers.path = numbers_path(path_of(sensor->name()), field.name);
+        add_array(std::move(numbers));
+      }
       continue;
     }
     for (const Field& field : sensor->fields()) {
@@ -216,6 +253,12 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
         for (std::size_t i = first; i < plan.videos.size(); ++i)
           claim("obs/sensor_data/" + plan.videos[i].key, owner);
       }
+    }
+    if (sensor->name() != "env_states") continue;
+    for (const Field& field : sensor->fields()) {
+      const std::string thing = thing_of(field);
+      if (thing.empty() || owners.contains(path_of("env_states/present/" + thing))) continue;
+      add_array({.spec = always_present(*sensor, thing)});
     }
   }
   for (const char* group : standard_groups()) owners.erase(group);
@@ -254,14 +297,8 @@ std::string batch_file(int batch, int batches) {
   return fmt::format("trajectories_batch_{}_of_{}.h5", batch + 1, batches);
 }
 
-std::string video_file(std::string_view stem, std::string_view extension, int index, int batch,
-                       int batches) {
-  return fmt::format("episode_{:08d}_{}_batch_{}_of_{}{}", index, stem, batch + 1, batches,
-                     extension);
-}
-
-std::string video_file(const VideoStream& video, int index, int batch, int batches) {
-  return video_file(video.stem, video.extension, index, batch, batches);
+std::string video_file(std::int64_t episode, std::string_view name) {
+  return fmt::format("episode_{:08d}_{}", episode, name);
 }
 
 std::string spec_json(std::string_view sensor, std::string_view kind, const SensorSpec& spec) {

@@ -16,12 +16,13 @@
 
 namespace mjsense {
 
-// One dataset with one row per step: one field of a sensor, or all its fields as JSON text.
+// One dataset with one row per step: one field of a sensor, all its fields as JSON text, or the
+// constant `true`.
 struct ArrayStream {
   const Sensor* sensor = nullptr;
   SensorSpec spec;                       // of the dataset
-  const Field* field = nullptr;          // null if it is text of several fields
-  std::shared_ptr<const JsonRows> text;  // null if it is a single field
+  const Field* field = nullptr;          // null: text, or constant
+  std::shared_ptr<const JsonRows> text;  // text of all fields, or null
   const Field* present = nullptr;        // bool; the row is NaN where it is false. Null: no flag
   std::string path;                      // path in the trajectory's group: "obs/extra/tcp_pose"
   std::int64_t chunk_rows = 1;
@@ -74,9 +75,9 @@ struct Batches {
 Batches batches_of(int episodes, int batches);
 
 std::string batch_file(int batch, int batches);  // batch from 0
-std::string video_file(const VideoStream& video, int index, int batch, int batches);  // final name
-std::string video_file(std::string_view stem, std::string_view extension, int index, int batch,
-                       int batches);
+// Final name of the video `name` of an episode: "episode_00000007_wrist_camera.mp4". It depends on
+// nothing else, so an episode has the same files in whichever recording it is attempted.
+std::string video_file(std::int64_t episode, std::string_view name);
 // Group of the data for replay.
 inline constexpr std::string_view kReplayGroup = "replay/";
 constexpr std::size_t kFileNameBytes = 100;  // width of a file name in obs/sensor_data

@@ -63,7 +63,7 @@ TEST(Layout, StreamPathsEqualMolmoSpaces) {
 TEST(Layout, NumbersPerMoveGroupAreJsonRows) {
   const Plain qpos("qpos", spec(DType::kFloat32, {7}), "arm");
   const RecordingPlan p = plan({&qpos});
-  ASSERT_EQ(p.arrays.size(), 1u);
+  ASSERT_EQ(p.arrays.size(), 2u);  // the second are the numbers
   EXPECT_EQ(p.arrays[0].path, "obs/agent/qpos");
   EXPECT_EQ(p.arrays[0].kind(), "json");
   EXPECT_EQ(p.arrays[0].spec.shape, Shape({2000}));
@@ -91,8 +91,7 @@ TEST(Layout, BatchesEqualMolmoSpacesAndAreEven) {
   EXPECT_THROW(batch_sizes(0, 0), ValueError);
   EXPECT_THROW(batch_sizes(2, 3), ValueError);
   EXPECT_EQ(batch_file(0, 2), "trajectories_batch_1_of_2.h5");
-  EXPECT_EQ(video_file("wrist_camera_depth", ".mkv", 3, 0, 2),
-            "episode_00000003_wrist_camera_depth_batch_1_of_2.mkv");
+  EXPECT_EQ(video_file(3, "wrist_camera_depth.mkv"), "episode_00000003_wrist_camera_depth.mkv");
 }
 
 TEST(Layout, FramesPerSecondAreExact) {
@@ -109,11 +108,43 @@ TEST(Layout, EveryFieldHasAPath) {
   cfg.num_worlds = 2;
   cfg.sensors = suite.sensors();
   std::size_t fields = 0;
-  for (const Sensor* s : cfg.sensors) fields += text_of(*s) ? 1 : s->fields().size();
+  for (const Sensor* s : cfg.sensors) {
+    const auto empty = [&](const Field& f) {  // the base has no joints
+      return text_of(*s) && (f.spec.shape.size() == 0 || f.name == "given/base");
+    };
+    fields += s->fields().size() - std::ranges::count_if(s->fields(), empty);
+    fields += text_of(*s) ? 1 : 0;
+  }
   const RecordingPlan p = plan_recording(cfg);
-  EXPECT_EQ(p.arrays.size() + p.videos.size(), fields);
+  const auto added = [](const ArrayStream& a) {
+    return !a.field && !a.text;
+  };  // env_states/present
+  EXPECT_EQ(p.arrays.size() + p.videos.size(), fields + std::ranges::count_if(p.arrays, added));
   cfg.video.molmospaces_depth = true;
   EXPECT_EQ(plan_recording(cfg).videos.size(), p.videos.size() + 1);
+}
+
+// The numbers of a sensor that is stored as JSON text are also datasets of their own.
+TEST(Layout, JsonRowsHaveTheirNumbers) {
+  struct Joints final : Sensor {
+    Joints() : Sensor("qpos") {
+      SensorSpec arm = spec(DType::kFloat32, {7});
+      arm.unit = "rad";
+      add_field("arm", arm, 2);
+      add_field("base", spec(DType::kFloat32, {0}), 2);
+      add_field("given/base", spec(DType::kBool, {}), 2);
+    }
+    std::string_view kind() const override { return "joints"; }
+    void initialize(const SensorInit&) override {}
+    void compute(const World&) override {}
+  } joints;
+  const RecordingPlan p = plan({&joints});
+  ASSERT_EQ(p.arrays.size(), 2u);  // a group without joints has no numbers
+  EXPECT_EQ(p.arrays[0].path, "obs/agent/qpos");
+  EXPECT_TRUE(p.arrays[0].text);
+  EXPECT_EQ(p.arrays[1].path, "numbers/obs/agent/qpos/arm");
+  EXPECT_EQ(p.arrays[1].spec.unit, "rad");
+  EXPECT_EQ(p.arrays[1].field, &joints.fields()[0]);
 }
 
 // An actor's row depends on its own flag; an actor without a flag is always present.
@@ -123,16 +154,22 @@ TEST(Layout, PresenceFlagsHaveTheirActors) {
       for (const char* actor : {"actors/cup", "actors/mug"})
         add_field(actor, spec(DType::kFloat32, {13}), 2);
       add_field("present/mug", spec(DType::kBool, {}), 2);
+      add_field("articulations/door", spec(DType::kFloat64, {2}), 2);
     }
     std::string_view kind() const override { return "states"; }
     void initialize(const SensorInit&) override {}
     void compute(const World&) override {}
   } states;
   const RecordingPlan p = plan({&states});
-  ASSERT_EQ(p.arrays.size(), 3u);
+  ASSERT_EQ(p.arrays.size(), 6u);
   EXPECT_EQ(p.arrays[0].present, nullptr);
   EXPECT_EQ(p.arrays[1].present, &states.fields()[2]);
   EXPECT_EQ(p.arrays[2].path, "env_states/present/mug");
+  // Constant flags of the others.
+  EXPECT_EQ(p.arrays[4].path, "env_states/present/cup");
+  EXPECT_EQ(p.arrays[5].path, "env_states/present/door");
+  EXPECT_EQ(p.arrays[5].field, nullptr);
+  EXPECT_EQ(p.arrays[5].row_bytes(), 1u);
 }
 
 TEST(Layout, StreamsCannotShareAPath) {

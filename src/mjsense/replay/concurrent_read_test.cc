@@ -111,13 +111,12 @@ TEST(Live, ReplacedFileIsReportedAsChanged) {
 TEST(Live, ReplacedVideoIsReportedAsChanged) {
   TempDir dir;
   record(dir.path, 1, {.worlds = 1}, true);
-  const fs::path video = dir.path / "house_0/episode_00000000_wrist_camera_batch_1_of_1.mp4";
+  const fs::path video = dir.path / "house_0/episode_00000000_wrist_camera.mp4";
   ASSERT_TRUE(fs::exists(video));
   const std::string ffmpeg = fake_ffmpeg(
       dir.path, fmt::format("cp '{0}' '{0}.new'; mv '{0}.new' '{0}'; exit 1", video.string()));
   const VerifyResult found = verify(dir.path / "house_0", {.decode = true, .ffmpeg = ffmpeg});
-  EXPECT_THAT(found.text(),
-              HasSubstr("wrist_camera_batch_1_of_1.mp4' changed while it was being read"));
+  EXPECT_THAT(found.text(), HasSubstr("wrist_camera.mp4' changed while it was being read"));
 }
 
 // Data sets without elements can claim any number of rows at no cost.

@@ -109,13 +109,17 @@ std::string missing_names(const fs::path& path, int batch, int batches) {
   for (const std::string& trajectory : trajectory_names(file)) {
     const std::string params = trajectory + "/obs/sensor_param";
     if (!h5::exists(file, params)) continue;
+    const std::int64_t number = h5::int_attribute(h5::open_group(file, trajectory), "episode", -1);
     for (const std::string& camera : h5::children(h5::open_group(file, params))) {
       for (const std::string& key : {camera, camera + "_depth"}) {
-        const std::string name =
-            video_file(key, ".mp4", std::atoi(trajectory.c_str() + 5), batch - 1, batches);
         const std::string context = trajectory + "/obs/sensor_data";
-        if (!h5::exists(file, context + "/" + key) && is_plain_name(name) &&
-            printable(name) == name && name.size() <= kFileNameBytes &&
+        if (h5::exists(file, context + "/" + key)) continue;
+        // Files that have no episode numbers name videos by their position in the file.
+        const std::string name =
+            number >= 0 ? video_file(number, key + ".mp4")
+                        : fmt::format("episode_{:08d}_{}_batch_{}_of_{}.mp4",
+                                      std::atoi(trajectory.c_str() + 5), key, batch, batches);
+        if (is_plain_name(name) && printable(name) == name && name.size() <= kFileNameBytes &&
             is_plain_file(path.parent_path() / name))
           missing.push_back({context, key, name});
       }

@@ -95,7 +95,7 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
   record(dir.path, 3, {.worlds = 1}, true);
   ASSERT_TRUE(verify(dir.path).ok());
   const auto video = [](const fs::path& out, int e) {
-    return out / fmt::format("house_0/episode_{:08d}_wrist_camera_batch_1_of_1.mp4", e);
+    return out / fmt::format("house_0/episode_{:08d}_wrist_camera.mp4", e);
   };
   const auto replaced = [&](const fs::path& by, const fs::path& what) {
     const std::string original = read_file(what);
@@ -176,7 +176,7 @@ class RepairNames : public ::testing::Test {
 
 TEST_F(RepairNames, BelongToTheirBatch) {
   std::string is;
-  EXPECT_EQ(was, "episode_00000001_wrist_camera_batch_2_of_2.mp4");
+  EXPECT_EQ(was, "episode_00000004_wrist_camera.mp4");
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
   in_videos(false, [&](hid_t videos) { is = read_file_name(videos, "wrist_camera"); });
   EXPECT_EQ(is, was);

@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <limits>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
+#include "mjsense/core/rng.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/model_fields.h"
 #include "mjsense/record/outcome_details.h"
@@ -31,6 +33,8 @@ RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const Stop
   cfg.out_dir = job.out;
   cfg.house = job.house;
   cfg.episodes = job.episodes;
+  cfg.num_attempts = job.num_attempts;
+  cfg.first_attempt = job.first_attempt;
   cfg.batches = job.batches;
   cfg.num_worlds = rollout.num_worlds();
   cfg.fps = Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
@@ -45,6 +49,8 @@ RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const Stop
   cfg.settings = recording_settings(job, rollout);
   cfg.model = rollout.task().model();
   cfg.resume = job.resume;
+  cfg.append = job.append;
+  cfg.overwrite = job.overwrite;
   cfg.gzip = job.gzip;
   cfg.video = job.video;
   cfg.stop = stop;
@@ -55,10 +61,13 @@ class RecordJob {
  public:
   RecordJob(const RecordJobCfg& cfg, const StopFlag* stop)
       : cfg_(checked(cfg)),
-        rollout_(cfg_.rollout),
+        rollout_(rollout_cfg(cfg_)),
         recorder_(recording_cfg(cfg_, rollout_, stop)),
         lengths_(rollout_.num_worlds(), 0),
-        max_attempts_(cfg.max_attempts > 0 ? cfg.max_attempts : 6 * std::int64_t{cfg.episodes}) {
+        next_(recorder_.first_attempt()),
+        end_(next_ + (cfg_.num_attempts > 0   ? cfg_.num_attempts
+                      : cfg_.max_attempts > 0 ? cfg_.max_attempts
+                                              : 6 * std::int64_t{cfg_.episodes})) {
     for (const RecordedCamera& camera : rollout_.cameras()) pictures_ += camera.depth ? 2 : 1;
   }
 
@@ -84,12 +93,12 @@ class RecordJob {
         reported = progress_.seconds;
       }
     }
-    summary_.interrupted = stop && stop->load() > 0 && !recorder_.has_all_episodes();
+    summary_.interrupted = stop && stop->load() > 0 && !has_all();
     timed([&] { summary_.interrupted ? recorder_.flush() : recorder_.complete(); });
     progress_.seconds = since(begun);
     update_progress();
     if (report) report(progress_);
-    summary_.enough = recorder_.kept() >= cfg_.episodes;
+    summary_.enough = cfg_.num_attempts > 0 ? has_all() : recorder_.kept() >= cfg_.episodes;
     summary_.progress = progress_;
     summary_.times = rollout_.times();
     summary_.record = recorder_.stats();
@@ -108,10 +117,31 @@ class RecordJob {
     if (cfg.rollout.policy.empty() && !cfg.rollout.make_policy) {
       throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
     }
+    cfg = without_shard(std::move(cfg));
+    if (cfg.num_attempts > std::numeric_limits<int>::max())
+      throw ValueError(fmt::format("num_attempts is {}, the maximum is {}", cfg.num_attempts,
+                                   std::numeric_limits<int>::max()));
+    if (cfg.num_attempts > 0 && (cfg.episodes != 1 || cfg.max_attempts > 0)) {
+      throw ValueError(
+          "num_attempts is the number of attempts, whatever their outcome: leave out episodes and "
+          "max_attempts");
+    }
+    if (cfg.num_attempts > 0) cfg.episodes = static_cast<int>(cfg.num_attempts);
     cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);
     cfg.rollout = resolved(std::move(cfg.rollout));
     cfg.rollout.replay_sensor = cfg.replay;
     return cfg;
+  }
+
+  static RolloutCfg rollout_cfg(const RecordJobCfg& cfg) {
+    RolloutCfg rollout = cfg.rollout;
+    rollout.seed = seed_of_house(rollout.seed, cfg.house);
+    return rollout;
+  }
+
+  bool has_all() const {
+    return cfg_.num_attempts > 0 ? recorder_.kept() + recorder_.discarded() >= cfg_.num_attempts
+                                 : recorder_.has_all_episodes();
   }
 
   template <class Body>
@@ -128,8 +158,8 @@ class RecordJob {
     episodes_.clear();
     for (int w = 0; w < rollout_.num_worlds(); ++w) {
       if (rollout_.active(w)) continue;
-      while (next_ < max_attempts_ && recorder_.decided(next_)) ++next_;
-      if (next_ >= max_attempts_ || recorder_.kept() + running_ >= cfg_.episodes) break;
+      while (next_ < end_ && recorder_.decided(next_)) ++next_;
+      if (next_ >= end_ || recorder_.kept() + running_ >= cfg_.episodes) break;
       worlds_.push_back(w);
       episodes_.push_back(next_++);
       ++running_;
@@ -138,7 +168,7 @@ class RecordJob {
     rollout_.start(worlds_, episodes_);
     for (std::size_t k = 0; k < worlds_.size(); ++k) {
       timed([&] {
-        recorder_.begin_episode(worlds_[k], {.episode = episodes_[k], .seed = cfg_.rollout.seed});
+        recorder_.begin_episode(worlds_[k], {.episode = episodes_[k], .seed = rollout_.cfg().seed});
       });
       lengths_[worlds_[k]] = 0;
       observe(worlds_[k]);
@@ -208,6 +238,8 @@ class RecordJob {
     if (!held.empty())
       arrays.push_back({"held",
                         "Ids of the free joints of absent objects, which are held at rest.",
+                        "",
+                        "",
                         DType::kInt32,
                         {static_cast<std::int64_t>(held.size())},
                         {bytes.begin(), bytes.end()}});
@@ -225,7 +257,7 @@ class RecordJob {
 
   void update_progress() {
     progress_.kept = recorder_.saved();
-    progress_.wanted = cfg_.episodes;
+    progress_.wanted = cfg_.episodes - (cfg_.num_attempts > 0 ? recorder_.discarded() : 0);
     progress_.running = running_;
     progress_.running_steps = 0;
     for (int w = 0; w < rollout_.num_worlds(); ++w) {
@@ -242,14 +274,47 @@ class RecordJob {
   std::vector<int> lengths_;  // observations recorded of each world's current episode
   std::vector<int> worlds_;
   std::vector<std::int64_t> episodes_;
-  std::int64_t next_ = 0;
+  std::int64_t next_, end_;  // the next attempt, and the one after the last
   std::int64_t ended_steps_ = 0;
-  std::int64_t max_attempts_;
   int running_ = 0;
   int pictures_ = 0;  // images per observation
 };
 
 }  // namespace
+
+RecordJobCfg without_shard(RecordJobCfg job) {
+  if (job.shard.empty()) return job;
+  std::int64_t k = -1, n = 0;
+  const char *first = job.shard.data(), *last = first + job.shard.size();
+  const auto [slash, k_error] = std::from_chars(first, last, k);
+  const auto [end, n_error] = slash < last && *slash == '/'
+                                  ? std::from_chars(slash + 1, last, n)
+                                  : std::from_chars_result{slash, std::errc::invalid_argument};
+  if (k_error != std::errc{} || n_error != std::errc{} || end != last || k < 0 || k >= n) {
+    throw ValueError(
+        fmt::format("shard is '{}', expected k/n with k from 0 to n - 1, such as 0/8", job.shard));
+  }
+  const std::int64_t total = job.num_attempts;
+  if (total < n) {
+    throw ValueError(fmt::format(
+        "shard '{}': num_attempts is {}; it is the number of attempts of all shards, at least {}",
+        job.shard, total, n));
+  }
+  if (job.append)
+    throw ValueError("shard and append exclude each other: use first_attempt for new attempts");
+  // Without k * total, which can overflow.
+  const auto begin_of = [&](std::int64_t i) { return total / n * i + std::min(i, total % n); };
+  job.first_attempt += begin_of(k);
+  job.num_attempts = begin_of(k + 1) - begin_of(k);
+  job.out /= fmt::format("shard_{}", k);
+  job.shard.clear();
+  return job;
+}
+
+std::uint64_t seed_of_house(std::uint64_t seed, int house) {
+  if (house == 0) return seed;
+  return Rng(seed, static_cast<std::uint32_t>(house), stream_of("house"), 0).next64();
+}
 
 double RecordProgress::seconds_left() const {
   if (mean_length == 0 || steps == 0) return std::numeric_limits<double>::quiet_NaN();

@@ -119,9 +119,9 @@ void require_code(const RecordJobCfg& job) {
   const RolloutCfg& cfg = job.rollout;
   const auto require = [&](bool is_own, std::string_view part) {
     const auto has = [&](const auto& entry) { return entry.first.starts_with(part); };
-    if (job.resume && is_own && std::ranges::none_of(cfg.code, has))
+    if ((job.resume || job.append) && is_own && std::ranges::none_of(cfg.code, has))
       throw ValueError(
-          fmt::format("cannot resume: the {} is made by the calling program and RolloutCfg::code "
+          fmt::format("cannot continue: the {} is made by the calling program and RolloutCfg::code "
                       "does not describe it, so it cannot be compared with that of the recording",
                       part));
   };

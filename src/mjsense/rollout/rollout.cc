@@ -61,6 +61,7 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   out.terminate_upon_success = cfg.terminate_upon_success;
   if (!cfg.make_task) set_task_defaults(cfg.task, out);
   if (cfg.horizon) out.horizon = *cfg.horizon;
+  if (cfg.policy_dt_ms) out.policy_dt_ms = *cfg.policy_dt_ms;
   return out;
 }
 
@@ -106,6 +107,7 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
   cfg_.policy = policy_ ? policy_->name() : "";
   cfg_.seed = own.seed;
   cfg_.horizon = own.horizon;
+  cfg_.policy_dt_ms = own.policy_dt_ms;
   cfg_.action_noise = own.action_noise;
   cfg_.perturb = own.perturb;
   cfg_.terminate_upon_success = own.terminate_upon_success;

@@ -68,7 +68,7 @@ struct RolloutCfg {
   int samples = 1;
   bool shadows = true;
   std::string meshes = "auto";  // one of kMeshes
-  std::optional<int> horizon;
+  std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
   bool terminate_upon_success = false;
   double perturb = 0;
@@ -148,6 +148,13 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("horizon", c.horizon, "Maximum number of control steps of an episode; by default the task's.")
       .at_least(1)
       .decides_data_as("horizon");
+  v("policy_dt_ms", c.policy_dt_ms,
+    "Duration of one action of the policy, a multiple of the controllers' period; by default the "
+    "robot's or the task's. 50 ms gives 20 observations per second.")
+      .unit("ms")
+      .option("policy_dt")
+      .at_least(1)
+      .decides_data_as("policy_dt_ms");
   v("action_noise", c.action_noise, "Add noise to the commands of the arm.")
       .option("noise")
       .decides_data();

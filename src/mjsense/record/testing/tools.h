@@ -61,14 +61,14 @@ inline int length_of(std::int64_t episode, int steps) {
   return steps + static_cast<int>(episode % 3);
 }
 
-// Runs attempts 0, 1, 2 ... like a rollout until the recording has enough episodes.
+// Runs attempts in order, like a rollout, until the recording has enough episodes.
 inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) {
   struct Running {
     std::int64_t episode = -1;
     int t = 0;
   };
   std::vector<Running> running(a.worlds);
-  std::int64_t next = 0;
+  std::int64_t next = recorder.first_attempt();
   for (int decided = 0; !recorder.has_all_episodes();) {
     for (int w = 0; w < a.worlds && !recorder.has_all_episodes(); ++w) {
       Running& r = running[w];
