@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recording on many machines with Ray: a job is divided into shards, ranges of attempts, each of which any worker can record alone."""
+
+from mjsense.cluster.driver import ClusterProgress, ClusterSummary, record_on_ray
+from mjsense.cluster.job import Job
+
+__all__ = ["ClusterProgress", "ClusterSummary", "Job", "record_on_ray"]

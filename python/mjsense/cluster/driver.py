@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The driver of a recording on Ray: hands out shards until the wanted episodes are recorded, and writes the index."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mjsense.cluster.index import write_index
+from mjsense.cluster.job import Job, Shard, ShardResult, run_shard
+from mjsense.cluster.storage import Storage
+
+
+@dataclass(frozen=True)
+class ClusterProgress:
+    """Progress of a recording on Ray. Attempts are counted when their shard is done."""
+
+    kept: int
+    """Episodes in the shards without a gap from the first one."""
+    wanted: int
+    succeeded: int
+    failed: int
+    shards: int
+    """Shards that are done."""
+    workers: int
+    """Shards that are being recorded."""
+    steps_per_second: float
+    """Steps of the policy by all workers, since the driver started."""
+    seconds: float
+    """Wall-clock time of the driver."""
+
+
+@dataclass(frozen=True)
+class ClusterSummary(ClusterProgress):
+    """Result of a recording on Ray."""
+
+    enough: bool
+    """Whether all wanted episodes are recorded."""
+    failures: dict[str, int]
+    """Number of failed attempts by reason."""
+    out: str
+    """The output directory, which contains ``index.parquet``."""
+
+
+class _Results:
+    """Shards that are done."""
+
+    def __init__(self, storage: Storage, fingerprint: str) -> None:
+        self.done: dict[int, ShardResult] = {}
+        for path in storage.find("shard_*/done.json"):
+            result = ShardResult.parse(storage.read(path) or b"")
+            if result.fingerprint == fingerprint:
+                self.done[result.shard.number] = result
+        self._old_steps = sum(result.steps for result in self.done.values())
+
+    def without_gap(self) -> list[ShardResult]:
+        count = 0
+        while count in self.done:
+            count += 1
+        return [self.done[number] for number in range(count)]
+
+    def progress(self, wanted: int, workers: int, seconds: float) -> dict[str, Any]:
+        results = self.done.values()
+        steps = sum(result.steps for result in results) - self._old_steps
+        return {
+            "kept": sum(len(result.episodes) for result in self.without_gap()), "wanted": wanted,
+            "succeeded": sum(result.succeeded for result in results), "failed": sum(result.failed for result in results),
+            "shards": len(results), "workers": workers, "steps_per_second": steps / seconds if seconds > 0 else 0.0, "seconds": seconds,
+        }  # fmt: skip
+
+
+def _claim(storage: Storage, job: Job, shard_attempts: int, resume: bool) -> None:
+    """Writes what the directory contains, or compares it with what it contains already."""
+    ours = {**job.settings(), "shard_attempts": shard_attempts}
+    found = storage.read("job.json")
+    if found is None:
+        return storage.write("job.json", json.dumps(ours, indent=1, sort_keys=True).encode())
+    theirs = json.loads(found)
+    if not resume:
+        raise FileExistsError(f"{job.out} contains a recording: continue it with resume (--resume), or choose another directory")
+    for name in sorted({*ours, *theirs}):
+        if ours.get(name) != theirs.get(name):
+            raise ValueError(f"{job.out} contains a different recording: {name} is {theirs.get(name)!r} there, and {ours.get(name)!r} here")
+
+
+def record_on_ray(
+    job: Job,
+    *,
+    episodes: int,
+    max_attempts: int = 0,
+    shard_attempts: int = 16,
+    address: str = "local",
+    resume: bool = False,
+    runtime_env: dict[str, Any] | None = None,
+    progress: Callable[[ClusterProgress], None] | None = None,
+) -> ClusterSummary:
+    """Records episodes as stateless Ray tasks of one CPU each. The episodes are those of one process with the same arguments.
+
+    A task that is lost with its worker is repeated; an exception of the recording ends it here. The driver may be killed at any
+    time and continues with ``resume``.
+
+    Args:
+        job: What to record, and where.
+        episodes: Number of episodes to keep: the first ones.
+        max_attempts: Maximum number of attempts; 0: six times ``episodes``.
+        shard_attempts: Attempts of one task.
+        address: ``local`` for a cluster of this machine's CPUs that ends with the recording, ``auto``, or the address of a cluster.
+        resume: Continue an interrupted recording.
+        runtime_env: Ray's runtime environment: ``working_dir``, ``pip`` and so on.
+        progress: Called about once per second.
+    """
+    try:
+        import ray
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"Recording on a cluster needs Ray: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    if episodes < 1 or shard_attempts < 1:
+        raise ValueError(f"episodes is {episodes} and shard_attempts is {shard_attempts}: both must be at least 1")
+    _check_pickle(job)
+    storage, fingerprint = Storage(job.out), job.fingerprint()
+    _claim(storage, job, shard_attempts, resume)
+    results = _Results(storage, fingerprint)
+    attempts = max_attempts or 6 * episodes
+    shards = [Shard(n, n * shard_attempts, min(shard_attempts, attempts - n * shard_attempts)) for n in range(math.ceil(attempts / shard_attempts))]
+
+    started_here = not ray.is_initialized()
+    if started_here:
+        options: dict[str, Any] = {"log_to_driver": False, "runtime_env": runtime_env, "logging_level": "ERROR"}
+        ray.init(**options, include_dashboard=False) if address == "local" else ray.init(address=address, **options)
+    began, running = time.perf_counter(), {}
+
+    def report() -> dict[str, Any]:
+        now = results.progress(episodes, len(running), time.perf_counter() - began)
+        if progress is not None:
+            progress(ClusterProgress(**now))
+        return now
+
+    try:
+        task = ray.remote(num_cpus=1, max_retries=-1)(run_shard)
+        waiting = [shard for shard in shards if shard.number not in results.done]
+        while report()["kept"] < episodes and (waiting or running):
+            slots = max(1, int(ray.cluster_resources().get("CPU", 1)))
+            while waiting and len(running) < slots + 1:  # one more, so that no worker waits for the driver
+                shard = waiting.pop(0)
+                running[task.remote(job, shard, fingerprint)] = shard
+            for ref in ray.wait(list(running), timeout=1.0)[0]:
+                shard = running.pop(ref)
+                try:
+                    results.done[shard.number] = ray.get(ref)
+                except ray.exceptions.RayTaskError as error:
+                    raise error.as_instanceof_cause() from None
+        final = report()
+    finally:
+        for ref in running:
+            ray.cancel(ref, force=True)
+        if started_here:
+            ray.shutdown()
+    write_index(storage, results.without_gap(), episodes)
+    failures: dict[str, int] = {}
+    for result in results.done.values():
+        for reason, count in result.failures.items():
+            failures[reason] = failures.get(reason, 0) + count
+    return ClusterSummary(**{**final, "workers": 0}, enough=final["kept"] >= episodes, failures=failures, out=job.out)
+
+
+def _check_pickle(job: Job) -> None:
+    """Raises TypeError that names the argument which cannot be sent to workers."""
+    from ray import cloudpickle
+
+    for name, value in (job.arguments or {}).items():
+        try:
+            cloudpickle.dumps(value)
+        except Exception as error:
+            raise TypeError(f"record: {name} cannot be sent to the workers: {error}. Pass the class or a function that creates it") from error

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``index.parquet``: the episodes of a job, with the shards' files that contain them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+from mjsense.cluster.job import ShardResult
+from mjsense.cluster.storage import Storage
+
+INDEX = "index.parquet"
+
+
+def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int) -> None:
+    """Writes one row for each of the first ``episodes`` episodes, in the order of attempts. Paths are relative to the index."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"The index needs pyarrow: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    rows = [
+        {**row, "path": f"{result.shard.folder}/{row['path']}"} for result in results for row in sorted(result.episodes, key=lambda row: row["episode"])
+    ]
+    kinds = {"episode": "int64", "path": "string", "trajectory": "string", "seed": "uint64", "length": "int64", "success": "bool_",
+             "outcome": "string", "task": "string"}  # fmt: skip
+    schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in kinds.items()])
+    table = pyarrow.Table.from_pylist(rows[:episodes], schema=schema)
+    data = io.BytesIO()
+    pyarrow.parquet.write_table(table, data)
+    storage.write(INDEX, data.getvalue())

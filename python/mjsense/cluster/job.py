@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording that can be divided into shards, and the work of one shard."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mjsense import _core
+from mjsense.cluster.storage import Storage
+
+_FREE = {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite", "ffmpeg",
+         "batches", "out", "progress", "sensors"}  # fmt: skip
+"""Arguments of ``record`` that do not change the episodes, or that the driver sets."""
+
+
+@dataclass(frozen=True)
+class Shard:
+    """The attempts ``first`` to ``first + count - 1`` of a job."""
+
+    number: int
+    first: int
+    count: int
+
+    @property
+    def folder(self) -> str:
+        """Name of its folder in the output directory."""
+        return f"shard_{self.number}"
+
+
+@dataclass
+class ShardResult:
+    """What a shard recorded; ``done.json`` in its folder."""
+
+    shard: Shard
+    fingerprint: str
+    """Of the job; results of another job are refused."""
+    episodes: list[dict[str, Any]]
+    """One dict for each kept episode: episode (its attempt), path (relative to the shard), trajectory, seed, length, success, outcome, task."""
+    succeeded: int
+    failed: int
+    steps: int
+    """Steps of the policy."""
+    failures: dict[str, int] = field(default_factory=dict)
+    """Number of failed attempts by reason."""
+    seconds: float = 0.0
+    """Wall-clock time of the worker."""
+
+    @staticmethod
+    def parse(text: bytes) -> ShardResult:
+        """Inverse of ``json.dumps(asdict(result))``."""
+        values = json.loads(text)
+        return ShardResult(**{**values, "shard": Shard(**values["shard"])})
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the workers record. It is sent to them by pickle."""
+
+    out: str
+    """Output directory: a path, or a URL of a file system that fsspec knows, such as ``s3://bucket/data``."""
+    arguments: dict[str, Any] | None = None
+    """Keyword arguments of :func:`mjsense.record`."""
+    words: tuple[str, ...] = ()
+    """Arguments of the command ``mjsense record``, if there are no keyword arguments."""
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that decides which episodes the job contains, as JSON values."""
+        if self.arguments is None:
+            return {"version": _core.__version__, "words": list(self.words)}  # pyright: ignore[reportAttributeAccessIssue]
+        from mjsense._parts import parts_of
+
+        options = {"resume": True, "append": False, **self.arguments}
+        code = parts_of(options, options.pop("sensors", ()))[4]
+        decided = {name: value for name, value in options.items() if name not in _FREE}
+        return json.loads(json.dumps({"version": _core.__version__, "options": decided, "code": code}, default=str))  # pyright: ignore[reportAttributeAccessIssue]
+
+    def fingerprint(self) -> str:
+        """Checksum of the settings."""
+        return hashlib.sha256(json.dumps(self.settings(), sort_keys=True).encode()).hexdigest()[:16]
+
+    def record(self, folder: Path, shard: Shard) -> dict[str, Any]:
+        """Records the shard's attempts into an empty local folder. Returns the summary as ``mjsense record --json`` prints it."""
+        if self.arguments is not None:
+            from mjsense.record import record
+
+            summary = record(**{**self.arguments, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count})
+            return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
+        command = [sys.executable, "-m", "mjsense", "record", *self.words, "--out", str(folder), "--no-sheet", "--json", "--quiet"]
+        command += ["--first-attempt", str(shard.first), "--num-attempts", str(shard.count)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode not in (0, 1):
+            raise RuntimeError(done.stderr.strip().removeprefix("mjsense: "))
+        return json.loads(done.stdout)
+
+
+def _kept_episodes(folder: Path) -> Iterable[dict[str, Any]]:
+    from mjsense.dataset import Dataset
+
+    if not any(folder.glob("house_*/trajectories_batch_*.h5")):
+        return
+    for e in Dataset(folder).episodes:
+        yield {"episode": e.number, "path": str(e.path.relative_to(folder)), "trajectory": e.trajectory, "seed": e.seed, "length": e.length,
+               "success": e.success, "outcome": e.outcome, "task": e.task}  # fmt: skip
+
+
+def run_shard(job: Job, shard: Shard, fingerprint: str) -> ShardResult:
+    """Records a shard into a temporary folder, moves it to the output directory, and marks it as done."""
+    began = time.perf_counter()
+    folder = Path(tempfile.mkdtemp(prefix="mjsense_shard_"))
+    try:
+        summary = job.record(folder, shard)
+        result = ShardResult(
+            shard, fingerprint, list(_kept_episodes(folder)), summary["succeeded"], summary["failed"], summary["steps"], summary["failures"],
+            time.perf_counter() - began)  # fmt: skip
+        storage = Storage(job.out)
+        storage.put_folder(folder, shard.folder)
+        storage.write(f"{shard.folder}/done.json", json.dumps(asdict(result)).encode())
+        return result
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

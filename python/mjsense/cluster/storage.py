@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The output directory of a job, on any file system that fsspec knows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class Storage:
+    """Files by their paths relative to the root."""
+
+    def __init__(self, root: str) -> None:
+        try:
+            from fsspec.core import url_to_fs
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(f"Recording with Ray needs fsspec: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+        self._fs, self._root = url_to_fs(root)
+
+    def _path(self, path: str) -> str:
+        return f"{self._root}/{path}"
+
+    def write(self, path: str, data: bytes) -> None:
+        """Writes a file that appears with all of its content."""
+        part = self._path(path + ".part")
+        self._fs.makedirs(part.rsplit("/", 1)[0], exist_ok=True)
+        self._fs.pipe_file(part, data)
+        self._fs.mv(part, self._path(path))
+
+    def read(self, path: str) -> bytes | None:
+        """None if there is no such file."""
+        try:
+            return self._fs.cat_file(self._path(path))
+        except FileNotFoundError:
+            return None
+
+    def find(self, pattern: str) -> list[str]:
+        """Paths that match a glob pattern."""
+        return [str(found)[len(self._root) + 1 :] for found in self._fs.glob(self._path(pattern))]
+
+    def put_folder(self, local: Path, path: str) -> None:
+        """Copies a local folder. Files that are already there are replaced."""
+        for file in sorted(local.rglob("*")):
+            if file.is_file():
+                target = self._path(f"{path}/{file.relative_to(local)}")
+                self._fs.makedirs(target.rsplit("/", 1)[0], exist_ok=True)
+                self._fs.put_file(str(file), target)
