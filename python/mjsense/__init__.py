@@ -16,15 +16,16 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
     what all worlds share        Scene, SceneCfg, EntityCfg, TerrainCfg
     many worlds                  Simulation: step, reset, qpos, ctrl, randomize, draw
-    your own MuJoCo program      attach (sensors over your data), Renderer; RecordEpisodes records any gymnasium.Env
+    your own MuJoCo program      attach: sensors over your MjModel and MjData; Renderer
     sensors of a scene           BuiltinSensorCfg, ContactSensorCfg, RayCastSensorCfg, TerrainHeightSensorCfg, LidarSensorCfg,
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
-    episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
-    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay; for other programs:
-                                 export_lerobot, export_lerobot21
-                                 export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
-    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
+    episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv)
+    recording                    record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: any gymnasium.Env;
+                                 Recorder: your own loop; mjsense.cluster: on many machines with Ray
+    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
+    other programs               export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
+                                 export_zarr; import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
