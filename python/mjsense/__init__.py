@@ -69,7 +69,7 @@ from mjsense.pipeline import ObservationPipeline
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
-from mjsense.record_episodes import EpisodeRecording, RecordEpisodes, RecordVectorEpisodes
+from mjsense.record_episodes import RecordEpisodes, RecordVectorEpisodes
 from mjsense.recorder import Recorder
 from mjsense.renderer import Renderer
 from mjsense.robot import MoveGroup, Robot, RobotCamera
@@ -89,7 +89,7 @@ __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "EpisodeRecording", "FunctionSensor",
+    "EpisodeCheck", "FunctionSensor",
     "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
     "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
     "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes", "Recorder", "Renderer", "ReplayReport",

@@ -114,7 +114,7 @@ class _MujocoEnvs:
             self.attached.close()
 
 
-class EpisodeRecording:
+class _Recording:
     """The recording of a wrapped environment; see :class:`RecordEpisodes` for the arguments."""
 
     def __init__(
@@ -124,15 +124,19 @@ class EpisodeRecording:
         episodes: int,
         cameras: Mapping[str, Any] | Sequence[str],
         sensors: Sequence[Any],
-        camera_size: Sequence[int],
+        camera_size: Sequence[float],
         decimation: int | None,
-        fps: float | None,
+        fps: float | Fraction | None,
         resume: bool,
         keep_partial: bool,
         info_bytes: int,
         settings: Mapping[str, Any] | None,
         options: Mapping[str, Any],
     ) -> None:
+        if episodes < 1:
+            raise ValueError(f"RecordEpisodes: episodes is {episodes}: must be at least 1")
+        if len(camera_size) != 2:
+            raise ValueError(f"RecordEpisodes: camera_size is {camera_size}: must be (height, width)")
         if unknown := options.keys() - _OPTIONS.keys():
             raise TypeError(f"RecordEpisodes() got unexpected arguments {', '.join(sorted(unknown))}; options are {', '.join(_OPTIONS)}")
         self._env = env
@@ -187,7 +191,7 @@ class EpisodeRecording:
             )
         return envs
 
-    def _rate(self, fps: float | None) -> Fraction:
+    def _rate(self, fps: float | Fraction | None) -> Fraction:
         if fps is None:
             fps = float(self._env.metadata.get("render_fps") or 30)
             inner = getattr(self._env.unwrapped, "envs", [self._env])[0].unwrapped
@@ -390,6 +394,7 @@ def _seeds(seed: Any, worlds: Sequence[int]) -> dict[int, int | None]:
     return {w: seed[w] for w in worlds}
 
 
+@checked
 class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
     """Records the episodes of a Gymnasium environment, MuJoCo or not, to the files of :func:`mjsense.record`::
 
@@ -422,8 +427,8 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         TypeError: If a space has no arrays, or if a camera or sensor needs a MuJoCo model that the environment does not show.
     """
 
-    recording: EpisodeRecording
-    """State of the recording: ``path``, ``kept``, ``complete``."""
+    recording: _Recording
+    """State of the recording: ``path`` is its folder, ``kept`` the number of recorded episodes, ``complete`` whether all are recorded."""
 
     def __new__(cls, env: Any, *args: Any, **kwargs: Any) -> Any:
         return RecordVectorEpisodes(env, *args, **kwargs) if isinstance(env, VectorEnv) else super().__new__(cls)
@@ -436,7 +441,7 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         *,
         cameras: Mapping[str, Any] | Sequence[str] = (),
         sensors: Sequence[Any] = (),
-        camera_size: Sequence[int] = (240, 320),
+        camera_size: Sequence[float] = (240, 320),
         decimation: int | None = None,
         fps: float | Fraction | None = None,
         resume: bool = False,
@@ -446,10 +451,9 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         **options: Any,
     ) -> None:
         super().__init__(env)
-        self.recording = _recording(
-            env, out, episodes, cameras=cameras, sensors=sensors, camera_size=camera_size, decimation=decimation, fps=fps, resume=resume,
-            keep_partial=keep_partial, info_bytes=info_bytes, settings=settings, options=options,
-        )  # fmt: skip
+        self.recording = _Recording(
+            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, info_bytes, settings, options
+        )
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         observation, info = self.env.reset(seed=seed, options=options)
@@ -467,11 +471,12 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         self.env.close()
 
 
+@checked
 class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
     """:class:`RecordEpisodes` of a ``gymnasium.vector.VectorEnv``, with the same arguments, in all autoreset modes."""
 
-    recording: EpisodeRecording
-    """State of the recording: ``path``, ``kept``, ``complete``."""
+    recording: _Recording
+    """State of the recording: ``path`` is its folder, ``kept`` the number of recorded episodes, ``complete`` whether all are recorded."""
 
     def __init__(
         self,
@@ -481,7 +486,7 @@ class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
         *,
         cameras: Mapping[str, Any] | Sequence[str] = (),
         sensors: Sequence[Any] = (),
-        camera_size: Sequence[int] = (240, 320),
+        camera_size: Sequence[float] = (240, 320),
         decimation: int | None = None,
         fps: float | Fraction | None = None,
         resume: bool = False,
@@ -491,10 +496,9 @@ class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
         **options: Any,
     ) -> None:
         super().__init__(env)
-        self.recording = _recording(
-            env, out, episodes, cameras=cameras, sensors=sensors, camera_size=camera_size, decimation=decimation, fps=fps, resume=resume,
-            keep_partial=keep_partial, info_bytes=info_bytes, settings=settings, options=options,
-        )  # fmt: skip
+        self.recording = _Recording(
+            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, info_bytes, settings, options
+        )
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
@@ -518,30 +522,3 @@ class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
         """Publishes the recording and closes the environments."""
         self.recording.close()
         self.env.close(**kwargs)
-
-
-@checked
-def _recording(
-    env: Any,
-    out: str | Path,
-    episodes: int,
-    *,
-    cameras: Mapping[str, Any] | Sequence[str],
-    sensors: Sequence[Any],
-    camera_size: Sequence[int],
-    decimation: int | None,
-    fps: float | Fraction | None,
-    resume: bool,
-    keep_partial: bool,
-    info_bytes: int,
-    settings: Mapping[str, Any] | None,
-    options: dict[str, Any],
-) -> EpisodeRecording:
-    if episodes < 1:
-        raise ValueError(f"RecordEpisodes: episodes is {episodes}: must be at least 1")
-    if len(camera_size) != 2:
-        raise ValueError(f"RecordEpisodes: camera_size is {camera_size}: must be (height, width)")
-    return EpisodeRecording(
-        env, out, episodes, cameras, sensors, camera_size, decimation, None if fps is None else float(fps), resume, keep_partial, info_bytes,
-        settings, options,
-    )  # fmt: skip
