@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense.RecordEpisodes on environments of Gymnasium, gymnasium-robotics and Meta-World, with cameras and attached sensors."""
+"""mjsense.RecordEpisodes on environments of Gymnasium and gymnasium-robotics, with cameras and attached sensors."""
 
 import subprocess
 import sys
@@ -52,6 +52,6 @@ data = recorded(gymnasium.make("FetchReach-v4", max_episode_steps=10), "fetch", 
 episode = data.episodes[0]
 assert np.allclose(episode["obs/extra/tip"], episode["obs/extra/observation/achieved_goal"], atol=1e-6)
 assert episode["obs/extra/observation/desired_goal"].shape == (11, 3)
-env = gymnasium.make("FrankaKitchen-v1", max_episode_steps=5, render_mode="rgb_array", tasks_to_complete=["kettle"])
-data = recorded(mjs.compat.gymnasium.use(env) if hasattr(mjs, "compat") else env, "kitchen", 1, cameras={"room": 0}, camera_size=(48, 64))
+env = gymnasium.make("FrankaKitchen-v1", max_episode_steps=5, tasks_to_complete=["kettle"])
+data = recorded(env, "kitchen", 1, cameras={"room": 0}, camera_size=(48, 64))
 assert data.episodes[0]["obs/extra/observation/observation"].shape == (6, 59) and data.episodes[0].video("room")[2].std() > 5
