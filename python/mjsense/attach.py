@@ -46,16 +46,16 @@ class Attached(KnownAttributes):
         threads: int = 0,
         seed: Seed = 0,
     ) -> None:
-        self.model = model
+        self.model = getattr(model, "_model", model)
         """The user's model."""
-        self.datas: tuple[Any, ...] = tuple(data) if isinstance(data, (list, tuple)) else (data,)
+        self.datas: tuple[Any, ...] = tuple(getattr(one, "_data", one) for one in (data if isinstance(data, (list, tuple)) else [data]))
         """The user's data, by world."""
         if not self.datas:
             raise ValueError("attach(): data is empty: pass one MjData, or a list with one for each world")
-        self._mujoco: Any = _foreign_model.package_of(model)
+        self._mujoco: Any = _foreign_model.package_of(self.model)
         self._same_series = _foreign_model.is_our_series(self._mujoco)
-        copy = None if self._same_series else _foreign_model.copy_of(model)
-        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), (model if copy is None else copy)._address)
+        copy = None if self._same_series else _foreign_model.copy_of(self.model)
+        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), (self.model if copy is None else copy)._address)
         self._sim = Simulation(scene, len(self.datas), decimation, threads, seed)
         state = self._sim.state
         self._columns: dict[str, slice] = {}
@@ -274,7 +274,7 @@ def attach(
     the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
 
     Args:
-        model: The ``mujoco.MjModel``. It is not changed.
+        model: The ``mujoco.MjModel``, or robosuite's or dm_control's wrapper of it. It is not changed.
         data: A ``mujoco.MjData`` of the model, or a list with one for each world.
         sensors: Sensor configurations and :class:`mjsense.Sensor` objects, as in :class:`mjsense.SceneCfg`. Names are those of the model;
             an element without a name has the name of its kind and number, ``geom_3``. MuJoCo's sensors of the model are attached, too.

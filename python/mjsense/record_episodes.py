@@ -78,8 +78,18 @@ class _MujocoEnvs:
         self._renderers: dict[int, Renderer] = {}
         self.attached: Attached | None = None
         if sensors:
-            steps = decimation or int(getattr(envs[0].unwrapped, "frame_skip", 1))
+            inner = envs[0].unwrapped
+            steps = decimation or int(getattr(inner, "frame_skip", getattr(inner, "n_substeps", 1)))
+            self._check_models()
             self.attached = Attached(self._pairs[0][0], [data for _, data in self._pairs], sensors, decimation=steps)
+
+    def _check_models(self) -> None:
+        first = self._pairs[0][0]
+        for world, (model, _) in enumerate(self._pairs[1:], 1):
+            for name in dir(first):
+                mine = getattr(model, name, None) if name[0] != "_" else None
+                if isinstance(mine, np.ndarray) and not np.array_equal(mine, getattr(first, name), equal_nan=mine.dtype.kind == "f"):
+                    raise ValueError(f"RecordEpisodes: the models of environments 0 and {world} differ in {name}; sensors need equal models")
 
     @staticmethod
     def _pair(env: Any) -> tuple[Any, Any]:
@@ -414,7 +424,7 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
             which :class:`mjsense.Renderer` draws. A sequence of names gives cameras of the model their own names.
         sensors: Sensors over the environment's MuJoCo model, as for :func:`mjsense.attach`.
         camera_size: Height and width of the images of the model's cameras, pixels.
-        decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip``.
+        decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip`` or ``n_substeps``.
         fps: Steps per second; by default ``1 / env.unwrapped.dt``, else the metadata's ``render_fps``, else 30.
         resume: Continue an interrupted recording with the same settings.
         keep_partial: Keep episodes that ``reset()`` or ``close()`` cuts short; by default they are discarded.

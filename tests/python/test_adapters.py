@@ -51,8 +51,9 @@ def test_images_are_those_of_the_package(python, script):
     run(python, script)
 
 
-def test_episodes_of_the_packages_are_recorded(python):
-    run(python, "record_episodes")
+@pytest.mark.parametrize("script", ["attach_environments", "record_episodes"])
+def test_sensors_and_recordings_of_the_packages(python, script):
+    run(python, script)
 
 
 def run(python, script):

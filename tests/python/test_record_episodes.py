@@ -273,6 +273,10 @@ def test_errors(tmp_path):
     env.observation_space = spaces.Text(5)
     with pytest.raises(TypeError, match=r"observation: .*Text.*FilterObservation"):
         mjs.RecordEpisodes(env, tmp_path, 1)
+    env = SyncVectorEnv([Pendulum, Pendulum])
+    env.envs[1].model.geom_size[1, 0] = 0.06
+    with pytest.raises(ValueError, match="the models of environments 0 and 1 differ in geom_size"):
+        mjs.RecordEpisodes(env, tmp_path, 1, sensors=(mjs.CameraSensorCfg(name="eye", camera_name="side"),))
     env = Pendulum()
     wrapped = mjs.RecordEpisodes(env, tmp_path, 1, cameras=["side"])
     env.data = mujoco.MjData(env.model)
