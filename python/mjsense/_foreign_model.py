@@ -51,10 +51,10 @@ def arrays_of(model: Any, like: Any) -> dict[str, np.ndarray]:
     return {name: value for name in kept if isinstance(value := getattr(model, name, None), np.ndarray)}
 
 
-def changed_options(model: Any, like: Any) -> list[str]:
-    """The fields of ``opt`` that differ."""
-    pairs = ((name, getattr(model.opt, name, None), getattr(like.opt, name)) for name in _core.model_fields(like._address)["opt"])
-    return [name for name, now, was in pairs if now is not None and not np.array_equal(now, was)]
+def options_of(model: Any, like: Any) -> dict[str, np.ndarray]:
+    """The fields of ``opt`` of a model; `like` has all of them."""
+    fields = _core.model_fields(like._address)["opt"]
+    return {name: np.array(getattr(model.opt, name), kind) for name, (_, kind, _) in fields.items() if hasattr(model.opt, name)}
 
 
 def copy_of(model: Any) -> Any:

@@ -67,7 +67,7 @@ class Attached(KnownAttributes):
             self._check_data(one, world)
         self._times = np.zeros(len(self.datas))
         self._seen = np.zeros_like(state)
-        self._edited = {}
+        self._edited, self._options = {}, {}
         self._complete = True
         self.reset()
 
@@ -150,6 +150,8 @@ class Attached(KnownAttributes):
         """
         rows, times = self._rows(range(self.num_worlds))
         timestep = self._sim.physics_dt
+        if self.model.opt.timestep != timestep:
+            raise ValueError(f"update(): the model's time step was {timestep:g} s and is now {self.model.opt.timestep:g} s: attach again")
         moved: dict[int, list[int]] = {}
         for world, (before, now) in enumerate(zip(self._times, times)):
             steps = (now - before) / timestep
@@ -182,11 +184,11 @@ class Attached(KnownAttributes):
         self._check_failures("reset")
 
     def reload(self) -> None:
-        """Call after the model was edited (masses, sizes, friction, colours ...): the sensors follow.
+        """Call after the model was edited (masses, sizes, friction, colours, options ...): the sensors follow.
 
         Raises:
-            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step
-                and other options, and the structure of the model.
+            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step,
+                and the structure of the model.
         """
         sim, base = self._sim, self._sim.model
         model = self.model if self._same_series else _foreign_model.copy_of(self.model)
@@ -197,18 +199,22 @@ class Attached(KnownAttributes):
                 raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown.shape}: attach again")
             if not np.array_equal(now, shown, equal_nan=now.dtype.kind == "f"):
                 changed[name] = np.array(now)
-        options = _foreign_model.changed_options(model, base)
+        shown = {**_foreign_model.options_of(base, base), **self._options}
+        options = {name: now for name, now in _foreign_model.options_of(model, base).items() if not np.array_equal(now, shown[name])}
         try:
             for name in changed:
                 sim._check_randomizable(name)
                 sim.model_field(name)
         except (ValueError, AttributeError) as error:
             raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
-        if options:
-            raise ValueError(f"reload(): the model's opt.{options[0]} has changed, which only a new attach() follows")
+        if "timestep" in options:
+            raise ValueError("reload(): the model's time step has changed, which only a new attach() follows")
         for name, now in changed.items():
             sim.model_field(name)[:, : len(now)] = now
+        for name, now in options.items():
+            sim._core.model_field(f"opt.{name}")[:] = np.frombuffer(now.tobytes(), np.uint8)
         self._edited.update(changed)
+        self._options.update(options)
         sim._core.model_changed(None, False)
         sim._follow_models()
         sim.forward()
@@ -221,6 +227,7 @@ class Attached(KnownAttributes):
 
     _seen: np.ndarray
     _edited: dict[str, np.ndarray]
+    _options: dict[str, np.ndarray]
 
     def _worlds(self, ids: Sequence[int] | None) -> list[int]:
         found = _ids(ids)

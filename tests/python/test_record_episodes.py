@@ -216,6 +216,22 @@ def test_cameras_and_sensors_of_a_mujoco_environment(tmp_path, worlds):
         assert episode.video("side")[0].shape == (32, 48, 3) and episode.video("eye_depth")[0].shape == (16, 24)
 
 
+def made(folder, house):
+    return mjs.RecordEpisodes(Pendulum(), folder, 2, cameras=["side"], camera_size=(16, 16), house=house)
+
+
+def test_environments_in_other_processes_record_to_folders_of_their_own(tmp_path):
+    env = AsyncVectorEnv([lambda house=house: made(tmp_path, house) for house in range(2)])
+    env.reset(seed=3)
+    for _ in range(23):
+        env.step(np.zeros((2, 1), np.float32))
+    env.close()
+    verified(tmp_path)
+    data = mjs.Dataset(tmp_path)
+    assert [(e.house, e.length, e.seed) for e in data.episodes] == [(0, 11, 3), (0, 11, 0), (1, 11, 4), (1, 11, 0)]
+    assert data.episodes[3].video("side")[10].shape == (16, 16, 3)
+
+
 SCRIPT = """
 import sys, time, warnings
 sys.path.insert(0, {tests!r})
