@@ -71,11 +71,11 @@ class Attached(KnownAttributes):
         self._complete = True
         self.reset()
 
-    def _check_data(self, data: Any, world: int) -> None:
-        what = f"attach(): data[{world}]"
+    def _check_data(self, data: Any, world: int, call: str = "attach()") -> None:
+        what = f"{call}: data[{world}]"
         if self._mujoco is not None and not isinstance(data, self._mujoco.MjData):
             raise TypeError(f"{what} must be a mujoco.MjData, not {data!r:.100}")
-        if any(data is other for other in self.datas[:world]):
+        if any(data is other for i, other in enumerate(self.datas) if i != world):
             raise ValueError(f"{what} is given twice")
         for name, columns in self._columns.items():
             found, expected = np.size(getattr(data, name)), columns.stop - columns.start
@@ -193,31 +193,56 @@ class Attached(KnownAttributes):
         sim, base = self._sim, self._sim.model
         model = self.model if self._same_series else _foreign_model.copy_of(self.model)
         changed: dict[str, np.ndarray] = {}
+        shown: dict[str, np.ndarray] = {}
         for name, now in _foreign_model.arrays_of(model, base).items():
-            shown = self._edited[name] if name in self._edited else getattr(base, name)[: len(now)]
-            if now.shape != shown.shape:
-                raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown.shape}: attach again")
-            if not np.array_equal(now, shown, equal_nan=now.dtype.kind == "f"):
+            shown[name] = self._edited[name] if name in self._edited else getattr(base, name)[: len(now)]
+            if now.shape != shown[name].shape:
+                raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown[name].shape}: attach again")
+            if not np.array_equal(now, shown[name], equal_nan=now.dtype.kind == "f"):
                 changed[name] = np.array(now)
-        shown = {**_foreign_model.options_of(base, base), **self._options}
-        options = {name: now for name, now in _foreign_model.options_of(model, base).items() if not np.array_equal(now, shown[name])}
-        try:
-            for name in changed:
-                sim._check_randomizable(name)
-                sim.model_field(name)
-        except (ValueError, AttributeError) as error:
-            raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
+        used = {**_foreign_model.options_of(base, base), **self._options}
+        options = {name: now for name, now in _foreign_model.options_of(model, base).items() if not np.array_equal(now, used[name])}
         if "timestep" in options:
             raise ValueError("reload(): the model's time step has changed, which only a new attach() follows")
-        for name, now in changed.items():
-            sim.model_field(name)[:, : len(now)] = now
-        for name, now in options.items():
-            sim._core.model_field(f"opt.{name}")[:] = np.frombuffer(now.tobytes(), np.uint8)
+        writes = []
+        for name, now in {**changed, **{f"opt.{name}": now for name, now in options.items()}}.items():
+            try:
+                if name in changed and name != "bvh_aabb":
+                    sim._check_randomizable(name)
+                rows = sim._core.model_field(name)  # bytes
+            except ValueError as error:
+                raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
+            size = min(rows.shape[1], now.nbytes)  # of bvh_aabb, worlds have the boxes of bodies, but not those of meshes
+            if name in changed and not np.array_equal(_bytes(now)[size:], _bytes(shown[name])[size:]):
+                raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows")
+            writes.append((rows[:, :size], _bytes(now)[:size]))
+        for rows, now in writes:
+            rows[:] = now
         self._edited.update(changed)
         self._options.update(options)
         sim._core.model_changed(None, False)
         sim._follow_models()
         sim.forward()
+
+    def replace(self, world: int, data: Any, model: Any = None) -> None:
+        """Call when the program has made a new data for a world, and perhaps a new model; an episode begins in it.
+
+        Args:
+            world: Id of the world.
+            data: The new ``mujoco.MjData``.
+            model: The new model of all worlds, of the same structure; its values are read as by :meth:`reload`.
+
+        Raises:
+            ValueError: If the new model or data has another structure; it needs a new :func:`attach`.
+        """
+        (world,) = self._worlds([world])
+        data = getattr(data, "_data", data)
+        self._check_data(data, world, "replace()")
+        self.datas = (*self.datas[:world], data, *self.datas[world + 1 :])
+        if model is not None and getattr(model, "_model", model) is not self.model:
+            self.model = getattr(model, "_model", model)
+            self.reload()
+        self.reset([world])
 
     def add(self, sensor: Any) -> Any:
         """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.PoseSensor`. Returns it."""
@@ -294,6 +319,10 @@ def attach(
         ValueError: If a data belongs to another model, or a sensor needs an element that the model lacks; the message says what to add.
     """
     return Attached(model, data, sensors, decimation=decimation, threads=threads, seed=seed)
+
+
+def _bytes(array: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
 def _address(array: np.ndarray) -> int:

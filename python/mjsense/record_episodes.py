@@ -26,6 +26,9 @@ from mjsense.sensor import Sensor, encode_json
 _OPTIONS = {"house": 0, "batches": 0, "gzip": 4, "ffmpeg": "", "crf": 24, "preset": "veryfast", "molmospaces_depth": False}
 """Options of the files, which are those of :class:`mjsense.Recorder`."""
 
+_OWNERS = ("", "robot_env", "point_env", "ant_env", "sim", "env.sim", "physics", "_env.physics")
+"""Attributes of environments that have the MuJoCo `model` and `data`."""
+
 
 @dataclass
 class _Step:
@@ -93,20 +96,29 @@ class _MujocoEnvs:
 
     @staticmethod
     def _pair(env: Any) -> tuple[Any, Any]:
-        inner = env.unwrapped
-        for owner in (inner, getattr(inner, "robot_env", None), getattr(inner, "sim", None)):
+        for path in _OWNERS:
+            owner: Any = env.unwrapped
+            for name in filter(None, path.split(".")):
+                owner = getattr(owner, name, None)
             model, data = getattr(owner, "model", None), getattr(owner, "data", None)
-            model, data = getattr(model, "_model", model), getattr(data, "_data", data)  # robosuite wraps them
+            model, data = getattr(model, "_model", model), getattr(data, "_data", data)  # robosuite and dm_control wrap them
             if model is not None and hasattr(data, "qpos"):
                 return model, data
         raise TypeError(f"RecordEpisodes: {env} has no MuJoCo `model` and `data`, which sensors and cameras need; 'render' needs none")
 
     def sense(self, begun: Sequence[int]) -> None:
         """Makes the sensors current; episodes have begun in these worlds."""
-        for world, env in enumerate(self._envs):
-            if self._pair(env)[1] is not self._pairs[world][1]:
-                raise RuntimeError(f"RecordEpisodes: env {world} has made another MjData, which its sensors and cameras do not see")
+        pairs = [self._pair(env) for env in self._envs]
+        made = [w for w, (pair, old) in enumerate(zip(pairs, self._pairs)) if pair[0] is not old[0] or pair[1] is not old[1]]
+        self._pairs = pairs
+        for world in made:  # as robosuite does in reset()
+            if world in self._renderers:
+                self._renderers.pop(world).close()
         if self.attached is not None:
+            if made:
+                self._check_models()
+            for world in made:
+                self.attached.replace(world, pairs[world][1], pairs[0][0])
             self.attached.reset(begun)
             self.attached.update()
 
@@ -164,7 +176,7 @@ class _Recording:
         prefix = "single_" if self._vector else ""
         spaces = {"observation": getattr(env, f"{prefix}observation_space"), "actions/action": getattr(env, f"{prefix}action_space")}
         self._rows = {name: self._rows_of(name, space) for name, space in spaces.items()}
-        self.autoreset = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) if self._vector else AutoresetMode.DISABLED
+        self.autoreset = (env.metadata or {}).get("autoreset_mode", AutoresetMode.NEXT_STEP) if self._vector else AutoresetMode.DISABLED
         """When the environments are reset."""
         self._fps = self._rate(fps)
         needs_mujoco = bool(sensors) or any(camera != "render" for camera in self._cameras.values())
@@ -203,8 +215,8 @@ class _Recording:
 
     def _rate(self, fps: float | Fraction | None) -> Fraction:
         if fps is None:
-            fps = float(self._env.metadata.get("render_fps") or 30)
             inner = getattr(self._env.unwrapped, "envs", [self._env])[0].unwrapped
+            fps = float(getattr(inner, "control_freq", None) or (self._env.metadata or {}).get("render_fps") or 30)
             with contextlib.suppress(AttributeError, TypeError, ZeroDivisionError):
                 fps = 1 / float(inner.dt)
         rate = Fraction(fps).limit_denominator(10**6)
@@ -405,7 +417,7 @@ def _seeds(seed: Any, worlds: Sequence[int]) -> dict[int, int | None]:
 
 
 @checked
-class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
+class RecordEpisodes(gymnasium.Wrapper):
     """Records the episodes of a Gymnasium environment, MuJoCo or not, to the files of :func:`mjsense.record`::
 
         env = mjs.RecordEpisodes(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"), "data", episodes=10, cameras={"view": "render"})
@@ -425,7 +437,7 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         sensors: Sensors over the environment's MuJoCo model, as for :func:`mjsense.attach`.
         camera_size: Height and width of the images of the model's cameras, pixels.
         decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip`` or ``n_substeps``.
-        fps: Steps per second; by default ``1 / env.unwrapped.dt``, else the metadata's ``render_fps``, else 30.
+        fps: Steps per second; by default ``1 / env.unwrapped.dt``, else ``env.unwrapped.control_freq``, else the metadata's ``render_fps``, else 30.
         resume: Continue an interrupted recording with the same settings.
         keep_partial: Keep episodes that ``reset()`` or ``close()`` cuts short; by default they are discarded.
         info_bytes: Maximum length of the JSON text of a step's infos.
@@ -482,7 +494,7 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 @checked
-class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
+class RecordVectorEpisodes(VectorWrapper):
     """:class:`RecordEpisodes` of a ``gymnasium.vector.VectorEnv``, with the same arguments, in all autoreset modes."""
 
     recording: _Recording

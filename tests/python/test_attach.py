@@ -258,7 +258,7 @@ def test_errors():
         mjs.attach(3, data)
     with pytest.raises(TypeError, match=r"data\[1\] must be a mujoco.MjData, not None"):
         mjs.attach(model, [data, None])
-    with pytest.raises(ValueError, match=r"data\[1\] is given twice"):
+    with pytest.raises(ValueError, match=r"data\[0\] is given twice"):
         mjs.attach(model, [data, data])
     with pytest.raises(ValueError, match="data is empty"):
         mjs.attach(model, [])
@@ -298,6 +298,26 @@ def test_measurements_are_what_mujoco_computes_for_the_state():
         if 1 in contact.geom:
             total += contact.frame.reshape(3, 3).T @ wrench[:3]
     assert total[2] > 1 and np.abs(attached["net"].data.force[0, 0, 2]) == pytest.approx(abs(total[2]), rel=1e-6)
+
+
+def test_a_world_may_get_new_data_and_a_new_model():
+    model, datas = started(2)
+    attached = mjs.attach(model, datas, sensors())
+    for _ in range(5):
+        mujoco.mj_step(model, datas[1])
+    attached.update()
+    heavy = mujoco.MjModel.from_xml_string(MODEL.replace('size=".1 .1 .1"', 'size=".1 .1 .2"'))
+    new = mujoco.MjData(heavy)
+    attached.replace(1, new, heavy)
+    assert attached.datas == (datas[0], new)
+    fresh = mjs.attach(heavy, [datas[0], new], sensors())
+    assert_equal({n: attached[n] for n in ("front", "touch", "height", "acc")}, fresh)
+    with pytest.raises(ValueError, match=r"replace\(\): data\[1\] belongs to another model: its qpos has 0 numbers, and this model's has 9"):
+        attached.replace(1, mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>")))
+    with pytest.raises(ValueError, match=r"replace\(\): data\[1\] is given twice"):
+        attached.replace(1, datas[0])
+    with pytest.raises(ValueError, match="world"):
+        attached.replace(2, new)
 
 
 def test_suites_and_recorders_take_attached_sensors(tmp_path):

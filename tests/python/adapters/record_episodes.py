@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense.RecordEpisodes on environments of Gymnasium and gymnasium-robotics, with cameras and attached sensors."""
+"""mjsense.RecordEpisodes on environments of Gymnasium, gymnasium-robotics, gym-aloha and robosuite, with cameras and attached sensors."""
 
 import subprocess
 import sys
@@ -7,9 +7,13 @@ import tempfile
 import warnings
 from pathlib import Path
 
+import gym_aloha  # noqa: F401
 import gymnasium
 import gymnasium_robotics
 import numpy as np
+import robosuite
+from mjsense.compat import dm_control
+from robosuite.wrappers import GymWrapper
 
 import mjsense as mjs
 
@@ -55,3 +59,15 @@ assert episode["obs/extra/observation/desired_goal"].shape == (11, 3)
 env = gymnasium.make("FrankaKitchen-v1", max_episode_steps=5, tasks_to_complete=["kettle"])
 data = recorded(env, "kitchen", 1, cameras={"room": 0}, camera_size=(48, 64))
 assert data.episodes[0]["obs/extra/observation/observation"].shape == (6, 59) and data.episodes[0].video("room")[2].std() > 5
+
+dm_control.use()  # draws the observations
+arm = mjs.BuiltinSensorCfg(name="grip", sensor_type="framepos", obj=mjs.ObjRef("xbody", "vx300s_left/gripper_link"))
+env = gymnasium.make("gym_aloha/AlohaTransferCube-v0", obs_type="pixels_agent_pos", max_episode_steps=3)
+data = recorded(env, "aloha", 2, cameras=["top"], camera_size=(48, 64), sensors=(arm,))
+assert data.episodes[1]["obs/extra/observation/agent_pos"].shape == (4, 14) and data.episodes[1].video("top")[3].std() > 5
+
+cube = mjs.BuiltinSensorCfg(name="cube", sensor_type="framepos", obj=mjs.ObjRef("xbody", "cube_main"))
+lift = robosuite.make("Lift", robots="Panda", has_renderer=False, has_offscreen_renderer=False, use_camera_obs=False, horizon=5)
+data = recorded(GymWrapper(lift), "lift", 3, cameras=["agentview"], camera_size=(48, 64), sensors=(cube,))  # makes a new model in each reset
+for episode in data.episodes:
+    assert episode.length == 6 and 0.8 < episode["obs/extra/cube"][-1, 2] < 0.9 and episode.video("agentview")[3].std() > 5
