@@ -21,7 +21,7 @@ spaces = gymnasium.spaces
 
 
 class Counter(gymnasium.Env):
-    """Counts its steps; episodes have `length` steps, and those of odd seeds are truncated. It is no MuJoCo environment."""
+    """Counts its steps; episodes have `length` steps, and those of odd seeds are truncated. It does not use MuJoCo."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
