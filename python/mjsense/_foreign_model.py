@@ -25,8 +25,8 @@ _DEFAULTS: dict[str, Any] = {
 }  # fmt: skip
 """Values of fields that older series lack; all others are 0."""
 
-_GONE = {"cam_orthographic", "nflexevpair", "nJfv"}
-"""Fields that only older series have and whose content is in others. So are those of flexes: models with flexes are refused."""
+_GONE = ("flex", "cam_orthographic")
+"""Beginnings of the names of arrays that only older series have. Models with flexes are refused; the content of the other is in a new field."""
 
 
 def package_of(model: Any) -> Any:
@@ -65,8 +65,8 @@ def copy_of(model: Any) -> Any:
         raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3 is the first version that can be attached")
     if model.nflex:
         raise ValueError(f"attach(): the model has flexes, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
-    sizes = _sizes(model)
-    view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(sizes)))
+    view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
+    _refuse_unknown(model, view, version)
     for name, place in _core.model_fields(view._address).items():
         if isinstance(place, dict) or name in ("names", "paths", "text_data") or (place[2] == () and not name.startswith("flg_")):
             continue
@@ -92,6 +92,15 @@ def copy_of(model: Any) -> Any:
     _compute(view, model)
     _copy_structs(view, model, mujoco)
     return view
+
+
+def _refuse_unknown(model: Any, view: Any, version: str) -> None:
+    """Raises ValueError if the model has an array with values that mean nothing here."""
+    for name in dir(model):
+        if name[0] != "_" and name not in view._fields and not name.startswith(_GONE):
+            value = getattr(model, name, None)
+            if isinstance(value, np.ndarray) and value.any():
+                raise ValueError(f"attach(): the model of MuJoCo {version} has {name}, which mjsense's MuJoCo {'.'.join(map(str, _libmujoco.SERIES))} does not know")
 
 
 def _sizes(model: Any) -> dict[str, int]:
