@@ -61,8 +61,8 @@ def copy_of(model: Any) -> Any:
     """A copy of a model of another series; raises ValueError if it has something that cannot be copied."""
     mujoco = package_of(model)
     version = mujoco.mj_versionString()
-    if version.startswith(("1.", "2.", "3.0", "3.1.", "3.2.")):
-        raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3 is the first version that can be attached")
+    if not hasattr(model, "M_rownnz"):  # the structure of its sparse matrices, which data had
+        raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3.6 is the first version that can be attached")
     if model.nflex:
         raise ValueError(f"attach(): the model has flexes, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
     view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))

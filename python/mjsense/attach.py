@@ -302,7 +302,7 @@ def attach(
             attached.update()
             attached["front"].data.rgb      # uint8 [1, H, W, 3]
 
-    Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
+    Works with every MuJoCo from 3.3.6 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
     the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
 
     Args:
