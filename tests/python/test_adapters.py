@@ -48,9 +48,18 @@ def python():
     "script", ["dm_control_images", "aloha_images", "gymnasium_images", "robosuite_images", "without_opengl"]
 )
 def test_images_are_those_of_the_package(python, script):
+    run(python, script)
+
+
+@pytest.mark.parametrize("script", ["attach_environments", "record_episodes"])
+def test_sensors_and_recordings_of_the_packages(python, script):
+    run(python, script)
+
+
+def run(python, script):
     path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    run = [python, "-W", "ignore", Path(__file__).parent / f"adapters/{script}.py"]
-    done = subprocess.run(run, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+    command = [python, "-W", "ignore", Path(__file__).parent / f"adapters/{script}.py"]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
     if done.returncode == 77:
         pytest.skip(done.stdout)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
