@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """CPU time of images of existing environments: their own renderer (software OpenGL) and mjsense.
 
-    python bench/drop_in.py [--sizes 84 256] [--json FILE] [ENVIRONMENT ...]
+    python bench/drop_in.py [--sizes 84 256 640x480] [--json FILE] [--pictures FOLDER] [ENVIRONMENT ...]
 
 Needs the packages of the environments (those of tests/python/test_adapters.py), PyOpenGL and EGL; environments that cannot be made are skipped.
-Both renderers draw the same states, after one step each, through the environment's own function.
+Both renderers draw the same states, after one step each, through the environment's own function. The columns "step" are the CPU times of a
+step and its image. --pictures writes the last image of each environment and size, the package's own at the left, mjsense's at the right.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from __future__ import annotations
 import argparse
 import gc
 import json
+import logging
 import os
 import statistics
 import time
 import warnings
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 os.environ.setdefault("MUJOCO_GL", "egl")
 os.environ.setdefault("LP_NUM_THREADS", "1")  # llvmpipe's; CPU time counts all threads in any case
@@ -28,6 +31,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    Size = tuple[int, int]  # width, height
     Made = tuple[Any, Callable[[], object], Callable[[], np.ndarray]]  # environment, its step, its image
 
 ENVIRONMENTS = (
@@ -53,8 +57,8 @@ ENVIRONMENTS = (
 )
 
 
-def gymnasium_env(name: str, size: int, use: bool) -> Made:
-    arguments = {"id": name, "render_mode": "rgb_array", "width": size, "height": size, "disable_env_checker": True}
+def gymnasium_env(name: str, size: Size, use: bool) -> Made:
+    arguments = {"id": name, "render_mode": "rgb_array", "width": size[0], "height": size[1], "disable_env_checker": True}
     if name.startswith("Meta-World/"):
         import metaworld  # noqa: F401
 
@@ -69,10 +73,10 @@ def gymnasium_env(name: str, size: int, use: bool) -> Made:
     return env, lambda: env.step(env.action_space.sample()), lambda: np.asarray(env.render())
 
 
-def aloha_env(name: str, size: int, use: bool) -> Made:
+def aloha_env(name: str, size: Size, use: bool) -> Made:
     import gym_aloha  # noqa: F401
 
-    sizes = {"observation_width": 8, "observation_height": 8, "visualization_width": size, "visualization_height": size}
+    sizes = {"observation_width": 8, "observation_height": 8, "visualization_width": size[0], "visualization_height": size[1]}
     env = gymnasium.make(name, disable_env_checker=True, **sizes)
     if use:
         from mjsense.compat import dm_control as adapter
@@ -83,7 +87,7 @@ def aloha_env(name: str, size: int, use: bool) -> Made:
     return env, lambda: env.step(env.action_space.sample()), lambda: np.asarray(env.render())
 
 
-def dm_control_env(name: str, size: int, use: bool) -> Made:
+def dm_control_env(name: str, size: Size, use: bool) -> Made:
     from dm_control import suite
 
     env = suite.load(*name.split("/")[1:], task_kwargs={"random": 0})
@@ -93,10 +97,10 @@ def dm_control_env(name: str, size: int, use: bool) -> Made:
         adapter.use(env)
     env.reset()
     rng, shape = np.random.default_rng(0), env.action_spec().shape
-    return env, lambda: env.step(rng.uniform(-1, 1, shape)), lambda: env.physics.render(size, size, camera_id=0)
+    return env, lambda: env.step(rng.uniform(-1, 1, shape)), lambda: env.physics.render(size[1], size[0], camera_id=0)
 
 
-def robosuite_env(name: str, size: int, use: bool) -> Made:
+def robosuite_env(name: str, size: Size, use: bool) -> Made:
     import robosuite
     from robosuite.environments import base
     from robosuite.utils.binding_utils import MjRenderContextOffscreen
@@ -113,28 +117,80 @@ def robosuite_env(name: str, size: int, use: bool) -> Made:
     return (
         env,
         lambda: env.step(rng.uniform(-1, 1, env.action_dim)),
-        lambda: env.sim.render(width=size, height=size, camera_name=camera),
+        lambda: np.array(env.sim.render(width=size[0], height=size[1], camera_name=camera)[::-1]),
     )
 
 
-MAKE = {"gym_aloha": aloha_env, "dm_control": dm_control_env, "robosuite": robosuite_env}
+def libero_env(name: str, size: Size, use: bool) -> Made:
+    from libero.libero import get_libero_path
+    from libero.libero.envs import OffScreenRenderEnv
+    from robosuite.environments import base
+    from robosuite.utils.binding_utils import MjRenderContextOffscreen
+
+    base.MjRenderContextOffscreen = MjRenderContextOffscreen
+    if use:
+        from mjsense.compat import robosuite as adapter
+
+        adapter.use()
+    _, suite, task, camera = name.split("/")
+    files = sorted((Path(get_libero_path("bddl_files")) / suite).glob("*.bddl"))
+    env = OffScreenRenderEnv(bddl_file_name=str(files[int(task)]), camera_heights=8, camera_widths=8)
+    env.seed(0)
+    np.random.seed(0)
+    env.reset()
+    rng = np.random.default_rng(0)
+    return (
+        env,
+        lambda: env.step(rng.uniform(-1, 1, 7)),
+        lambda: np.array(env.sim.render(width=size[0], height=size[1], camera_name=camera)[::-1]),
+    )
 
 
-def images(name: str, size: int, use: bool, count: int) -> tuple[np.ndarray, float, float]:
-    """The images of `count` steps, the median CPU time of one in ms, and that of the first image with the renderer's construction."""
-    env, step, render = MAKE.get(name.split("/")[0], gymnasium_env)(name, size, use)
+MAKE = {"gym_aloha": aloha_env, "dm_control": dm_control_env, "robosuite": robosuite_env, "libero": libero_env}
+
+
+def prepare() -> None:
+    """Registers environments and stops the packages' messages."""
+    warnings.filterwarnings("ignore")
+    logging.disable(logging.CRITICAL)
+    try:
+        import gymnasium_robotics
+
+        gymnasium.register_envs(gymnasium_robotics)
+    except Exception as error:
+        print(f"gymnasium-robotics: {error}")
+
+
+def make(name: str, size: Size, use: bool) -> Made:
+    """The environment after a reset, with mjsense if `use`; it gives the same states in both cases."""
+    return MAKE.get(name.split("/")[0], gymnasium_env)(name, size, use)
+
+
+class Measured(NamedTuple):
+    images: np.ndarray
+    image_ms: float  # median CPU time of an image
+    step_ms: float  # of a step and its image
+    first_ms: float  # of the first image with the renderer's construction
+
+
+def measure(name: str, size: Size, use: bool, count: int) -> Measured:
+    """The images of `count` steps and their CPU times."""
+    env, step, render = make(name, size, use)
     start = time.process_time()
-    rows, times = [render()], []
+    rows, image_times, step_times = [render()], [], []
     first = time.process_time() - start
     for _ in range(count):
+        begin = time.process_time()
         step()
         start = time.process_time()
         rows.append(render())
-        times.append(time.process_time() - start)
+        end = time.process_time()
+        image_times.append(end - start)
+        step_times.append(end - begin)
     env.close()
     del env, step, render
     gc.collect()  # frees OpenGL's contexts here, not in a later measurement
-    return np.array(rows[1:]), 1e3 * statistics.median(times), 1e3 * first
+    return Measured(np.array(rows[1:]), 1e3 * statistics.median(image_times), 1e3 * statistics.median(step_times), 1e3 * first)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
@@ -142,45 +198,63 @@ def psnr(a: np.ndarray, b: np.ndarray) -> float:
     return float(10 * np.log10(255**2 / max(error, 1e-3)))
 
 
+def save_picture(path: Path, theirs: np.ndarray, ours: np.ndarray) -> None:
+    """Both images side by side."""
+    from PIL import Image
+
+    gap = np.full((len(ours), 4, 3), 255, np.uint8)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.concatenate([theirs, gap, ours], axis=1)).save(path, quality=85)
+
+
+def size_of(text: str) -> Size:
+    width, _, height = text.partition("x")
+    return int(width), int(height or width)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("environments", nargs="*", default=ENVIRONMENTS)
-    parser.add_argument("--sizes", nargs="+", type=int, default=(84, 256))
+    parser.add_argument("--sizes", nargs="+", type=size_of, default=[(84, 84), (256, 256), (640, 480)])
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--json")
+    parser.add_argument("--pictures", type=Path)
     arguments = parser.parse_args()
-    warnings.filterwarnings("ignore")
-    try:
-        import gymnasium_robotics
-
-        gymnasium.register_envs(gymnasium_robotics)
-    except Exception as error:
-        print(f"gymnasium-robotics: {error}")
+    prepare()
     print(f"MuJoCo {mujoco.__version__}")
-    print(f"{'environment':38s} {'size':>5s} {'OpenGL':>9s} {'mjsense':>9s} {'ratio':>6s} {'first':>8s} {'PSNR':>6s}")
+    columns = ("OpenGL", "mjsense", "ratio", "step", "mjsense", "ratio", "first", "PSNR")
+    print(f"{'environment':38s} {'size':>8s} " + " ".join(f"{name:>9s}" for name in columns))
     rows = []
     for name in arguments.environments:
         for size in arguments.sizes:
+            label = f"{size[0]}x{size[1]}"
             try:
-                theirs, slow, _ = images(name, size, False, arguments.count)
-                ours, fast, first = images(name, size, True, arguments.count)
+                theirs, ours = (measure(name, size, use, arguments.count) for use in (False, True))
             except Exception as error:
-                print(f"{name:38s} {size:5d} {type(error).__name__}: {str(error)[:90]}")
+                print(f"{name:38s} {label:>8s} {type(error).__name__}: {str(error)[:90]}", flush=True)
                 continue
+            if arguments.pictures:
+                save_picture(arguments.pictures / f"{name.replace('/', '_')}_{label}.jpg", theirs.images[-1], ours.images[-1])
             row = {
                 "environment": name,
-                "size": size,
-                "opengl_ms": slow,
-                "mjsense_ms": fast,
-                "first_ms": first,
-                "psnr": psnr(theirs, ours),
+                "size": label,
+                "opengl_ms": theirs.image_ms,
+                "mjsense_ms": ours.image_ms,
+                "opengl_step_ms": theirs.step_ms,
+                "mjsense_step_ms": ours.step_ms,
+                "first_ms": ours.first_ms,
+                "psnr": psnr(theirs.images, ours.images),
             }
             rows.append(row)
-            print(f"{name:38s} {size:5d} {slow:6.2f} ms {fast:6.2f} ms {slow / fast:6.1f} {first:5.1f} ms {row['psnr']:6.1f}")
-    for size in arguments.sizes:
+            numbers = (theirs.image_ms, ours.image_ms, theirs.image_ms / ours.image_ms)
+            steps = (theirs.step_ms, ours.step_ms, theirs.step_ms / ours.step_ms)
+            print(
+                f"{name:38s} {label:>8s} " + " ".join(f"{x:9.2f}" for x in (*numbers, *steps, ours.first_ms, row["psnr"])),
+                flush=True,
+            )
+    for size in sorted({row["size"] for row in rows}):
         ratios = [row["opengl_ms"] / row["mjsense_ms"] for row in rows if row["size"] == size]
-        if ratios:
-            print(f"median ratio at {size}: {statistics.median(ratios):.1f}, lowest {min(ratios):.1f}")
+        print(f"median ratio at {size}: {statistics.median(ratios):.1f}, lowest {min(ratios):.1f}")
     if arguments.json:
         with open(arguments.json, "w") as file:
             json.dump(rows, file, indent=1)

@@ -24,7 +24,7 @@
 namespace mjsense::python {
 namespace {
 
-// Rows that Python writes: a measurement that no simulation of ours computes.
+// Rows that Python writes: the measurements of a program without a Simulation.
 class WrittenRows final : public Sensor {
  public:
   WrittenRows(std::string name, SensorSpec spec, int num_worlds) : Sensor(std::move(name)) {

@@ -78,7 +78,7 @@ from mjsense.plot import plot
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
-from mjsense.record_episodes import EpisodeRecording, RecordEpisodes, RecordVectorEpisodes
+from mjsense.record_episodes import RecordEpisodes, RecordVectorEpisodes
 from mjsense.recorder import Recorder
 from mjsense.renderer import Renderer
 from mjsense.robot import MoveGroup, Robot, RobotCamera

@@ -25,8 +25,8 @@ _DEFAULTS: dict[str, Any] = {
 }  # fmt: skip
 """Values of fields that older series lack; all others are 0."""
 
-_GONE = {"cam_orthographic", "nflexevpair", "nJfv"}
-"""Fields that only older series have and whose content is in others. So are those of flexes: models with flexes are refused."""
+_GONE = ("flex", "cam_orthographic")
+"""Beginnings of the names of arrays that only older series have. Models with flexes are refused; the content of the other is in a new field."""
 
 
 def package_of(model: Any) -> Any:
@@ -51,22 +51,22 @@ def arrays_of(model: Any, like: Any) -> dict[str, np.ndarray]:
     return {name: value for name in kept if isinstance(value := getattr(model, name, None), np.ndarray)}
 
 
-def changed_options(model: Any, like: Any) -> list[str]:
-    """The fields of ``opt`` that differ."""
-    pairs = ((name, getattr(model.opt, name, None), getattr(like.opt, name)) for name in _core.model_fields(like._address)["opt"])
-    return [name for name, now, was in pairs if now is not None and not np.array_equal(now, was)]
+def options_of(model: Any, like: Any) -> dict[str, np.ndarray]:
+    """The fields of ``opt`` of a model; `like` has all of them."""
+    fields = _core.model_fields(like._address)["opt"]
+    return {name: np.array(getattr(model.opt, name), kind) for name, (_, kind, _) in fields.items() if hasattr(model.opt, name)}
 
 
 def copy_of(model: Any) -> Any:
     """A copy of a model of another series; raises ValueError if it has something that cannot be copied."""
     mujoco = package_of(model)
     version = mujoco.mj_versionString()
-    if version.startswith(("1.", "2.", "3.0", "3.1.", "3.2.")):
-        raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3 is the first version that can be attached")
+    if not hasattr(model, "M_rownnz"):  # the structure of its sparse matrices, which data had
+        raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3.6 is the first version that can be attached")
     if model.nflex:
         raise ValueError(f"attach(): the model has flexes, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
-    sizes = _sizes(model)
-    view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(sizes)))
+    view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
+    _refuse_unknown(model, view, version)
     for name, place in _core.model_fields(view._address).items():
         if isinstance(place, dict) or name in ("names", "paths", "text_data") or (place[2] == () and not name.startswith("flg_")):
             continue
@@ -92,6 +92,15 @@ def copy_of(model: Any) -> Any:
     _compute(view, model)
     _copy_structs(view, model, mujoco)
     return view
+
+
+def _refuse_unknown(model: Any, view: Any, version: str) -> None:
+    """Raises ValueError if the model has an array with values that mean nothing here."""
+    for name in dir(model):
+        if name[0] != "_" and name not in view._fields and not name.startswith(_GONE):
+            value = getattr(model, name, None)
+            if isinstance(value, np.ndarray) and value.any():
+                raise ValueError(f"attach(): the model of MuJoCo {version} has {name}, which mjsense's MuJoCo {'.'.join(map(str, _libmujoco.SERIES))} does not know")
 
 
 def _sizes(model: Any) -> dict[str, int]:

@@ -46,16 +46,16 @@ class Attached(KnownAttributes):
         threads: int = 0,
         seed: Seed = 0,
     ) -> None:
-        self.model = model
+        self.model = getattr(model, "_model", model)
         """The user's model."""
-        self.datas: tuple[Any, ...] = tuple(data) if isinstance(data, (list, tuple)) else (data,)
+        self.datas: tuple[Any, ...] = tuple(getattr(one, "_data", one) for one in (data if isinstance(data, (list, tuple)) else [data]))
         """The user's data, by world."""
         if not self.datas:
             raise ValueError("attach(): data is empty: pass one MjData, or a list with one for each world")
-        self._mujoco: Any = _foreign_model.package_of(model)
+        self._mujoco: Any = _foreign_model.package_of(self.model)
         self._same_series = _foreign_model.is_our_series(self._mujoco)
-        copy = None if self._same_series else _foreign_model.copy_of(model)
-        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), (model if copy is None else copy)._address)
+        copy = None if self._same_series else _foreign_model.copy_of(self.model)
+        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), (self.model if copy is None else copy)._address)
         self._sim = Simulation(scene, len(self.datas), decimation, threads, seed)
         state = self._sim.state
         self._columns: dict[str, slice] = {}
@@ -67,15 +67,15 @@ class Attached(KnownAttributes):
             self._check_data(one, world)
         self._times = np.zeros(len(self.datas))
         self._seen = np.zeros_like(state)
-        self._edited = {}
+        self._edited, self._options = {}, {}
         self._complete = True
         self.reset()
 
-    def _check_data(self, data: Any, world: int) -> None:
-        what = f"attach(): data[{world}]"
+    def _check_data(self, data: Any, world: int, call: str = "attach()") -> None:
+        what = f"{call}: data[{world}]"
         if self._mujoco is not None and not isinstance(data, self._mujoco.MjData):
             raise TypeError(f"{what} must be a mujoco.MjData, not {data!r:.100}")
-        if any(data is other for other in self.datas[:world]):
+        if any(data is other for i, other in enumerate(self.datas) if i != world):
             raise ValueError(f"{what} is given twice")
         for name, columns in self._columns.items():
             found, expected = np.size(getattr(data, name)), columns.stop - columns.start
@@ -150,6 +150,8 @@ class Attached(KnownAttributes):
         """
         rows, times = self._rows(range(self.num_worlds))
         timestep = self._sim.physics_dt
+        if self.model.opt.timestep != timestep:
+            raise ValueError(f"update(): the model's time step was {timestep:g} s and is now {self.model.opt.timestep:g} s: attach again")
         moved: dict[int, list[int]] = {}
         for world, (before, now) in enumerate(zip(self._times, times)):
             steps = (now - before) / timestep
@@ -182,36 +184,65 @@ class Attached(KnownAttributes):
         self._check_failures("reset")
 
     def reload(self) -> None:
-        """Call after the model was edited (masses, sizes, friction, colours ...): the sensors follow.
+        """Call after the model was edited (masses, sizes, friction, colours, options ...): the sensors follow.
 
         Raises:
-            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step
-                and other options, and the structure of the model.
+            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step,
+                and the structure of the model.
         """
         sim, base = self._sim, self._sim.model
         model = self.model if self._same_series else _foreign_model.copy_of(self.model)
         changed: dict[str, np.ndarray] = {}
+        shown: dict[str, np.ndarray] = {}
         for name, now in _foreign_model.arrays_of(model, base).items():
-            shown = self._edited[name] if name in self._edited else getattr(base, name)[: len(now)]
-            if now.shape != shown.shape:
-                raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown.shape}: attach again")
-            if not np.array_equal(now, shown, equal_nan=now.dtype.kind == "f"):
+            shown[name] = self._edited[name] if name in self._edited else getattr(base, name)[: len(now)]
+            if now.shape != shown[name].shape:
+                raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown[name].shape}: attach again")
+            if not np.array_equal(now, shown[name], equal_nan=now.dtype.kind == "f"):
                 changed[name] = np.array(now)
-        options = _foreign_model.changed_options(model, base)
-        try:
-            for name in changed:
-                sim._check_randomizable(name)
-                sim.model_field(name)
-        except (ValueError, AttributeError) as error:
-            raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
-        if options:
-            raise ValueError(f"reload(): the model's opt.{options[0]} has changed, which only a new attach() follows")
-        for name, now in changed.items():
-            sim.model_field(name)[:, : len(now)] = now
+        used = {**_foreign_model.options_of(base, base), **self._options}
+        options = {name: now for name, now in _foreign_model.options_of(model, base).items() if not np.array_equal(now, used[name])}
+        if "timestep" in options:
+            raise ValueError("reload(): the model's time step has changed, which only a new attach() follows")
+        writes = []
+        for name, now in {**changed, **{f"opt.{name}": now for name, now in options.items()}}.items():
+            try:
+                if name in changed and name != "bvh_aabb":
+                    sim._check_randomizable(name)
+                rows = sim._core.model_field(name)  # bytes
+            except ValueError as error:
+                raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
+            size = min(rows.shape[1], now.nbytes)  # of bvh_aabb, worlds have the boxes of bodies, but not those of meshes
+            if name in changed and not np.array_equal(_bytes(now)[size:], _bytes(shown[name])[size:]):
+                raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows")
+            writes.append((rows[:, :size], _bytes(now)[:size]))
+        for rows, now in writes:
+            rows[:] = now
         self._edited.update(changed)
+        self._options.update(options)
         sim._core.model_changed(None, False)
         sim._follow_models()
         sim.forward()
+
+    def replace(self, world: int, data: Any, model: Any = None) -> None:
+        """Call when the program has made a new data for a world, and perhaps a new model; an episode begins in it.
+
+        Args:
+            world: Id of the world.
+            data: The new ``mujoco.MjData``.
+            model: The new model of all worlds, of the same structure; its values are read as by :meth:`reload`.
+
+        Raises:
+            ValueError: If the new model or data has another structure; it needs a new :func:`attach`.
+        """
+        (world,) = self._worlds([world])
+        data = getattr(data, "_data", data)
+        self._check_data(data, world, "replace()")
+        self.datas = (*self.datas[:world], data, *self.datas[world + 1 :])
+        if model is not None and getattr(model, "_model", model) is not self.model:
+            self.model = getattr(model, "_model", model)
+            self.reload()
+        self.reset([world])
 
     def add(self, sensor: Any) -> Any:
         """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.PoseSensor`. Returns it."""
@@ -221,6 +252,7 @@ class Attached(KnownAttributes):
 
     _seen: np.ndarray
     _edited: dict[str, np.ndarray]
+    _options: dict[str, np.ndarray]
 
     def _worlds(self, ids: Sequence[int] | None) -> list[int]:
         found = _ids(ids)
@@ -270,11 +302,11 @@ def attach(
             attached.update()
             attached["front"].data.rgb      # uint8 [1, H, W, 3]
 
-    Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
+    Works with every MuJoCo from 3.3.6 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
     the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
 
     Args:
-        model: The ``mujoco.MjModel``. It is not changed.
+        model: The ``mujoco.MjModel``, or robosuite's or dm_control's wrapper of it. It is not changed.
         data: A ``mujoco.MjData`` of the model, or a list with one for each world.
         sensors: Sensor configurations and :class:`mjsense.Sensor` objects, as in :class:`mjsense.SceneCfg`. Names are those of the model;
             an element without a name has the name of its kind and number, ``geom_3``. MuJoCo's sensors of the model are attached, too.
@@ -287,6 +319,10 @@ def attach(
         ValueError: If a data belongs to another model, or a sensor needs an element that the model lacks; the message says what to add.
     """
     return Attached(model, data, sensors, decimation=decimation, threads=threads, seed=seed)
+
+
+def _bytes(array: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
 def _address(array: np.ndarray) -> int:

@@ -26,6 +26,9 @@ from mjsense.sensor import Sensor, encode_json
 _OPTIONS = {"house": 0, "batches": 0, "gzip": 4, "ffmpeg": "", "crf": 24, "preset": "veryfast", "molmospaces_depth": False}
 """Options of the files, which are those of :class:`mjsense.Recorder`."""
 
+_OWNERS = ("", "robot_env", "point_env", "ant_env", "sim", "env.sim", "physics", "_env.physics")
+"""Attributes of environments that have the MuJoCo `model` and `data`."""
+
 
 @dataclass
 class _Step:
@@ -78,25 +81,44 @@ class _MujocoEnvs:
         self._renderers: dict[int, Renderer] = {}
         self.attached: Attached | None = None
         if sensors:
-            steps = decimation or int(getattr(envs[0].unwrapped, "frame_skip", 1))
+            inner = envs[0].unwrapped
+            steps = decimation or int(getattr(inner, "frame_skip", getattr(inner, "n_substeps", 1)))
+            self._check_models()
             self.attached = Attached(self._pairs[0][0], [data for _, data in self._pairs], sensors, decimation=steps)
+
+    def _check_models(self) -> None:
+        first = self._pairs[0][0]
+        for world, (model, _) in enumerate(self._pairs[1:], 1):
+            for name in dir(first):
+                mine = getattr(model, name, None) if name[0] != "_" else None
+                if isinstance(mine, np.ndarray) and not np.array_equal(mine, getattr(first, name), equal_nan=mine.dtype.kind == "f"):
+                    raise ValueError(f"RecordEpisodes: the models of environments 0 and {world} differ in {name}; sensors need equal models")
 
     @staticmethod
     def _pair(env: Any) -> tuple[Any, Any]:
-        inner = env.unwrapped
-        for owner in (inner, getattr(inner, "robot_env", None), getattr(inner, "sim", None)):
+        for path in _OWNERS:
+            owner: Any = env.unwrapped
+            for name in filter(None, path.split(".")):
+                owner = getattr(owner, name, None)
             model, data = getattr(owner, "model", None), getattr(owner, "data", None)
-            model, data = getattr(model, "_model", model), getattr(data, "_data", data)  # robosuite wraps them
+            model, data = getattr(model, "_model", model), getattr(data, "_data", data)  # robosuite and dm_control wrap them
             if model is not None and hasattr(data, "qpos"):
                 return model, data
         raise TypeError(f"RecordEpisodes: {env} has no MuJoCo `model` and `data`, which sensors and cameras need; 'render' needs none")
 
     def sense(self, begun: Sequence[int]) -> None:
         """Makes the sensors current; episodes have begun in these worlds."""
-        for world, env in enumerate(self._envs):
-            if self._pair(env)[1] is not self._pairs[world][1]:
-                raise RuntimeError(f"RecordEpisodes: env {world} has made another MjData, which its sensors and cameras do not see")
+        pairs = [self._pair(env) for env in self._envs]
+        made = [w for w, (pair, old) in enumerate(zip(pairs, self._pairs)) if pair[0] is not old[0] or pair[1] is not old[1]]
+        self._pairs = pairs
+        for world in made:  # as robosuite does in reset()
+            if world in self._renderers:
+                self._renderers.pop(world).close()
         if self.attached is not None:
+            if made:
+                self._check_models()
+            for world in made:
+                self.attached.replace(world, pairs[world][1], pairs[0][0])
             self.attached.reset(begun)
             self.attached.update()
 
@@ -114,7 +136,7 @@ class _MujocoEnvs:
             self.attached.close()
 
 
-class EpisodeRecording:
+class _Recording:
     """The recording of a wrapped environment; see :class:`RecordEpisodes` for the arguments."""
 
     def __init__(
@@ -124,15 +146,19 @@ class EpisodeRecording:
         episodes: int,
         cameras: Mapping[str, Any] | Sequence[str],
         sensors: Sequence[Any],
-        camera_size: Sequence[int],
+        camera_size: Sequence[float],
         decimation: int | None,
-        fps: float | None,
+        fps: float | Fraction | None,
         resume: bool,
         keep_partial: bool,
         info_bytes: int,
         settings: Mapping[str, Any] | None,
         options: Mapping[str, Any],
     ) -> None:
+        if episodes < 1:
+            raise ValueError(f"RecordEpisodes: episodes is {episodes}: must be at least 1")
+        if len(camera_size) != 2:
+            raise ValueError(f"RecordEpisodes: camera_size is {camera_size}: must be (height, width)")
         if unknown := options.keys() - _OPTIONS.keys():
             raise TypeError(f"RecordEpisodes() got unexpected arguments {', '.join(sorted(unknown))}; options are {', '.join(_OPTIONS)}")
         self._env = env
@@ -150,7 +176,7 @@ class EpisodeRecording:
         prefix = "single_" if self._vector else ""
         spaces = {"observation": getattr(env, f"{prefix}observation_space"), "actions/action": getattr(env, f"{prefix}action_space")}
         self._rows = {name: self._rows_of(name, space) for name, space in spaces.items()}
-        self.autoreset = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP) if self._vector else AutoresetMode.DISABLED
+        self.autoreset = (env.metadata or {}).get("autoreset_mode", AutoresetMode.NEXT_STEP) if self._vector else AutoresetMode.DISABLED
         """When the environments are reset."""
         self._fps = self._rate(fps)
         needs_mujoco = bool(sensors) or any(camera != "render" for camera in self._cameras.values())
@@ -187,10 +213,10 @@ class EpisodeRecording:
             )
         return envs
 
-    def _rate(self, fps: float | None) -> Fraction:
+    def _rate(self, fps: float | Fraction | None) -> Fraction:
         if fps is None:
-            fps = float(self._env.metadata.get("render_fps") or 30)
             inner = getattr(self._env.unwrapped, "envs", [self._env])[0].unwrapped
+            fps = float(getattr(inner, "control_freq", None) or (self._env.metadata or {}).get("render_fps") or 30)
             with contextlib.suppress(AttributeError, TypeError, ZeroDivisionError):
                 fps = 1 / float(inner.dt)
         rate = Fraction(fps).limit_denominator(10**6)
@@ -390,7 +416,8 @@ def _seeds(seed: Any, worlds: Sequence[int]) -> dict[int, int | None]:
     return {w: seed[w] for w in worlds}
 
 
-class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
+@checked
+class RecordEpisodes(gymnasium.Wrapper):
     """Records the episodes of a Gymnasium environment, MuJoCo or not, to the files of :func:`mjsense.record`::
 
         env = mjs.RecordEpisodes(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"), "data", episodes=10, cameras={"view": "render"})
@@ -409,8 +436,8 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
             which :class:`mjsense.Renderer` draws. A sequence of names gives cameras of the model their own names.
         sensors: Sensors over the environment's MuJoCo model, as for :func:`mjsense.attach`.
         camera_size: Height and width of the images of the model's cameras, pixels.
-        decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip``.
-        fps: Steps per second; by default ``1 / env.unwrapped.dt``, else the metadata's ``render_fps``, else 30.
+        decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip`` or ``n_substeps``.
+        fps: Steps per second; by default ``1 / env.unwrapped.dt``, else ``env.unwrapped.control_freq``, else the metadata's ``render_fps``, else 30.
         resume: Continue an interrupted recording with the same settings.
         keep_partial: Keep episodes that ``reset()`` or ``close()`` cuts short; by default they are discarded.
         info_bytes: Maximum length of the JSON text of a step's infos.
@@ -422,8 +449,8 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         TypeError: If a space has no arrays, or if a camera or sensor needs a MuJoCo model that the environment does not show.
     """
 
-    recording: EpisodeRecording
-    """State of the recording: ``path``, ``kept``, ``complete``."""
+    recording: _Recording
+    """State of the recording: ``path`` is its folder, ``kept`` the number of recorded episodes, ``complete`` whether all are recorded."""
 
     def __new__(cls, env: Any, *args: Any, **kwargs: Any) -> Any:
         return RecordVectorEpisodes(env, *args, **kwargs) if isinstance(env, VectorEnv) else super().__new__(cls)
@@ -436,7 +463,7 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         *,
         cameras: Mapping[str, Any] | Sequence[str] = (),
         sensors: Sequence[Any] = (),
-        camera_size: Sequence[int] = (240, 320),
+        camera_size: Sequence[float] = (240, 320),
         decimation: int | None = None,
         fps: float | Fraction | None = None,
         resume: bool = False,
@@ -446,10 +473,9 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         **options: Any,
     ) -> None:
         super().__init__(env)
-        self.recording = _recording(
-            env, out, episodes, cameras=cameras, sensors=sensors, camera_size=camera_size, decimation=decimation, fps=fps, resume=resume,
-            keep_partial=keep_partial, info_bytes=info_bytes, settings=settings, options=options,
-        )  # fmt: skip
+        self.recording = _Recording(
+            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, info_bytes, settings, options
+        )
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         observation, info = self.env.reset(seed=seed, options=options)
@@ -467,11 +493,12 @@ class RecordEpisodes(gymnasium.Wrapper[Any, Any, Any, Any]):
         self.env.close()
 
 
-class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
+@checked
+class RecordVectorEpisodes(VectorWrapper):
     """:class:`RecordEpisodes` of a ``gymnasium.vector.VectorEnv``, with the same arguments, in all autoreset modes."""
 
-    recording: EpisodeRecording
-    """State of the recording: ``path``, ``kept``, ``complete``."""
+    recording: _Recording
+    """State of the recording: ``path`` is its folder, ``kept`` the number of recorded episodes, ``complete`` whether all are recorded."""
 
     def __init__(
         self,
@@ -481,7 +508,7 @@ class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
         *,
         cameras: Mapping[str, Any] | Sequence[str] = (),
         sensors: Sequence[Any] = (),
-        camera_size: Sequence[int] = (240, 320),
+        camera_size: Sequence[float] = (240, 320),
         decimation: int | None = None,
         fps: float | Fraction | None = None,
         resume: bool = False,
@@ -491,10 +518,9 @@ class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
         **options: Any,
     ) -> None:
         super().__init__(env)
-        self.recording = _recording(
-            env, out, episodes, cameras=cameras, sensors=sensors, camera_size=camera_size, decimation=decimation, fps=fps, resume=resume,
-            keep_partial=keep_partial, info_bytes=info_bytes, settings=settings, options=options,
-        )  # fmt: skip
+        self.recording = _Recording(
+            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, info_bytes, settings, options
+        )
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
@@ -518,30 +544,3 @@ class RecordVectorEpisodes(VectorWrapper[Any, Any, Any, Any, Any]):
         """Publishes the recording and closes the environments."""
         self.recording.close()
         self.env.close(**kwargs)
-
-
-@checked
-def _recording(
-    env: Any,
-    out: str | Path,
-    episodes: int,
-    *,
-    cameras: Mapping[str, Any] | Sequence[str],
-    sensors: Sequence[Any],
-    camera_size: Sequence[int],
-    decimation: int | None,
-    fps: float | Fraction | None,
-    resume: bool,
-    keep_partial: bool,
-    info_bytes: int,
-    settings: Mapping[str, Any] | None,
-    options: dict[str, Any],
-) -> EpisodeRecording:
-    if episodes < 1:
-        raise ValueError(f"RecordEpisodes: episodes is {episodes}: must be at least 1")
-    if len(camera_size) != 2:
-        raise ValueError(f"RecordEpisodes: camera_size is {camera_size}: must be (height, width)")
-    return EpisodeRecording(
-        env, out, episodes, cameras, sensors, camera_size, decimation, None if fps is None else float(fps), resume, keep_partial, info_bytes,
-        settings, options,
-    )  # fmt: skip

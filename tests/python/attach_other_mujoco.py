@@ -4,10 +4,13 @@
 Run by test_other_mujocos.py.
 """
 
+import types
+
 import mujoco
 import numpy as np
 
 import mjsense as mjs
+from mjsense import _foreign_model
 
 MODEL = """
 <mujoco>
@@ -98,4 +101,19 @@ before = attached["front"].data.rgb.copy()
 model.geom_rgba[2] = [0, 1, 0, 1]
 attached.reload()
 assert not np.array_equal(before, attached["front"].data.rgb)
+if not mujoco.mj_versionString().startswith("4.0"):
+    FLEX = '<mujoco><worldbody><flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2"/></worldbody></mujoco>'
+    soft = mujoco.MjModel.from_xml_string(FLEX)
+    try:
+        mjs.attach(soft, mujoco.MjData(soft))
+    except ValueError as error:
+        assert "the model has flexes" in str(error), error
+    else:
+        raise AssertionError("a model with flexes was attached")
+    try:
+        _foreign_model._refuse_unknown(types.SimpleNamespace(geom_smell=np.ones(3)), attached.simulation.model, "5.0")
+    except ValueError as error:
+        assert "the model of MuJoCo 5.0 has geom_smell, which mjsense's MuJoCo 4.0 does not know" in str(error), error
+    else:
+        raise AssertionError("an unknown field was accepted")
 attached.close()

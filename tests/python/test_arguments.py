@@ -11,8 +11,9 @@ from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
 
-# Users write the methods of the first three; the last is made of a task, see below.
-SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.TaskVectorEnv)
+# Users write the methods of the first three; environments have those of Gymnasium, see below.
+ENVS = (mjs.TaskVectorEnv, mjs.RecordEpisodes, mjs.RecordVectorEpisodes)
+SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, *ENVS)
 CLASSES = [
     value
     for value in vars(mjs).values()
@@ -22,7 +23,7 @@ CLASSES = [
     and value.__module__.startswith("mjsense.")
     and value is not mjs.SensorSpec
 ]
-FUNCTIONS = [mjs.record, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
+FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
 
 
 def methods_of(cls):
@@ -43,6 +44,7 @@ def ids(function):
 
 NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # created by scenes only
 STATIC = {f.__qualname__: f for c in {*CLASSES, mjs.TaskVectorEnv} - NATIVE for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
+STATIC |= {f.__qualname__: f for f in (mjs.RecordEpisodes.__init__, mjs.RecordVectorEpisodes.__init__)}
 STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.replace and f.__name__ != "checked"}
 
 
@@ -81,7 +83,7 @@ def live(tmp_path_factory):
     dataset = mjs.Dataset(data)
     renderer = mjs.Renderer(scene.model, 4, 4)
     renderer.update_scene(mujoco.MjData(scene.model))
-    objects += [renderer, dataset, dataset.episodes[0], dataset.episodes[0].video("wrist_camera")]
+    objects += [mjs.attach(scene.model, mujoco.MjData(scene.model)), renderer, dataset, dataset.episodes[0], dataset.episodes[0].video("wrist_camera")]
     objects += [
         mjs.JointPositionSensor(), mjs.JointVelocitySensor(), mjs.PoseSensor("p", body="ball/ball"), mjs.TcpPoseSensor(),
         mjs.RobotBasePoseSensor(), mjs.EnvStatesSensor(), mjs.CameraParameterSensor("eye"), mjs.CameraImageSensor("eye"),

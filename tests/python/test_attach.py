@@ -219,10 +219,17 @@ def test_reload_follows_edits_of_the_model():
         attached.update()
         fresh.update()
     assert_equal(attached, {name: fresh[name] for name in fresh})
+    mujoco.mj_resetDataKeyframe(model, data, 0)
     model.opt.gravity[2] = -1
-    with pytest.raises(ValueError, match=r"opt.gravity has changed, which only a new attach\(\) follows"):
-        attached.reload()
-    model.opt.gravity[2] = -9.81
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    attached.reset()
+    attached.reload()
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0 and np.array_equal(attached.simulation.data.qacc[0], data.qacc)
+    model.opt.timestep = 0.001
+    with pytest.raises(ValueError, match=r"time step was 0.005 s and is now 0.001 s: attach again"):
+        attached.update()
+    model.opt.timestep = 0.005
     model.tex_data[:] = 0
     with pytest.raises(ValueError, match="tex_data has changed"):
         attached.reload()
@@ -251,7 +258,7 @@ def test_errors():
         mjs.attach(3, data)
     with pytest.raises(TypeError, match=r"data\[1\] must be a mujoco.MjData, not None"):
         mjs.attach(model, [data, None])
-    with pytest.raises(ValueError, match=r"data\[1\] is given twice"):
+    with pytest.raises(ValueError, match=r"data\[0\] is given twice"):
         mjs.attach(model, [data, data])
     with pytest.raises(ValueError, match="data is empty"):
         mjs.attach(model, [])
@@ -291,6 +298,43 @@ def test_measurements_are_what_mujoco_computes_for_the_state():
         if 1 in contact.geom:
             total += contact.frame.reshape(3, 3).T @ wrench[:3]
     assert total[2] > 1 and np.abs(attached["net"].data.force[0, 0, 2]) == pytest.approx(abs(total[2]), rel=1e-6)
+
+
+def test_a_world_may_get_new_data_and_a_new_model():
+    model, datas = started(2)
+    attached = mjs.attach(model, datas, sensors())
+    for _ in range(5):
+        mujoco.mj_step(model, datas[1])
+    attached.update()
+    heavy = mujoco.MjModel.from_xml_string(MODEL.replace('size=".1 .1 .1"', 'size=".1 .1 .2"'))
+    new = mujoco.MjData(heavy)
+    attached.replace(1, new, heavy)
+    assert attached.datas == (datas[0], new)
+    fresh = mjs.attach(heavy, [datas[0], new], sensors())
+    assert_equal({n: attached[n] for n in ("front", "touch", "height", "acc")}, fresh)
+    with pytest.raises(ValueError, match=r"replace\(\): data\[1\] belongs to another model: its qpos has 0 numbers, and this model's has 9"):
+        attached.replace(1, mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>")))
+    with pytest.raises(ValueError, match=r"replace\(\): data\[1\] is given twice"):
+        attached.replace(1, datas[0])
+    with pytest.raises(ValueError, match="world"):
+        attached.replace(2, new)
+
+
+def test_suites_and_recorders_take_attached_sensors(tmp_path):
+    model, datas = started(2)
+    with mjs.attach(model, datas, sensors()) as attached:
+        suite = mjs.SensorSuite([attached["touch"], attached["acc"], attached.add(mjs.PoseSensor("pose", body="box"))])
+        with mjs.Recorder(tmp_path, attached.simulation, suite, episodes=2) as recorder:
+            for world in range(2):
+                recorder.begin_episode(world, world)
+            for _ in range(5):
+                for data in datas:
+                    mujoco.mj_step(model, data)
+                attached.update()
+                recorder.append()
+            for world in range(2):
+                recorder.finish_episode(world)
+    assert mjs.Dataset(tmp_path).episodes[1]["obs/extra/acc"].shape == (5, 3)
 
 
 def test_attaching_a_thousand_times_leaks_nothing():

@@ -305,7 +305,7 @@ def test_workers(root, method):
 
 def test_statistics(root, dataset):
     stats = dataset.stats()
-    qpos = np.concatenate([e["obs/agent/qpos/arm"] for e in dataset.episodes])
+    qpos = np.concatenate([e["obs/agent/qpos/arm"] for e in dataset.episodes]).astype(np.float64)
     one = stats["obs/agent/qpos/arm"]
     for name, value in dict(min=qpos.min(0), max=qpos.max(0), mean=qpos.mean(0), std=qpos.std(0), q01=np.quantile(qpos, 0.01, 0),
                             q10=np.quantile(qpos, 0.1, 0), q50=np.median(qpos, 0), q90=np.quantile(qpos, 0.9, 0),

@@ -21,7 +21,7 @@ spaces = gymnasium.spaces
 
 
 class Counter(gymnasium.Env):
-    """Counts its steps; episodes have `length` steps, and those of odd seeds are truncated. It is no MuJoCo environment."""
+    """Counts its steps; episodes have `length` steps, and those of odd seeds are truncated. It does not use MuJoCo."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
@@ -216,6 +216,44 @@ def test_cameras_and_sensors_of_a_mujoco_environment(tmp_path, worlds):
         assert episode.video("side")[0].shape == (32, 48, 3) and episode.video("eye_depth")[0].shape == (16, 24)
 
 
+class Remade(Pendulum):
+    """Makes a new model and data in every reset, as robosuite does."""
+
+    def reset(self, *, seed=None, options=None):
+        if self.np_random.random() < 2:
+            self.__init__()
+        return super().reset(seed=seed, options=options)
+
+
+def test_an_environment_may_make_its_model_anew(tmp_path):
+    tip = mjs.BuiltinSensorCfg(name="tip", sensor_type="framepos", obj=mjs.ObjRef("site", "tip"))
+    env = mjs.RecordEpisodes(Remade(), tmp_path, 3, cameras=["side"], camera_size=(16, 16), sensors=(tip,))
+    env.reset(seed=0)
+    while not env.recording.complete:
+        *_, truncated, _ = env.step(np.full(1, 0.5, np.float32))
+        if truncated:
+            env.reset()
+    env.close()
+    for episode in mjs.Dataset(tmp_path).episodes:
+        assert np.allclose(episode["obs/extra/tip"][:, 0], 0.4 * np.cos(episode["obs/extra/observation"][:, 0]), atol=1e-6)
+
+
+def made(folder, house):
+    return mjs.RecordEpisodes(Pendulum(), folder, 2, cameras=["side"], camera_size=(16, 16), house=house)
+
+
+def test_environments_in_other_processes_record_to_folders_of_their_own(tmp_path):
+    env = AsyncVectorEnv([lambda house=house: made(tmp_path, house) for house in range(2)])
+    env.reset(seed=3)
+    for _ in range(23):
+        env.step(np.zeros((2, 1), np.float32))
+    env.close()
+    verified(tmp_path)
+    data = mjs.Dataset(tmp_path)
+    assert [(e.house, e.length, e.seed) for e in data.episodes] == [(0, 11, 3), (0, 11, 0), (1, 11, 4), (1, 11, 0)]
+    assert data.episodes[3].video("side")[10].shape == (16, 16, 3)
+
+
 SCRIPT = """
 import sys, time, warnings
 sys.path.insert(0, {tests!r})
@@ -273,8 +311,7 @@ def test_errors(tmp_path):
     env.observation_space = spaces.Text(5)
     with pytest.raises(TypeError, match=r"observation: .*Text.*FilterObservation"):
         mjs.RecordEpisodes(env, tmp_path, 1)
-    env = Pendulum()
-    wrapped = mjs.RecordEpisodes(env, tmp_path, 1, cameras=["side"])
-    env.data = mujoco.MjData(env.model)
-    with pytest.raises(RuntimeError, match="env 0 has made another MjData"):
-        wrapped.reset()
+    env = SyncVectorEnv([Pendulum, Pendulum])
+    env.envs[1].model.geom_size[1, 0] = 0.06
+    with pytest.raises(ValueError, match="the models of environments 0 and 1 differ in geom_size"):
+        mjs.RecordEpisodes(env, tmp_path, 1, sensors=(mjs.CameraSensorCfg(name="eye", camera_name="side"),))

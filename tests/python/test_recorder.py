@@ -122,3 +122,25 @@ def test_errors(tmp_path):
         with pytest.raises(error, match=text):
             call()
         recorder.abandon_episode(0)
+
+
+def test_episodes_can_be_added_and_replaced(tmp_path):
+    sim, height = simulation(), Height()
+
+    def record(episodes, **options):
+        with mjs.Recorder(tmp_path, sim, [height], episodes=episodes, **options) as recorder:
+            for number in range(recorder.first_attempt, recorder.first_attempt + episodes):
+                recorder.begin_episode(0, number)
+                recorder.append([0])
+                recorder.finish_episode(0)
+            return recorder.first_attempt
+
+    assert record(1) == 0
+    with pytest.raises(ValueError, match="resume it, append to it, overwrite it"):
+        record(2)
+    assert record(2, append=True) == 1
+    assert [episode.number for episode in mjs.Dataset(tmp_path).episodes] == [0, 1, 2]
+    with pytest.raises(ValueError, match="choose one of resume, append and overwrite"):
+        record(1, append=True, overwrite=True)
+    assert record(1, overwrite=True) == 0
+    assert [episode.number for episode in mjs.Dataset(tmp_path).episodes] == [0]

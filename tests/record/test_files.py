@@ -120,14 +120,17 @@ def test_numbers_equal_the_json_rows(files):
             traj["numbers"].visititems(lambda name, item: leaves.update({name: item}) if isinstance(item, h5py.Dataset) else None)
             assert {"obs/agent/qpos/arm", "obs/agent/qvel/arm", "actions/joint_pos/arm"} <= set(leaves)
             for name, numbers in leaves.items():
-                place, _, group = name.rpartition("/")
-                if place.endswith("/given"):
+                place, *keys = name.split("/")
+                while not isinstance(traj[place], h5py.Dataset):
+                    place = f"{place}/{keys.pop(0)}"
+                if keys[0] == "given":
                     continue
-                given = leaves.get(f"{place}/given/{group}", np.ones(len(numbers), bool))
-                decoded = readers.rows(traj[place])
-                for row, values, is_given in zip(decoded, numbers, given, strict=True):
-                    assert (group in row) == is_given, name
-                    np.testing.assert_array_equal(values, row[group] if is_given else np.zeros_like(values), err_msg=name)
+                given = leaves.get("/".join([place, "given", *keys]), np.ones(len(numbers), bool))
+                for row, values, is_given in zip(readers.rows(traj[place]), numbers, given, strict=True):
+                    for key in keys:
+                        row = row.get(key) if row is not None else None
+                    assert (row is not None) == is_given, name
+                    np.testing.assert_array_equal(values, row if is_given else np.zeros_like(values), err_msg=name)
 
 
 def test_checksums(house, files):

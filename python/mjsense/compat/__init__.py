@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Replacements for modules of mjlab and MolmoSpaces: code written for them runs after changing its imports.
+"""Parts of other packages: scenes and sensors of mjlab; tasks, policies, robots and sensors of MolmoSpaces.
 
 The modules gymnasium, dm_control and robosuite make the environments of these packages draw with mjsense.
 """

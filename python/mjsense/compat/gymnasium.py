@@ -73,15 +73,19 @@ class Viewer(OffScreenViewer):
         return images[kinds[0]] if len(kinds) == 1 else (images[color], images["depth"])
 
 
+def renderer_of(env: Any) -> MujocoRenderer:
+    """The ``MujocoRenderer`` of an environment, or of the one that it contains, as gymnasium-robotics' kitchen and mazes do."""
+    inner = env.unwrapped
+    for each in (inner, *(getattr(inner, name, None) for name in ("robot_env", "point_env", "ant_env"))):
+        renderer = getattr(each, "mujoco_renderer", None)
+        if isinstance(renderer, MujocoRenderer):
+            return renderer
+    raise TypeError(f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer")
+
+
 def use(env: Any) -> Any:
     """Makes the environment's ``MujocoRenderer`` draw with mjsense, for all render modes but ``human``; returns `env`."""
-    inner = env.unwrapped
-    inner = getattr(inner, "robot_env", inner)  # gymnasium-robotics' kitchen
-    renderer = getattr(inner, "mujoco_renderer", None)
-    if not isinstance(renderer, MujocoRenderer):
-        raise TypeError(
-            f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer"
-        )
+    renderer = renderer_of(env)
     get_viewer = renderer._get_viewer
 
     def viewer_of(render_mode: str | None) -> Any:

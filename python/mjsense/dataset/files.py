@@ -49,7 +49,7 @@ def _batches(root: Path) -> list[Path]:
         return [root]
     found = [path for folder in ("", "house_*/", "shard_*/house_*/") for path in root.glob(f"{folder}trajectories_batch_*.h5")]
 
-    def order(path: Path) -> tuple[str, int, int, int]:
+    def order(path: Path) -> tuple[str | int, ...]:
         house, batch = re.fullmatch(r"house_(\d+)", path.parent.name), BATCH.fullmatch(path.name)
         shard = re.fullmatch(r"shard_(\d+)", path.parent.parent.name)
         return "" if house else path.parent.name, *(int(match[1]) if match else 0 for match in (house, shard, batch))

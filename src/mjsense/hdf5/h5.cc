@@ -141,7 +141,7 @@ Id create_file(const std::filesystem::path& path, std::string_view shown) {
   const Id creation = plist(H5P_FILE_CREATE);
   H5Pset_obj_track_times(creation, false);
   // Small chunk indices, because an episode has many datasets with few chunks.
-  H5Pset_istore_k(creation, 8);
+  H5Pset_istore_k(creation, 4);
   const Id access = file_access();
   std::error_code ignored;  // if removal fails, H5Fcreate reports the error
   std::filesystem::remove(path, ignored);

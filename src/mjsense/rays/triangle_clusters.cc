@@ -30,11 +30,17 @@ std::array<float, 3> unit(const std::array<float, 3>& v) {
 class Builder {
  public:
   Builder(const float* vertices, const int* faces, int num_faces)
-      : vertices_(vertices), faces_(faces), order_(num_faces), centers_(num_faces) {
+      : vertices_(vertices),
+        faces_(faces),
+        order_(num_faces),
+        centers_(num_faces),
+        normals_(num_faces) {
     std::iota(order_.begin(), order_.end(), 0);
-    for (int f = 0; f < num_faces; ++f)
+    for (int f = 0; f < num_faces; ++f) {
       for (int k = 0; k < 3; ++k)
         centers_[f][k] = (corner(f, 0)[k] + corner(f, 1)[k] + corner(f, 2)[k]) / 3;
+      normals_[f] = normal(f);
+    }
   }
 
   Clusters build() {
@@ -137,11 +143,11 @@ class Builder {
   Cone cone_of(Range faces) const {
     std::array<float, 3> sum{};
     for (int f : faces)
-      for (int k = 0; k < 3; ++k) sum[k] += normal(f)[k];
+      for (int k = 0; k < 3; ++k) sum[k] += normals_[f][k];
     Cone cone{unit(sum), 1};
     float cosine = 1;
     for (int f : faces) {
-      const std::array<float, 3> n = normal(f);
+      const std::array<float, 3>& n = normals_[f];
       if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;  // degenerate triangles are never visible
       cosine = std::min(cosine, n[0] * cone.axis[0] + n[1] * cone.axis[1] + n[2] * cone.axis[2]);
     }
@@ -153,7 +159,7 @@ class Builder {
   const float* vertices_;
   const int* faces_;
   std::vector<int> order_;
-  std::vector<std::array<float, 3>> centers_;
+  std::vector<std::array<float, 3>> centers_, normals_;
   Clusters out_;
 };
 

@@ -118,15 +118,12 @@ class RecordJob {
       throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
     }
     cfg = without_shard(std::move(cfg));
-    if (cfg.num_attempts > std::numeric_limits<int>::max())
-      throw ValueError(fmt::format("num_attempts is {}, the maximum is {}", cfg.num_attempts,
-                                   std::numeric_limits<int>::max()));
     if (cfg.num_attempts > 0 && (cfg.episodes != 1 || cfg.max_attempts > 0)) {
       throw ValueError(
           "num_attempts is the number of attempts, whatever their outcome: leave out episodes and "
           "max_attempts");
     }
-    if (cfg.num_attempts > 0) cfg.episodes = static_cast<int>(cfg.num_attempts);
+    if (cfg.num_attempts > 0) cfg.episodes = cfg.num_attempts;
     cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);
     cfg.rollout = resolved(std::move(cfg.rollout));
     cfg.rollout.replay_sensor = cfg.replay;
@@ -283,6 +280,11 @@ class RecordJob {
 }  // namespace
 
 RecordJobCfg without_shard(RecordJobCfg job) {
+  constexpr int kMaximum = std::numeric_limits<int>::max();
+  if (job.num_attempts > kMaximum - job.first_attempt) {
+    throw ValueError(fmt::format("first_attempt + num_attempts is {}, the maximum is {}",
+                                 std::int64_t{job.first_attempt} + job.num_attempts, kMaximum));
+  }
   if (job.shard.empty()) return job;
   std::int64_t k = -1, n = 0;
   const char *first = job.shard.data(), *last = first + job.shard.size();
@@ -302,8 +304,9 @@ RecordJobCfg without_shard(RecordJobCfg job) {
   }
   if (job.append)
     throw ValueError("shard and append exclude each other: use first_attempt for new attempts");
-  // Without k * total, which can overflow.
-  const auto begin_of = [&](std::int64_t i) { return total / n * i + std::min(i, total % n); };
+  const auto begin_of = [&](std::int64_t i) {
+    return static_cast<int>(total / n * i + std::min(i, total % n));
+  };
   job.first_attempt += begin_of(k);
   job.num_attempts = begin_of(k + 1) - begin_of(k);
   job.out /= fmt::format("shard_{}", k);

@@ -22,7 +22,7 @@ struct RecordJobCfg {
   std::filesystem::path out;
   int episodes = 1;
   int max_attempts = 0;
-  std::int64_t num_attempts = 0, first_attempt = 0;
+  int num_attempts = 0, first_attempt = 0;
   std::string shard;  // "2/8"; "": not a shard
   bool keep_failures = false;
   bool resume = false;

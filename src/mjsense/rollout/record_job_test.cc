@@ -15,7 +15,7 @@ namespace {
 using testing::error_of;
 using ::testing::HasSubstr;
 
-RecordJobCfg shard(const std::string& name, std::int64_t attempts) {
+RecordJobCfg shard(const std::string& name, int attempts) {
   RecordJobCfg job;
   job.out = "data";
   job.shard = name;
@@ -26,7 +26,7 @@ RecordJobCfg shard(const std::string& name, std::int64_t attempts) {
 // Each attempt belongs to exactly one shard.
 TEST(Shard, ShardsDivideTheAttempts) {
   for (const auto& [attempts, n] : {std::pair{10, 3}, {8, 8}, {7, 1}}) {
-    std::int64_t next = 0;
+    int next = 0;
     for (int k = 0; k < n; ++k) {
       const RecordJobCfg job = shard(std::to_string(k) + "/" + std::to_string(n), attempts);
       EXPECT_EQ(job.first_attempt, next);
@@ -48,6 +48,11 @@ TEST(Shard, ShardsDivideTheAttempts) {
 TEST(Shard, InvalidShardsAreRefused) {
   for (const char* name : {"3/3", "-1/3", "1", "1/", "/3", "1/3x", "a/b", "1/0"})
     EXPECT_THAT(error_of([&] { shard(name, 9); }), HasSubstr("expected k/n with k from 0")) << name;
+  RecordJobCfg far;
+  far.first_attempt = 2'000'000'000;
+  far.num_attempts = 200'000'000;
+  EXPECT_THAT(error_of([&] { without_shard(far); }),
+              HasSubstr("first_attempt + num_attempts is 2200000000, the maximum is 2147483647"));
   EXPECT_THAT(error_of([&] { shard("0/3", 2); }),
               HasSubstr("num_attempts is 2; it is the number of attempts of all shards"));
 }

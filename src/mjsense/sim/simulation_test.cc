@@ -497,6 +497,44 @@ TEST(Simulation, ManualUpdateUsesTheGivenDuration) {
 }
 
 // Rays hit the world in its current state, not in the state of the first cast.
+// A caller that steps its own data and writes the states sees what a step would have shown.
+TEST(Simulation, FollowsStatesThatWereWritten) {
+  Simulation stepped(scene(), {.num_worlds = 2}), follower(scene(), {.num_worlds = 2});
+  const auto copy_state = [&] {
+    const auto size = stepped.worlds().state().shape.size() * sizeof(double);
+    std::memcpy(follower.worlds().state().data, stepped.worlds().state().data, size);
+  };
+  auto a = std::make_shared<Height>("a"), b = std::make_shared<Height>("b");
+  a->with_substeps = b->with_substeps = true;
+  stepped.add(a);
+  follower.add(b);
+  copy_state();
+  follower.reset(all_worlds, Worlds::kWrittenState);
+  for (int k = 0; k < 20; ++k) {
+    stepped.step();
+    copy_state();
+    follower.follow(1);
+    stepped.refresh(*a);
+    follower.refresh(*b);
+    ASSERT_EQ(a->row(1), b->row(1));
+    ASSERT_EQ(stepped.worlds().time(1), follower.worlds().time(1));
+  }
+  EXPECT_THAT(b->substeps, Each(20));
+  const double timestep = stepped.model()->opt.timestep;
+  EXPECT_EQ(b->last_dt, timestep);
+  const int one[] = {1};
+  follower.follow(3, one);  // the caller made three steps at once, in one world
+  EXPECT_THAT(b->substeps, ElementsAre(20, 21));
+  EXPECT_EQ(b->last_dt, 3 * timestep);
+  EXPECT_DOUBLE_EQ(follower.worlds().time(0), 20 * timestep);
+  EXPECT_DOUBLE_EQ(follower.worlds().time(1), 23 * timestep);
+  follower.reset(one, Worlds::kWrittenState);
+  EXPECT_EQ(follower.worlds().time(1), 0);
+  follower.refresh(*b);
+  EXPECT_EQ(a->row(1), b->row(1)) << "the state stays";
+  EXPECT_THROW(follower.follow(0), ValueError);
+}
+
 TEST(Simulation, RaysUseTheCurrentState) {
   SceneCfg cfg;
   cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});

@@ -222,17 +222,19 @@ void Worlds::restart(const mjModel* m, mjData* d, int w, int key, WorldHooks& ho
 }
 
 void Worlds::follow_world(const mjModel* m, mjData* d, int w, const Call& call) {
+  Clock& clock = clocks_[w];
+  WorldHooks& hooks = *call.hooks;
   derived_[w].stage = mjSTAGE_NONE;
-  clocks_[w].substep += call.substeps;
-  clocks_[w].tick += call.substeps;
-  ++clocks_[w].moment;
-  if (call.hooks->wants_substep()) {
-    compute_stage(m, d, w, call.hooks->substep_stage());
+  clock.substep += call.substeps;
+  clock.tick += call.substeps;
+  ++clock.moment;
+  if (hooks.wants_substep()) {
+    compute_stage(m, d, w, hooks.substep_stage());
     World world = view(m, d, w);
     if (call.substeps > 1) world.elapsed = call.substeps * m->opt.timestep;
-    call.hooks->substep(world);
+    hooks.substep(world);
   }
-  compute_stage(m, d, w, call.hooks->stage());
+  compute_stage(m, d, w, hooks.stage());
   remember(m, d, w);
 }
 

@@ -15,6 +15,8 @@ gymnasium.register_envs(gymnasium_robotics)
 META_WORLD = {"id": "Meta-World/MT1", "camera_name": "corner2", "seed": 0}
 ENVIRONMENTS = {
     "FetchPickAndPlace": ({"id": "FetchPickAndPlace-v4"}, 30),
+    "PointMaze": ({"id": "PointMaze_UMaze-v3"}, 40),
+    "AntMaze": ({"id": "AntMaze_UMaze-v5"}, 29),
     "AdroitHandDoor": ({"id": "AdroitHandDoor-v1"}, 30),
     "Meta-World reach": ({**META_WORLD, "env_name": "reach-v3"}, 30),
     "Meta-World drawer-open": ({**META_WORLD, "env_name": "drawer-open-v3"}, 30),

@@ -11,11 +11,16 @@ import mujoco
 import numpy as np
 
 
-def require_opengl():
-    """Ends the script with code 77 if the machine has no OpenGL for the packages' own images."""
+def has_opengl():
+    """Whether the machine has OpenGL for the packages' own images."""
     probe = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8).close()"
     # Not in this process: the packages' own images are wrong after mujoco.Renderer has used EGL in the same thread.
-    if subprocess.run([sys.executable, "-W", "ignore", "-c", probe], capture_output=True, check=False).returncode:
+    return subprocess.run([sys.executable, "-W", "ignore", "-c", probe], capture_output=True, check=False).returncode == 0
+
+
+def require_opengl():
+    """Ends the script with code 77 if the machine has no OpenGL."""
+    if not has_opengl():
         print("mujoco.Renderer does not work here")
         sys.exit(77)
 

@@ -48,21 +48,45 @@ Between between(int i, int size, int half) {
   return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
 }
 
+// An image of a mip level. Each row has one more texel at its end (see Texture).
+struct Image {
+  std::uint32_t* texels;
+  int width, height;
+
+  std::uint32_t* row(int y) const { return texels + static_cast<std::size_t>(y) * (width + 1); }
+};
+
 // Computes the next mip level of one image by interpolation at its texels' centres, as OpenGL
 // drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts the
 // image nor drops its border.
-void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
+void halve(const Image& src, const Image& dst) {
   using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
+  using Sums [[gnu::vector_size(8)]] = std::uint16_t;
   using Channels [[gnu::vector_size(16)]] = float;
+  if (src.width == 2 * dst.width && src.height == 2 * dst.height) {
+    const auto sums = [](std::uint32_t texel) {
+      return __builtin_convertvector(std::bit_cast<Bytes>(texel), Sums);
+    };
+    for (int y = 0; y < dst.height; ++y) {
+      const std::uint32_t *above = src.row(2 * y), *below = src.row(2 * y + 1);
+      std::uint32_t* out = dst.row(y);
+      for (int x = 0; x < dst.width; ++x, above += 2, below += 2) {
+        const Sums sum = sums(above[0]) + sums(above[1]) + sums(below[0]) + sums(below[1]) + 2;
+        out[x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(sum >> 2, Bytes));
+      }
+    }
+    return;
+  }
   const auto unpacked = [](std::uint32_t texel) {
     return __builtin_convertvector(std::bit_cast<Bytes>(texel), Channels);
   };
-  std::vector<Between> columns(w2);
-  for (int x = 0; x < w2; ++x) columns[x] = between(x, width, w2);
-  for (int y = 0; y < h2; ++y) {
-    const Between v = between(y, height, h2);
-    const std::uint32_t *above = src + v.first * width, *below = src + v.second * width;
-    for (int x = 0; x < w2; ++x) {
+  std::vector<Between> columns(dst.width);
+  for (int x = 0; x < dst.width; ++x) columns[x] = between(x, src.width, dst.width);
+  for (int y = 0; y < dst.height; ++y) {
+    const Between v = between(y, src.height, dst.height);
+    const std::uint32_t *above = src.row(v.first), *below = src.row(v.second);
+    std::uint32_t* out = dst.row(y);
+    for (int x = 0; x < dst.width; ++x) {
       const Between& u = columns[x];
       const auto mix = [&](const std::uint32_t* row) {
         const Channels first = unpacked(row[u.first]);
@@ -70,7 +94,7 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
       };
       const Channels upper = mix(above);
       const Channels value = upper + v.weight * (mix(below) - upper) + 0.5f;
-      dst[y * w2 + x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(value, Bytes));
+      out[x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(value, Bytes));
     }
   }
 }
@@ -104,50 +128,44 @@ void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   const mjtByte* data = model->tex_data + model->tex_adr[id];
   const std::array<std::uint8_t, 256> linear = linear_values();
 
-  std::size_t total = 0, padded = 0;
+  std::size_t total = 0;
   for (int w = width, h = height, n = 0; n < Texture::kMaxLevels; ++n) {
-    total += static_cast<std::size_t>(faces) * w * h;
-    padded += static_cast<std::size_t>(faces) * (w + 1) * h;
+    texture.width[n] = static_cast<float>(w);
+    texture.height[n] = static_cast<float>(h);
+    texture.offset[n] = static_cast<int>(total);
+    total += static_cast<std::size_t>(faces) * (w + 1) * h;
     ++texture.levels;
     if (w == 1 && h == 1) break;
     w = std::max(1, w / 2);
     h = std::max(1, h / 2);
   }
-  std::vector<std::uint32_t> texels(total);
+  out.texels = std::make_unique_for_overwrite<std::uint32_t[]>(total);
+  texture.texels = out.texels.get();
+  const auto image = [&](int level, int face) {
+    const int w = static_cast<int>(texture.width[level]),
+              h = static_cast<int>(texture.height[level]);
+    return Image{
+        out.texels.get() + texture.offset[level] + static_cast<std::size_t>(face) * (w + 1) * h, w,
+        h};
+  };
   for (int f = 0; f < faces; ++f) {
-    const mjtByte* image =
+    const Image first = image(0, f);
+    const mjtByte* from =
         data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
-    std::uint32_t* out = texels.data() + static_cast<std::size_t>(f) * width * height;
-    for (int i = 0; i < width * height; ++i) {
-      std::uint32_t texel = 255u << 24;
-      for (int c = 0; c < 3; ++c) {
-        const mjtByte v = image[i * channels + c];
-        texel |= static_cast<std::uint32_t>(srgb ? linear[v] : v) << (8 * c);
+    for (int y = 0; y < height; ++y) {
+      std::uint32_t* row = first.row(y);
+      for (int x = 0; x < width; ++x, from += channels) {
+        const std::uint32_t alpha = channels == 4 ? from[3] : 255;
+        row[x] = srgb ? linear[from[0]] | linear[from[1]] << 8 | linear[from[2]] << 16 | alpha << 24
+                      : from[0] | from[1] << 8 | from[2] << 16 | alpha << 24;
       }
-      if (channels == 4)
-        texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
-      out[i] = texel;
     }
-  }
-  std::vector<std::uint32_t>& rows = out.texels;
-  rows.resize(padded);
-  texture.texels = rows.data();
-  std::uint32_t* row = rows.data();
-  for (int n = 0, w = width, h = height, at = 0; n < texture.levels; ++n) {
-    texture.width[n] = static_cast<float>(w);
-    texture.height[n] = static_cast<float>(h);
-    texture.offset[n] = static_cast<int>(row - rows.data());
-    const int size = w * h, w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
-    std::uint32_t* image = texels.data() + at;
-    for (int y = 0; y < faces * h; ++y, row += w + 1) {
-      std::copy_n(image + y * w, w, row);
-      row[w] = row[texture.cube ? w - 1 : 0];
+    for (int n = 0; n + 1 < texture.levels; ++n) halve(image(n, f), image(n + 1, f));
+    for (int n = 0; n < texture.levels; ++n) {
+      const Image level = image(n, f);
+      for (int y = 0; y < level.height; ++y)
+        level.row(y)[level.width] = level.row(y)[texture.cube ? level.width - 1 : 0];
     }
-    at += faces * size;
-    for (int f = 0; f < faces && n + 1 < texture.levels; ++f)
-      halve(image + f * size, w, h, texels.data() + at + f * w2 * h2, w2, h2);
-    w = w2;
-    h = h2;
   }
 }
 

@@ -53,7 +53,7 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id);
 // A texture with its memory.
 struct StoredTexture {
   Texture texture;
-  std::vector<std::uint32_t> texels;
+  std::unique_ptr<std::uint32_t[]> texels;
 };
 
 // The model's texture `id`, shared by all models of the process that have an equal texture.
