@@ -20,7 +20,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
-    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay
+    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay, render
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -56,7 +56,21 @@ from mjsense.core_sensors import (
     TcpPoseSensor,
 )
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
-from mjsense.dataset import Dataset, Deviation, Episode, EpisodeCheck, ReplayReport, Stream, Video, check_replay, replay
+from mjsense.dataset import (
+    Dataset,
+    Deviation,
+    Episode,
+    EpisodeCheck,
+    RenderProgress,
+    RenderSummary,
+    ReplayReport,
+    SensorCheck,
+    Stream,
+    Video,
+    check_replay,
+    render,
+    replay,
+)
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
@@ -89,11 +103,12 @@ __all__ = [
     "EpisodeCheck", "FunctionSensor",
     "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
     "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "ReplayReport", "Robot",
-    "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "RenderProgress", "RenderSummary", "Renderer",
+    "ReplayReport", "Robot",
+    "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
     "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
     "Video", "WorldState", "check_replay", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names",
-    "record", "register_policy", "register_task", "replay",
+    "record", "register_policy", "register_task", "render", "replay",
     "robot_names", "task_names",
     "__version__",
 ]

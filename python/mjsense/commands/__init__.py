@@ -14,13 +14,33 @@ import sys
 from types import ModuleType
 
 COMMANDS = {
-    "replay": "Replay recorded episodes and compare them with the recording.",
+    "replay": "Replay recorded episodes and report every difference.",
+    "render": "Render recorded episodes with other cameras and sensors.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
 
 FAILED = 1  # some episodes or checks failed
 WRONG_INPUT = 2
 _INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+
+
+class ProgressLine:
+    """A line on stderr that is overwritten; nothing is shown if stderr is not a terminal."""
+
+    def __enter__(self) -> ProgressLine:
+        self._shown = False
+        return self
+
+    def show(self, text: str) -> None:
+        """Replaces the line."""
+        if sys.stderr.isatty():
+            self._shown = True
+            width = shutil.get_terminal_size().columns - 1
+            print(f"\r{text[:width]:<{width}}", end="", file=sys.stderr, flush=True)
+
+    def __exit__(self, *exception: object) -> None:
+        if self._shown:
+            print(file=sys.stderr)
 
 
 class _HelpFormatter(argparse.RawDescriptionHelpFormatter):

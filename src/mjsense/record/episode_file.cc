@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
+#include "mjsense/hdf5/chunk_checks.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/molmospaces.h"
@@ -198,6 +199,27 @@ void EpisodeFile::write_array(const EpisodeArray& array) {
             path);
   h5::set_attribute(dataset, "description", array.description);
   h5::set_attribute(dataset, kChecksumAttribute, sum.text());
+}
+
+void EpisodeFile::carry_over(const EpisodeSource& source) {
+  const std::string shown = source.file.string();
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(source.file);
+  const h5::Id from = h5::open_group(file, source.trajectory);
+  h5::each_dataset(from, [&](const std::string& path) {
+    const auto is_inside = [&](std::string_view group) {
+      return path.starts_with(group) && (path.size() == group.size() || path[group.size()] == '/');
+    };
+    if (path == "obs_scene" || std::ranges::any_of(source.skip, is_inside)) return;
+    if (h5::exists(trajectory_, path)) return;
+    const h5::Id dataset = h5::open_dataset(from, path);
+    // The HDF5 library copies chunks that cannot be unpacked, and frees them twice.
+    h5::check_storage(dataset, path);
+    h5::check_chunks(dataset, path);
+    h5::check(
+        H5Ocopy(from, path.c_str(), trajectory_, path.c_str(), H5P_DEFAULT, h5::link_properties()),
+        fmt::format("cannot copy '{}' of '{}'", path, shown));
+  });
 }
 
 void EpisodeFile::finish(std::span<const VideoSum> videos) {

@@ -38,6 +38,8 @@ class EpisodeFile {
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
   void write_scene(std::string_view obs_scene, std::string_view outcome);
   void write_array(const EpisodeArray& array);
+  // Copies what this file does not have yet. Throws RuntimeError if the source cannot be read.
+  void carry_over(const EpisodeSource& source);
   // Checksums and sizes of the videos, in the order of the plan. finish() writes them and closes
   // the file; it throws if the disk reports an error.
   struct VideoSum {
