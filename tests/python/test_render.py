@@ -3,8 +3,10 @@
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
+import time
 
 import gymnasium
 import h5py
@@ -56,7 +58,7 @@ def videos(root):
 def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
     """Depth is bit-equal, and so is rgb before encoding, because the encoder makes equal files of equal images."""
     seen = []
-    made = mjs.render(recorded, tmp_path, worlds=2, progress=seen.append)
+    made = mjs.render(recorded, tmp_path, copy=False, worlds=2, progress=seen.append)
     assert (made.finished, made.wanted, made.frames) == (3, 3, 3 * 9 * 4) and made.paths == [tmp_path / "house_0"]
     assert seen[-1].finished == 3
     assert "3 episodes" in verified(tmp_path)
@@ -75,8 +77,11 @@ def test_files_do_not_depend_on_worlds_and_threads(recorded, tmp_path):
 
 
 def test_added_cameras(recorded, tmp_path):
-    mjs.render(recorded, tmp_path, cameras=["wrist_camera"], add_cameras={"top": TOP, "hand": HAND}, depth=None)
+    mjs.render(recorded, tmp_path, cameras=["wrist_camera"], add_cameras={"top": TOP, "hand": HAND})
     verified(tmp_path)
+    assert {name: data for name, data in videos(tmp_path).items() if "wrist" in name} == {
+        name: data for name, data in videos(recorded).items() if "wrist" in name
+    }
     dataset = mjs.Dataset(tmp_path)
     assert sorted(name for name in dataset.streams if name.startswith("obs/sensor_data/")) == [
         f"obs/sensor_data/{name}" for name in ("hand", "hand_depth", "top", "wrist_camera", "wrist_camera_depth")
@@ -96,8 +101,9 @@ def test_added_cameras(recorded, tmp_path):
         assert "exo_camera_1_segmentation" not in trajectory["obs/extra"] and "wrist_camera_segmentation" in trajectory["obs/extra"]
     assert episode.video("top")[0].std() > 10
     # A rendering can be rendered again, with its added cameras.
-    mjs.render(tmp_path, tmp_path / "again")
-    assert videos(tmp_path / "again") == videos(tmp_path)
+    assert mjs.render(tmp_path, tmp_path / "again", copy=False).frames == 3 * 9 * 5
+    assert mjs.render(tmp_path, tmp_path / "copies").frames == 0
+    assert videos(tmp_path / "again") == videos(tmp_path) == videos(tmp_path / "copies")
 
 
 @pytest.mark.parametrize("pos, lookat, up", (((1, 2, 3), (0, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, 0, 0), (0, 0, 1)), ((-1, 0, 0), (2, 1, -1), (1, 1, 0))))
@@ -138,6 +144,8 @@ def test_light(recorded, tmp_path):
 
     mjs.render(recorded, tmp_path / "dark", brightness=0.3, shadows=False, episodes=[0])
     mjs.render(recorded, tmp_path / "lamp", edit=edit, episodes=[0])
+    mjs.render(tmp_path / "dark", tmp_path / "again", copy=False)
+    assert videos(tmp_path / "again") == videos(tmp_path / "dark")
     before, dark, lamp = (mjs.Dataset(out).episodes[0].video("wrist_camera")[0].mean((0, 1)) for out in (recorded, tmp_path / "dark", tmp_path / "lamp"))
     assert dark.mean() < 0.6 * before.mean() and lamp[0] > before[0] + 5
 
@@ -188,6 +196,62 @@ def test_resume_after_an_interruption(recorded, tmp_path):
     whole, out = ({p.relative_to(root): p.read_bytes() for p in root.rglob("*.*")} for root in (tmp_path / "whole", tmp_path / "out"))
     assert whole == out
     assert mjs.render(recorded, tmp_path / "out", resume=True, **about).finished == 3
+
+
+def test_kill_and_resume(recorded, tmp_path):
+    """kill -9 at any time: finished episodes stay, and the final files are those of an uninterrupted rendering."""
+    words = ["--cameras", "--add-camera", "top=pos=0.5,0,1.6 lookat=0.5,0,0", "--worlds", "1", "--batches", "1"]
+    program = [sys.executable, "-m", "mjsense", "render", recorded]
+    subprocess.run([*program, tmp_path / "whole", *words], check=True, capture_output=True)
+    killed = 0
+    for delay in (0.02, 0.15, 0.3):
+        process = subprocess.Popen([*program, tmp_path / "out", *words, "--resume"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        house = tmp_path / "out/house_0"
+        while process.poll() is None and not house.exists():
+            time.sleep(0.005)
+        time.sleep(delay)
+        process.kill()
+        killed += process.wait() == -signal.SIGKILL
+        process.communicate()
+    assert killed
+    subprocess.run([*program, tmp_path / "out", *words, "--resume"], check=True, capture_output=True)
+    whole, out = ({p.relative_to(root): p.read_bytes() for p in root.rglob("*.*")} for root in (tmp_path / "whole", tmp_path / "out"))
+    assert whole == out and not (tmp_path / "out/house_0/.recording").exists()
+
+
+def test_damage_is_noticed(recorded, tmp_path):
+    """Flipped bits of the data for replay, and of the model archive, in the recording and in what is made of it."""
+
+    def damaged(path, at):
+        data = bytearray(path.read_bytes())
+        data[at] ^= 4
+        path.write_bytes(data)
+
+    def verify(out):
+        done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(out)], capture_output=True, text=True)
+        return done.returncode, done.stdout
+
+    shutil.copytree(recorded, tmp_path / "data")
+    archive, file = next((tmp_path / "data").glob("house_0/*.zip")), next((tmp_path / "data").glob("house_0/*.h5"))
+    whole = archive.read_bytes()
+    damaged(archive, len(whole) // 2)
+    assert (code := verify(tmp_path / "data"))[0] == 1 and f"'{archive.name}' is damaged: its checksum is" in code[1]
+    archive.write_bytes(whole[: len(whole) // 2])
+    assert (code := verify(tmp_path / "data"))[0] == 1 and f"'{archive.name}' is damaged" in code[1]
+    with pytest.raises(ValueError, match=f"{archive.name} cannot be read: "):
+        mjs.render(tmp_path / "data", tmp_path / "out")
+    with pytest.raises(ValueError, match=f"{archive.name} cannot be read: "):
+        mjs.check_replay(tmp_path / "data")
+    archive.unlink()
+    assert (code := verify(tmp_path / "data"))[0] == 1 and "the model archive, which replay needs" in code[1]
+    archive.write_bytes(whole)
+    assert verify(tmp_path / "data")[0] == 0
+    with h5py.File(file) as opened:
+        at = opened["traj_1/replay/state"].id.get_chunk_info(0).byte_offset
+    damaged(file, at + 50)
+    assert (code := verify(tmp_path / "data"))[0] == 1 and "traj_1/replay/state" in code[1]
+    with pytest.raises((RuntimeError, OSError), match=r"replay/state|read"):
+        mjs.render(tmp_path / "data", tmp_path / "out")
 
 
 def test_gaps_between_episode_numbers(tmp_path):

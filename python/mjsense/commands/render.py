@@ -56,8 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--segmentation", action=flag, help="Segmentation images of all cameras; by default as recorded.")
     parser.add_argument("--shadows", action=flag, help="Shadows; by default as recorded.")
     parser.add_argument("--samples", type=int, metavar="N", help="Rays per pixel of rgb; by default as recorded.")
-    parser.add_argument("--brightness", type=float, default=1.0, metavar="X", help="Factor of all lights.")
+    parser.add_argument("--brightness", type=float, metavar="X", help="Factor of all lights; by default as recorded.")
     parser.add_argument("--sensors", metavar="FILE", help="TOML file with [[sensors]] tables, as in a robot.toml.")
+    parser.add_argument("--copy", action=flag, default=True, help="Copy the videos of recorded cameras that do not change.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--worlds", type=int, default=4, metavar="N", help="Number of episodes that are rendered in parallel.")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="Number of threads; 0: one per available CPU.")
@@ -83,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
             rate = now.frames / now.seconds if now.seconds else 0
             line.show(f"{now.finished} of {now.wanted} episodes, {now.frames} images, {rate:.0f} images/s")
 
-        same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "brightness", "episodes", "worlds",
+        same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "brightness", "copy", "episodes", "worlds",
                 "threads", "batches", "crf", "preset", "resume")  # fmt: skip
         made = render(
             arguments.path, arguments.out, add_cameras=added, progress=show,

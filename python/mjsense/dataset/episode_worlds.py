@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import tempfile
-import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,8 +59,9 @@ class EpisodeWorlds:
 
         archive = playback.archive_of(episode)
         with tempfile.TemporaryDirectory(prefix="mjsense") as folder:
-            with zipfile.ZipFile(archive) as file:
-                file.extractall(folder)
+            for name, data in playback.read_archive(archive).items():
+                (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
+                (Path(folder) / name).write_bytes(data)
             model_file = Path(folder) / playback.MODEL_FILE
             recorded = Scene(SceneCfg(base=model_file)).model
             self.scene = Scene(SceneCfg(base=model_file, sensors=tuple(sensors), spec_fn=edit_spec))

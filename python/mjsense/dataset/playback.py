@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import zipfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,13 +79,24 @@ def archive_of(episode: Episode) -> Path:
     return path
 
 
+def read_archive(path: Path) -> dict[str, bytes]:
+    """The files of a model archive."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            files = {name: archive.read(name) for name in archive.namelist()}
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+        raise ValueError(f"the model archive {path} cannot be read: {error}; copy it from the original recording") from error
+    if MODEL_FILE not in files or any(Path(name).is_absolute() or ".." in Path(name).parts for name in files):
+        raise ValueError(f"the model archive {path} cannot be read: it contains no {MODEL_FILE}, or names outside of its folder")
+    return files
+
+
 def _archived_model(episode: Episode) -> mujoco.MjModel:
     path = archive_of(episode)
 
     def compile_model() -> tuple[mujoco.MjModel, int]:
-        with zipfile.ZipFile(path) as archive:
-            assets = {file: archive.read(file) for file in archive.namelist() if file != MODEL_FILE}
-            text = archive.read(MODEL_FILE).decode()
+        assets = read_archive(path)
+        text = assets.pop(MODEL_FILE).decode()
         try:
             return mujoco.MjModel.from_xml_string(text, assets), 1
         except ValueError as error:

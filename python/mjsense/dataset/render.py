@@ -39,7 +39,7 @@ class RenderProgress:
     """Number of episodes on disk."""
     wanted: int
     frames: int
-    """Images of all cameras."""
+    """Images that were rendered, of all cameras."""
     seconds: float
     """Wall-clock time."""
 
@@ -82,26 +82,32 @@ class _House:
     def __init__(self, episodes: list[Episode], others: list[int], out: Path, options: dict[str, Any], progress: _Progress) -> None:
         self._episodes, self._progress = episodes, progress
         first = episodes[0]
-        cameras, self._system = render_cameras.choose(
+        cameras, self._system, unchanged = render_cameras.choose(
             first, options["cameras"], options["add_cameras"], options["camera_system"],
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
         )  # fmt: skip
         settings = first.settings
-        shadows, samples = (settings.get(key, default) if options[key] is None else options[key] for key, default in (("shadows", True), ("samples", 1)))
+        defaults = {"shadows": settings.get("shadows", True), "samples": settings.get("samples", 1),
+                    "brightness": settings.get("render", {}).get("brightness", 1.0)}  # fmt: skip
+        shadows, samples, brightness = (value if options[key] is None else options[key] for key, value in defaults.items())
+        recorded = render_cameras.recorded_cameras(first, None)
+        as_recorded = options["copy"] and not options["edit"] and all(options[key] is None for key in (*defaults, "crf", "preset"))
+        copied = unchanged if as_recorded else []
+        new_cameras = [camera for camera in cameras if camera not in copied]
         sensors = list(options["sensors"])
         suite_sensors = [sensor for sensor in sensors if isinstance(sensor, CoreSensor)]
         scene_sensors = [sensor for sensor in sensors if not isinstance(sensor, CoreSensor)]
-        views = [camera.scene_sensor(shadows, samples) for camera in cameras]
+        views = [camera.scene_sensor(shadows, samples) for camera in new_cameras]
         self._worlds = EpisodeWorlds(
             first, min(options["worlds"], len(episodes)), [*views, *scene_sensors],
-            edit=options["edit"], brightness=options["brightness"], threads=options["threads"],
+            edit=options["edit"], brightness=brightness, threads=options["threads"],
         )  # fmt: skip
         if self._system:
             self._system.bind(self._worlds)
-        self._frames = sum(1 + camera.depth for camera in cameras)
+        self._frames = sum(1 + camera.depth for camera in new_cameras)
         scene, sim = self._worlds.scene, self._worlds.sim
         own = [scene[_key_of(sensor)] for sensor in scene_sensors]
-        streams = [stream for camera in cameras for stream in camera.streams()]
+        streams = [stream for camera in new_cameras for stream in camera.streams()]
         self._sensors, handles = recorded_sensors(sim, [*streams, *own, *suite_sensors])
         for sensor, handle in zip(self._sensors, handles):
             if handle.has_memory:
@@ -115,16 +121,18 @@ class _House:
         archive = archive_of(first)
         files["archive"] = archive.name, archive.read_bytes()
         changed = {"cameras": [camera.settings() for camera in cameras], "shadows": shadows, "samples": samples,
-                   "render": {"of": description, "episodes": [episode.number for episode in episodes], "brightness": options["brightness"],
+                   "render": {"of": description, "episodes": [episode.number for episode in episodes], "brightness": brightness,
                               "camera_system": options["camera_system"]}}  # fmt: skip
         text = json.dumps(settings | changed, sort_keys=True, separators=(",", ":"))
         rate = Fraction(first.fps)
         use_installed_ffmpeg()
         self._recorder = _core.Recorder(sim._core, handles, str(out), rate.numerator, rate.denominator, text, files | video)
         self.path = Path(self._recorder.path)
-        self._skip = ["obs/sensor_data"]
-        for camera in settings.get("cameras", []):
-            self._skip += [f"obs/sensor_param/{camera['name']}", f"obs/extra/{camera['name']}_segmentation"]
+        self._skip = [
+            f"obs/{place}{end}" for camera in recorded if camera not in copied
+            for place, ends in ((f"sensor_data/{camera.name}", ("", "_depth", "_depth_16bit")), (f"sensor_param/{camera.name}", ("",)),
+                                (f"extra/{camera.name}", ("_segmentation",))) for end in ends
+        ]  # fmt: skip
         for number in () if self._recorder.enough else others:
             if not self._recorder.decided(number):
                 self._recorder.skip_episode(number, "not in the rendering")
@@ -169,7 +177,7 @@ class _House:
     def _finish(self, world: int, episode: Episode) -> None:
         with open_h5(episode.path) as file:
             scene = file[episode.trajectory]["obs_scene"][()]
-        self._recorder.carry_over(world, str(episode.path), episode.trajectory, self._skip)
+        self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
         self._recorder.finish_episode(world, scene.decode() if isinstance(scene, bytes) else str(scene), episode.outcome)
 
 
@@ -191,9 +199,10 @@ def render(
     segmentation: bool | None = None,
     shadows: bool | None = None,
     samples: int | None = None,
-    brightness: float = 1.0,
+    brightness: float | None = None,
     edit: Callable[[Any], None] | None = None,
     sensors: Callable[[], Iterable[Any]] | Iterable[Any] = (),
+    copy: bool = True,
     episodes: Sequence[int] | None = None,
     worlds: int = 4,
     threads: int = 0,
@@ -206,7 +215,7 @@ def render(
     """Renders recorded episodes again, with other or more cameras and sensors, into a new recording.
 
     Every number of the old recording is carried over unchanged: actions, rewards, states, data for replay, ``obs_scene`` and outcomes.
-    Images and sensors are computed from the recorded states and the archived model, so a camera of the recording gives the same images.
+    Images and sensors are computed from the recorded states and the archived model; videos of recorded cameras that do not change are copied.
     Nothing is simulated, and neither the task nor the policy is needed. Ctrl-C keeps the finished episodes; call again with
     ``resume=True`` to continue.
 
@@ -221,11 +230,12 @@ def render(
         width, height: Size of all images; one alone keeps the aspect ratio. By default as recorded. [pixels]
         depth, segmentation: Whether every camera has depth and segmentation; by default as recorded.
         shadows, samples: Whether shadows are drawn, and rays per pixel of rgb; by default as recorded.
-        brightness: Factor of all lights.
+        brightness: Factor of all lights; by default as recorded.
         edit: Function that edits the MjSpec before compilation: adds lights, replaces textures, hides geoms. Bodies, joints and geoms
             must stay as they are.
         sensors: Configurations of sensors, user-defined :class:`Sensor` objects, or sensors such as :class:`PoseSensor`; for a recording
             with several houses, a function that makes them for each house. One with the name of a recorded stream replaces it.
+        copy: Copy the videos of recorded cameras of which no option changes the images. False: render them again, with the same result.
         episodes: Positions of episodes in the recording; by default all.
         worlds: Number of episodes that are rendered in parallel.
         threads: Number of threads; 0: one per available CPU.
@@ -236,13 +246,13 @@ def render(
     """
     options: dict[str, Any] = {
         "cameras": cameras, "add_cameras": add_cameras or {}, "camera_system": camera_system, "width": width, "height": height, "depth": depth,
-        "segmentation": segmentation, "shadows": shadows, "samples": samples, "brightness": brightness, "edit": edit, "worlds": worlds,
+        "segmentation": segmentation, "shadows": shadows, "samples": samples, "brightness": brightness, "edit": edit, "copy": copy, "worlds": worlds,
         "threads": threads, "batches": batches, "crf": crf, "preset": preset, "resume": resume,
     }  # fmt: skip
     for name, value in (("worlds", worlds), ("width", width), ("height", height), ("samples", samples)):
         if value is not None and value < 1:
             raise ValueError(f"{name} is {value}: must be at least 1")
-    if not brightness > 0:
+    if brightness is not None and not brightness > 0:
         raise ValueError(f"brightness is {brightness}: must be positive")
     dataset = root if isinstance(root, Dataset) else Dataset(root, episodes=episodes)
     if isinstance(root, Dataset) and episodes is not None:

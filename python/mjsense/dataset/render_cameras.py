@@ -74,7 +74,8 @@ def recorded_cameras(episode: Episode, names: Sequence[str] | None) -> list[Rend
             if "pos" not in entry and "camera" not in entry:
                 frame = text_of(file[episode.trajectory][f"obs/sensor_data/{name}"].attrs["frame"])
                 entry = {**entry, "camera": frame.removeprefix("camera ")}
-            cameras.append(RenderCamera(**{key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}))
+            about: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+            cameras.append(RenderCamera(**about))
     return cameras
 
 
@@ -203,8 +204,8 @@ def choose(
     height: int | None,
     depth: bool | None,
     segmentation: bool | None,
-) -> tuple[list[RenderCamera], CameraSystem | None]:
-    """The cameras in the order of the new recording."""
+) -> tuple[list[RenderCamera], CameraSystem | None, list[RenderCamera]]:
+    """The cameras in the order of the new recording, the camera system, and those cameras that are as recorded."""
     system = CameraSystem(camera_system, episode) if camera_system else None
     if cameras is None and system is not None:
         cameras = []
@@ -222,4 +223,4 @@ def choose(
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise ValueError(f"two cameras are named '{sorted(twice)[0]}'; a camera that is added needs a new name")
-    return chosen, system
+    return chosen, system, [camera for camera, before in zip(chosen, recorded) if camera == before]

@@ -70,7 +70,7 @@ class _Rebuilt:
         if options["meshes"] == "real":
             use_installed_meshes()
         self._rollout = _core.Rollout(options, (None, None, [], None, {}, [], None), Simulation._of)
-        self.sim: Simulation = self._rollout.simulation()
+        self.sim: Any = self._rollout.simulation()
         stored = inputs_of(episode).state.shape[1]
         if self.sim.state.shape[1] != stored:
             raise ValueError(f"the recorded state has {stored} numbers, that of the task in this version has {self.sim.state.shape[1]}")
@@ -176,8 +176,8 @@ def _text_deviation(name: str, recorded: np.ndarray, replayed: np.ndarray, t: in
     if not differing:
         return Deviation(t, name, "the text", text_of(recorded[t].tobytes()), text_of(replayed[t].tobytes()), 1)
     leaf = differing[0]
-    values = [found[leaf][0][0].tolist() if leaf in found else None for found in (a, b)]
-    return Deviation(t, name, f"key '{leaf.lstrip('/')}'", *values, len(differing))
+    was, now = (found[leaf][0][0].tolist() if leaf in found else None for found in (a, b))
+    return Deviation(t, name, f"key '{leaf.lstrip('/')}'", was, now, len(differing))
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -187,8 +187,8 @@ def _same(a: Any, b: Any) -> bool:
 def _array_deviation(name: str, recorded: np.ndarray, replayed: np.ndarray) -> Deviation | None:
     """The first row and value that differ, in bits; NaN equals NaN."""
     if recorded.shape != replayed.shape or recorded.dtype != replayed.dtype:
-        shapes = [f"{rows.dtype}{list(rows.shape)}" for rows in (recorded, replayed)]
-        return Deviation(0, name, "the shape", *shapes, 1)
+        was, now = (f"{rows.dtype}{list(rows.shape)}" for rows in (recorded, replayed))
+        return Deviation(0, name, "the shape", was, now, 1)
     if recorded.tobytes() == replayed.tobytes():
         return None
     words = [np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1, rows.dtype.itemsize) for rows in (recorded, replayed)]
@@ -196,8 +196,8 @@ def _array_deviation(name: str, recorded: np.ndarray, replayed: np.ndarray) -> D
     t = int(differs.any(1).argmax())
     first = int(differs[t].argmax())
     place = np.unravel_index(first, recorded.shape[1:]) if recorded.ndim > 1 else ()
-    values = [rows[t][place].item() for rows in (recorded, replayed)]
-    return Deviation(t, name, f"value {[int(i) for i in place]}", *values, int(differs[t].sum()))
+    was, now = (rows[t][place].item() for rows in (recorded, replayed))
+    return Deviation(t, name, f"value {[int(i) for i in place]}", was, now, int(differs[t].sum()))
 
 
 def _video_deviation(name: str, recorded: Episode, replayed: Episode) -> Deviation | None:

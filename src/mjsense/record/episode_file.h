@@ -59,6 +59,8 @@ class EpisodeFile {
   // Returns a chunk converted to text; valid until the next call.
   std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
                                          std::span<const std::uint8_t> kept);
+  // Copies the video that the dataset `path` names, and names the copy.
+  void carry_video(const std::filesystem::path& folder, const std::string& path);
   void add_dataset(std::string_view path, DType dtype, const Shape& row, std::int64_t chunk_rows);
 
   std::shared_ptr<const Folder> folder_;

@@ -129,7 +129,7 @@ struct EpisodeArray {
 };
 
 // A recorded episode whose data are carried over into a new one: every dataset of the trajectory that
-// the new episode does not have, with its attributes.
+// the new episode does not have, with its attributes, and the videos that these datasets name.
 struct EpisodeSource {
   std::filesystem::path file;
   std::string trajectory;         // "traj_0"
