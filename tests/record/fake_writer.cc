@@ -90,7 +90,7 @@ std::vector<EpisodeArray> replay_arrays(std::int64_t episode) {
   sizes[episode % 300] = 0.02;
   const auto bytes = std::as_bytes(std::span(sizes));
   return {{"model/geom_size",
-           "Values of this episode's model.",
+           "Values of this episode's model; NaN: the value of the archived model.",
            DType::kFloat64,
            {100, 3},
            {bytes.begin(), bytes.end()}}};
@@ -170,8 +170,9 @@ int record(const std::string& out, const Options& o) {
         recorder.discard_episode(w, "every so many");
       } else {
         if (!source.file.empty()) recorder.carry_over(w, source);
-        recorder.finish_episode(w, FakeSuite::obs_scene(r.episode), "success",
-                                replay_arrays(r.episode));
+        recorder.finish_episode(
+            w, FakeSuite::obs_scene(r.episode), "success",
+            source.file.empty() ? replay_arrays(r.episode) : std::vector<EpisodeArray>());
         if (o.flag("--print")) {
           recorder.flush();
           fmt::print("finished {}\n", r.episode);

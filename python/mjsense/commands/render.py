@@ -8,7 +8,7 @@ from typing import Any
 
 EXAMPLES = [
     ('mjsense render data top --add-camera top="pos=0.5,0,1.6 lookat=0.5,0,0"', "Add a camera above the table; render the recorded ones again, too."),
-    ('mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.1,0,0 lookat=0,0,0.2 fovy=70"',
+    ('mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.17,0,-0.02 lookat=0,0,0.2 fovy=70"',
      "Only a new camera, mounted on the gripper."),
     ("mjsense render data large --width 1280 --depth --segmentation", "The recorded cameras with larger images, depth and segmentation."),
     ("mjsense render data droid --camera-system droid", "The cameras of another camera system of the robot."),

@@ -191,9 +191,9 @@ def check_replay(
         root: Folder of a recording, or a :class:`Dataset`.
         actions: Simulate in plain MuJoCo with the recorded controls, stepwise from each recorded state and open loop from the first one,
             and compare the states.
-        states: Set the recorded states, compute the recording's sensors from them, and compare every stream. Depth is compared bit for
-            bit, rgb by its video, which the encoder makes equal for equal images. Streams that do not follow from model and state are
-            listed with the reason.
+        states: Build the recording's task again, repeat each step from the recorded state, and compare every stream, rewards and success.
+            Depth is compared bit for bit, rgb by its video, because the encoder makes equal files of equal images. Streams of the policy,
+            and others that cannot be computed, are listed with the reason.
         episodes: Positions of episodes in the recording; by default all.
         worlds: Number of episodes whose sensors are computed in parallel.
         threads: Number of threads that compute sensors; 0: one per available CPU.
