@@ -4,7 +4,6 @@
 import base64
 import itertools
 import json
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -14,7 +13,7 @@ import urllib.request
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "site"))
-from browser import chromium  # noqa: E402
+from browser import chromium
 
 
 class Page:

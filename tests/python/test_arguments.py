@@ -23,7 +23,7 @@ CLASSES = [
     and value.__module__.startswith("mjsense.")
     and value is not mjs.SensorSpec
 ]
-FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
+FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.render, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
 
 
 def methods_of(cls):

@@ -14,11 +14,11 @@ import devtools
 import mujoco
 import numpy as np
 import pytest
+from mjsense.view import geometry, surfaces
+from mjsense.view.poses import PoseStream
 from scenes import BALL
 
 import mjsense as mjs
-from mjsense.view import geometry, surfaces
-from mjsense.view.poses import PoseStream
 
 needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
 needs_browser = pytest.mark.skipif(devtools.chromium() is None, reason="there is no Chromium")

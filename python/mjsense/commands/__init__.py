@@ -17,7 +17,8 @@ from types import ModuleType
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
     "plot": "Draw streams of a recording or of live worlds into a picture.",
-    "replay": "Replay recorded episodes and compare them with the recording.",
+    "replay": "Replay recorded episodes and report every difference.",
+    "render": "Render recorded episodes with other cameras and sensors.",
     "export": "Write a recording in the format of another program.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
