@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/scene/compiled_model.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/mujoco_fields.h"
 
@@ -178,6 +179,29 @@ nb::dict model_fields(std::uintptr_t address) {
   return fields.all();
 }
 
+// A model of these sizes whose arrays are 0, with default options.
+std::uintptr_t make_model(nb::dict sizes) {
+  mjModel fields{};
+  mj_defaultOption(&fields.opt);
+  mj_defaultVisual(&fields.vis);
+#define X(name) fields.name = nb::cast<decltype(fields.name)>(sizes[#name]);
+  MJMODEL_SIZES
+#undef X
+  const mjModel* m = &fields;
+  MJMODEL_POINTERS_PREAMBLE(m)
+  std::int64_t largest = 0;
+#define X(type, name, nr, nc) \
+  largest = std::max<std::int64_t>(largest, sizeof(type) * m->nr * (nc));
+  MJMODEL_POINTERS
+#undef X
+  const std::vector<char> zeros(largest + 1);
+#define X(type, name, nr, nc) \
+  fields.name = reinterpret_cast<type*>(const_cast<char*>(zeros.data()));
+  MJMODEL_POINTERS
+#undef X
+  return reinterpret_cast<std::uintptr_t>(copy_fields(fields).release());
+}
+
 nb::dict data_fields(std::uintptr_t model, std::uintptr_t address) {
   const auto* m = reinterpret_cast<const mjModel*>(model);
   const auto* d = reinterpret_cast<const mjData*>(address);
@@ -258,6 +282,8 @@ void bind_mujoco_views(nb::module_& m) {
       .def_prop_ro("address", &OwnedData::address);
   m.def("model_fields", &model_fields, nb::arg("model"),
         "Fields of an mjModel: name -> (address, data type, shape).");
+  m.def("make_model", &make_model, nb::arg("sizes"),
+        "Address of a new mjModel of these sizes, which the caller owns: arrays are 0.");
   m.def("data_fields", &data_fields, nb::arg("model"), nb::arg("data"),
         "Fields of an mjData that stay where they are.");
   m.def("arena_fields", &arena_fields, nb::arg("model"), nb::arg("data"),

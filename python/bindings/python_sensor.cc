@@ -122,23 +122,29 @@ void PythonSensor::flush_resets() {
   self().attr("_mjs_reset")(list_of(ids), seeds_of(ids));
 }
 
+SensorSpec read_row_spec(nb::handle field) {
+  SensorSpec spec;
+  spec.dtype = dtype_from_name(nb::cast<std::string>(field["dtype"]));
+  spec.shape =
+      Shape(std::span<const std::int64_t>(nb::cast<std::vector<std::int64_t>>(field["shape"])));
+  spec.unit = nb::cast<std::string>(field["unit"]);
+  spec.frame = nb::cast<std::string>(field["frame"]);
+  spec.low = nb::cast<double>(field["low"]);
+  spec.high = nb::cast<double>(field["high"]);
+  spec.is_dict = nb::cast<bool>(field["is_dict"]);
+  if (spec.is_dict) spec.str_max_len = static_cast<int>(spec.shape[0]);
+  spec.description = nb::cast<std::string>(field["description"]);
+  if (nb::cast<bool>(nb::handle(field).attr("get")("video", false))) {
+    spec.storage = spec.dtype == DType::kUint8 ? Storage::kRgbVideo : Storage::kDepthVideo;
+  }
+  return spec;
+}
+
 PythonSensorSpec read_python_spec(nb::handle sensor) {
   PythonSensorSpec declared;
   declared.updates = nb::cast<bool>(sensor.attr("_mjs_updates")());
-  for (nb::handle field : nb::object(sensor.attr("_mjs_row_specs")())) {
-    SensorSpec spec;
-    spec.dtype = dtype_from_name(nb::cast<std::string>(field["dtype"]));
-    spec.shape =
-        Shape(std::span<const std::int64_t>(nb::cast<std::vector<std::int64_t>>(field["shape"])));
-    spec.unit = nb::cast<std::string>(field["unit"]);
-    spec.frame = nb::cast<std::string>(field["frame"]);
-    spec.low = nb::cast<double>(field["low"]);
-    spec.high = nb::cast<double>(field["high"]);
-    spec.is_dict = nb::cast<bool>(field["is_dict"]);
-    if (spec.is_dict) spec.str_max_len = static_cast<int>(spec.shape[0]);
-    spec.description = nb::cast<std::string>(field["description"]);
-    declared.fields.emplace_back(nb::cast<std::string>(field["name"]), std::move(spec));
-  }
+  for (nb::handle field : nb::object(sensor.attr("_mjs_row_specs")()))
+    declared.fields.emplace_back(nb::cast<std::string>(field["name"]), read_row_spec(field));
   return declared;
 }
 

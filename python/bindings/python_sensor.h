@@ -47,6 +47,8 @@ struct PythonSensorSpec {
   bool updates = false;
 };
 PythonSensorSpec read_python_spec(nb::handle sensor);
+// One field, from a dict.
+SensorSpec read_row_spec(nb::handle field);
 
 // Calls _mjs_edit_spec(), _mjs_compute_rows(ids, seeds), _mjs_control_step(ids, dt, seeds) and
 // _mjs_reset(ids, seeds) of a mjsense.Sensor (python/mjsense/sensor.py). The seeds are for random
@@ -72,6 +74,8 @@ class PythonSensor final : public Sensor, public ControlStepListener {
   // The same for a period of `dt` seconds.
   void update(std::span<const int> ids, double dt);
   void reset(const World& world) override;
+  // s, control period from now on
+  void set_step_dt(double seconds) { step_dt_ = seconds; }
 
   // Called with the GIL when the rows exist.
   std::function<void()> on_initialized;

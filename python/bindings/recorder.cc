@@ -18,23 +18,39 @@
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/py_simulation.h"
+#include "python/bindings/python_sensor.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
 namespace {
 
+// Rows that Python writes: a measurement that no simulation of ours computes.
+class WrittenRows final : public Sensor {
+ public:
+  WrittenRows(std::string name, SensorSpec spec, int num_worlds) : Sensor(std::move(name)) {
+    add_field("", std::move(spec), num_worlds);
+  }
+  std::string_view kind() const override { return "python"; }
+  void initialize(const SensorInit& /*init*/) override {}
+  void compute(const World& /*world*/) override {}
+};
+
 // `episodes` and so on are fields of RecordJobCfg, of which a recorder uses those about files.
 class PyRecorder {
  public:
-  PyRecorder(PySimulation& sim, nb::list handles, const std::string& out, std::int64_t fps_num,
-             std::int64_t fps_den, const std::string& settings, nb::dict options)
-      : sim_(sim), simulation_(nb::find(&sim)) {
+  // `simulation` is None if all sensors are rows that Python writes.
+  PyRecorder(nb::object simulation, int num_worlds, nb::list handles, const std::string& out,
+             std::int64_t fps_num, std::int64_t fps_den, const std::string& settings,
+             nb::dict options)
+      : sim_(simulation.is_none() ? nullptr : &nb::cast<PySimulation&>(simulation)),
+        simulation_(simulation),
+        num_worlds_(num_worlds) {
     RecordingCfg cfg;
     cfg.out_dir = out;
-    cfg.num_worlds = sim.open().num_worlds();
+    cfg.num_worlds = num_worlds;
     cfg.fps = {fps_num, fps_den};
     cfg.settings = settings;
-    cfg.model = sim.open().model();
+    if (sim_) cfg.model = sim_->open().model();
     for (const char* name : {"house", "episodes", "batches", "gzip"}) {
       int& value = std::string_view(name) == "house"      ? cfg.house
                    : std::string_view(name) == "episodes" ? cfg.episodes
@@ -45,6 +61,12 @@ class PyRecorder {
     }
     cfg.resume = nb::cast<bool>(options["resume"]);
     options.attr("pop")("resume");
+    if (options.contains("archive")) {  // file name and bytes of the model for replay
+      const auto archive = nb::cast<std::pair<std::string, nb::bytes>>(options["archive"]);
+      cfg.archive_name = archive.first;
+      cfg.archive = std::string(archive.second.c_str(), archive.second.size());
+      options.attr("pop")("archive");
+    }
     read_options(options, struct_of<VideoCfg>(), &cfg.video);
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
@@ -66,7 +88,7 @@ class PyRecorder {
     for (int w : worlds) check(w);
     std::vector<Sensor*> fresh;
     for (const auto& sensor : sources_) fresh.push_back(sensor.get());
-    sim_.read([&](Simulation& sim) { sim.refresh(fresh, worlds); });
+    if (sim_) sim_->read([&](Simulation& sim) { sim.refresh(fresh, worlds); });
     unlocked([&] {
       for (std::size_t i = 0; i < worlds.size(); ++i) {
         recorder_->append(worlds[i], {.reward = static_cast<float>(reward[i]),
@@ -109,13 +131,13 @@ class PyRecorder {
     body();
   }
   void check(int world) const {
-    const int B = sim_.open().num_worlds();
-    if (world < 0 || world >= B)
-      throw ValueError(fmt::format("world {}: must be in [0, {})", world, B));
+    if (sim_) sim_->open();
+    if (world < 0 || world >= num_worlds_)
+      throw ValueError(fmt::format("world {}: must be in [0, {})", world, num_worlds_));
   }
   // A camera with rgb or depth becomes videos plus its other fields, as in recordings of tasks.
   void add(const std::shared_ptr<Sensor>& sensor) {
-    sources_.push_back(sensor);
+    if (!dynamic_cast<const WrittenRows*>(sensor.get())) sources_.push_back(sensor);
     const auto has = [&](std::string_view field) {
       return std::ranges::find(sensor->fields(), field, &Field::name) != sensor->fields().end();
     };
@@ -126,12 +148,13 @@ class PyRecorder {
     for (const Field& field : sensor->fields()) {
       const std::string suffix = field.name == "rgb" ? "" : "_" + field.name;
       sensors_.push_back(field_of_camera(sensor->name() + suffix, *sensor, field.name));
-      sensors_.back()->initialize({.model = nullptr, .num_worlds = sim_.open().num_worlds()});
+      sensors_.back()->initialize({.model = nullptr, .num_worlds = num_worlds_});
     }
   }
 
-  PySimulation& sim_;
-  nb::object simulation_;                         // keeps the simulation alive
+  PySimulation* sim_;      // null if there is none
+  nb::object simulation_;  // keeps the simulation alive
+  int num_worlds_;
   std::vector<std::shared_ptr<Sensor>> sources_;  // sensors to refresh
   std::vector<std::shared_ptr<Sensor>> sensors_;  // sensors to store
   const ProcessGuard process_;
@@ -156,12 +179,19 @@ nb::dict stats(PyRecorder& self) {
 }  // namespace
 
 void bind_recorder(nb::module_& m) {
+  m.def(
+      "written_rows",
+      [](const std::string& name, nb::handle spec, int num_worlds) {
+        return SensorHandle{std::make_shared<WrittenRows>(name, read_row_spec(spec), num_worlds)};
+      },
+      nb::arg("name"), nb::arg("spec"), nb::arg("num_worlds"),
+      "A stream whose rows are written to SensorHandle.arrays(writable=True).");
   const auto world = nb::arg("world");
   nb::class_<PyRecorder>(m, "Recorder", "The C++ recorder.")
-      .def(nb::init<PySimulation&, nb::list, const std::string&, std::int64_t, std::int64_t,
+      .def(nb::init<nb::object, int, nb::list, const std::string&, std::int64_t, std::int64_t,
                     const std::string&, nb::dict>(),
-           nb::arg("simulation"), nb::arg("sensors"), nb::arg("out"), nb::arg("fps_num"),
-           nb::arg("fps_den"), nb::arg("settings"), nb::arg("options"))
+           nb::arg("simulation").none(), nb::arg("num_worlds"), nb::arg("sensors"), nb::arg("out"),
+           nb::arg("fps_num"), nb::arg("fps_den"), nb::arg("settings"), nb::arg("options"))
       .def("begin_episode", &PyRecorder::begin, world, nb::arg("episode"), nb::arg("seed"))
       .def("append", &PyRecorder::append, nb::arg("worlds"), nb::arg("reward"),
            nb::arg("terminated"), nb::arg("truncated"), nb::arg("success"))

@@ -15,6 +15,7 @@
 #include "mjsense/core/files/embedded_files.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/scene/compiled_model.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/mujoco_callbacks.h"
@@ -69,13 +70,18 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
                                            read_python_spec(item));
 }
 
+// `model`: address of a compiled model that the scene uses instead of its own; 0: none.
 std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
-                                  nb::object edit) {
+                                  nb::object edit, std::uintptr_t model) {
   refuse_python_callbacks();  // compilation may call them too
   nb::list alive;
   SceneCfg cfg = read_scene(config, spec, sensors, edit, alive);
   nb::gil_scoped_release unlock;
-  return std::make_shared<Scene>(std::move(cfg));
+  std::optional<CompiledModel> compiled;
+  if (model) compiled.emplace(reinterpret_cast<const mjModel*>(model), cfg.spec);
+  auto scene = std::make_shared<Scene>(std::move(cfg));
+  if (compiled) compiled->replace_model(*scene);
+  return scene;
 }
 
 nb::dict entity_names(const Entity& e) {
@@ -195,7 +201,8 @@ void bind_scene(nb::module_& m) {
 
   nb::class_<Scene>(m, "Scene", "The C++ scene.")
       .def_static("make", &make_scene, nb::arg("config"), nb::arg("spec"), nb::arg("sensors"),
-                  nb::arg("edit"))
+                  nb::arg("edit"), nb::arg("model") = 0,
+                  "model: address of a compiled model for a scene that compiles none.")
       .def(
           "set_options",
           [](Scene& s, nb::handle config, std::uintptr_t copy) {

@@ -58,6 +58,14 @@ void update_sensors(PySimulation& self, double dt) {
   });
 }
 
+void follow(PySimulation& self, int substeps, const Ids& ids) {
+  self.change("update", [&](Simulation& sim) {
+    for (const auto& sensor : self.python())
+      sensor->set_step_dt(substeps * sim.model()->opt.timestep);
+    sim.follow(substeps, worlds_of(ids));
+  });
+}
+
 void reset_sensors(PySimulation& self, const Ids& ids) {
   self.change("reset_sensors", [&](Simulation& sim) { sim.reset_sensors(worlds_of(ids)); });
 }
@@ -132,6 +140,7 @@ void bind_simulation(nb::module_& m) {
       .def("step", &step, nb::arg("control_steps") = 1)
       .def("reset", &reset, nb::arg("world_ids") = nb::none(), nb::arg("key") = -1,
            nb::arg("seed") = nb::none())
+      .def("follow", &follow, nb::arg("substeps"), nb::arg("world_ids"))
       .def("reset_sensors", &reset_sensors, nb::arg("world_ids") = nb::none())
       .def("forward", &forward, nb::arg("world_ids") = nb::none())
       .def(

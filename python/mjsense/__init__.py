@@ -16,6 +16,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
     what all worlds share        Scene, SceneCfg, EntityCfg, TerrainCfg
     many worlds                  Simulation: step, reset, qpos, ctrl, randomize, draw
+    your own MuJoCo program      attach (sensors over your data), Renderer; RecordEpisodes records any gymnasium.Env
     sensors of a scene           BuiltinSensorCfg, ContactSensorCfg, RayCastSensorCfg, TerrainHeightSensorCfg, LidarSensorCfg,
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
@@ -41,6 +42,7 @@ from mjsense import _gymnasium, assets, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense._user_code import SensorError
+from mjsense.attach import Attached, attach
 from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
 from mjsense.core_sensors import (
@@ -69,6 +71,7 @@ from mjsense.pipeline import ObservationPipeline
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
+from mjsense.record_episodes import EpisodeRecording, RecordEpisodes, RecordVectorEpisodes
 from mjsense.recorder import Recorder
 from mjsense.renderer import Renderer
 from mjsense.robot import MoveGroup, Robot, RobotCamera
@@ -86,16 +89,18 @@ _gymnasium.register_all()
 # fmt: off
 __all__ = [
     *configs.__all__,
-    "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
+    "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "FunctionSensor",
+    "EpisodeCheck", "EpisodeRecording", "FunctionSensor",
     "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
     "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Renderer", "ReplayReport", "Robot",
+    "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes", "Recorder", "Renderer", "ReplayReport",
+    "Robot",
     "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
     "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
-    "Video", "WorldState", "check_replay", "effects", "embedded_models",
-    "export_mcap", "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "make", "make_vec", "observations", "policy_names",
+    "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models",
+    "export_mcap", "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "make", "make_vec", "observations",
+    "policy_names",
     "record", "register_policy", "register_task", "replay",
     "robot_names", "task_names",
     "__version__",

@@ -91,7 +91,7 @@ class Recorder(KnownAttributes):
         handles = [sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle for sensor in chosen]
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
         self._core = _core.Recorder(
-            simulation._core, handles, str(out), rate.numerator, rate.denominator, text, options
+            simulation._core, simulation.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, options
         )
         self._num_worlds = simulation.num_worlds
         self.sensors: tuple[Any, ...] = tuple(chosen)

@@ -110,6 +110,15 @@ class Scene(KnownAttributes):
         self._register()
         return self
 
+    @classmethod
+    def _of_model(cls, cfg: SceneCfg, address: int) -> Scene:
+        """A scene over a copy of the compiled model at this address, with the sensors of `cfg`."""
+        self = cls.__new__(cls)
+        items, edit = self._prepare(cfg)
+        self._core = _core.Scene.make(cfg, self.spec, items, edit, address)
+        self._finish()
+        return self
+
     def _register(self) -> None:
         self._sensors: dict[str, Any] = {}
         for handle in self._core.sensors():

@@ -25,23 +25,6 @@ constexpr const char* kFreeJoint = "floating_base_joint";
 
 std::string context_of(const std::string& name) { return fmt::format("entity '{}'", name); }
 
-// Names unnamed elements by type and index: "geom_3". If the name exists already, "_" is appended.
-void name_unnamed(mjSpec* spec) {
-  for (mjtObj type : {mjOBJ_BODY, mjOBJ_JOINT, mjOBJ_GEOM, mjOBJ_SITE, mjOBJ_CAMERA, mjOBJ_LIGHT,
-                      mjOBJ_TENDON, mjOBJ_ACTUATOR, mjOBJ_SENSOR}) {
-    const std::vector<mjsElement*> elements = spec_elements(spec, type);
-    const std::vector<std::string> names = spec_names(spec, type);
-    std::set<std::string> taken(names.begin(), names.end());
-    for (std::size_t i = 0; i < elements.size(); ++i) {
-      if (!names[i].empty()) continue;
-      std::string name = fmt::format("{}_{}", obj_type_name(type), i);
-      if (type == mjOBJ_JOINT && mjs_asJoint(elements[i])->type == mjJNT_FREE) name = kFreeJoint;
-      while (!taken.insert(name).second) name += "_";
-      mjs_setName(elements[i], name.c_str());
-    }
-  }
-}
-
 void drop_options(mjSpec* spec, const std::string& context, std::vector<std::string>& warnings) {
   mjOption standard;
   mj_defaultOption(&standard);
@@ -240,6 +223,22 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   }
   check_nothing_lost(before, scene_before, element_names_of(scene), cfg.model, context);
   return attached;
+}
+
+void name_unnamed(mjSpec* spec) {
+  for (mjtObj type : {mjOBJ_BODY, mjOBJ_JOINT, mjOBJ_GEOM, mjOBJ_SITE, mjOBJ_CAMERA, mjOBJ_LIGHT,
+                      mjOBJ_TENDON, mjOBJ_ACTUATOR, mjOBJ_SENSOR}) {
+    const std::vector<mjsElement*> elements = spec_elements(spec, type);
+    const std::vector<std::string> names = spec_names(spec, type);
+    std::set<std::string> taken(names.begin(), names.end());
+    for (std::size_t i = 0; i < elements.size(); ++i) {
+      if (!names[i].empty()) continue;
+      std::string name = fmt::format("{}_{}", obj_type_name(type), i);
+      if (type == mjOBJ_JOINT && mjs_asJoint(elements[i])->type == mjJNT_FREE) name = kFreeJoint;
+      while (!taken.insert(name).second) name += "_";
+      mjs_setName(elements[i], name.c_str());
+    }
+  }
 }
 
 Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs) {

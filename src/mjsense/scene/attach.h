@@ -18,6 +18,9 @@ namespace mjsense {
 Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,
                        std::vector<std::string>& warnings);
 
+// Names unnamed elements by type and index: "geom_3". If the name exists already, "_" is appended.
+void name_unnamed(mjSpec* spec);
+
 // Prepares a complete model in place as the base to which entities are attached: names unnamed
 // elements and takes out the keyframes.
 Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs);

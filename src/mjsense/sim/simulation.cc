@@ -82,7 +82,7 @@ void Simulation::mark_stale(std::span<const int> ids) {
 }
 
 void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids, Change change,
-                         int key) {
+                         int argument) {
   int last_phase = 0;
   for (const Slot* slot : slots) last_phase = std::max(last_phase, slot->phase);
   for (int phase = 0; phase <= last_phase; ++phase) {
@@ -92,21 +92,25 @@ void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids,
     } else {
       switch (change) {
         case Change::kStep:
-          after_all([&] { worlds_->step(cfg_.decimation, hooks, ids); },
-                    // By index, because a listener may add sensors.
-                    [&, i = std::size_t{0}]() mutable {
-                      if (i == slots_.size()) return false;
-                      const Slot& slot = *slots_[i++];
-                      if (slot.listener)
-                        guarded(*slot.sensor, [&] { slot.listener->control_step(ids); });
-                      return true;
-                    });
+        case Change::kFollow:
+          after_all(
+              [&] {
+                change == Change::kStep ? worlds_->step(argument, hooks, ids)
+                                        : worlds_->follow(argument, hooks, ids);
+              },
+              // By index, because a listener may add sensors.
+              [&, i = std::size_t{0}]() mutable {
+                if (i == slots_.size()) return false;
+                const Slot& slot = *slots_[i++];
+                if (slot.listener) guarded(*slot.sensor, [&] { slot.listener->control_step(ids); });
+                return true;
+              });
           break;
         case Change::kForward:
           worlds_->forward(ids, hooks);
           break;
         case Change::kReset:
-          worlds_->reset(ids, key, hooks);
+          worlds_->reset(ids, argument, hooks);
           break;
         case Change::kNone:
           worlds_->visit(ids, hooks);
@@ -145,18 +149,25 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
 void Simulation::step(int control_steps, WorldIds ids) {
   if (control_steps < 1)
     throw ValueError(fmt::format("step({}): must be at least 1", control_steps));
-  for (int k = 0; k < control_steps; ++k) {
-    const bool last = k + 1 == control_steps;
-    Borrowed due(*this);
-    collect(due->slots, [last](Slot& s) {
-      const bool wanted = s.sensor->needs_every_step() || (last && s.read);
-      if (last) s.read = false;
-      return wanted;
-    });
-    worlds_->checked_ids(ids, due->ids);
-    mark_stale(due->ids);
-    compute(due->slots, due->ids, Change::kStep);
-  }
+  for (int k = 0; k < control_steps; ++k)
+    advance(ids, Change::kStep, cfg_.decimation, k + 1 == control_steps);
+}
+
+void Simulation::follow(int substeps, WorldIds ids) {
+  advance(ids, Change::kFollow, substeps, true);
+}
+
+// If `last`, also computes the sensors that were read since the last call.
+void Simulation::advance(WorldIds ids, Change change, int substeps, bool last) {
+  Borrowed due(*this);
+  collect(due->slots, [last](Slot& s) {
+    const bool wanted = s.sensor->needs_every_step() || (last && s.read);
+    if (last) s.read = false;
+    return wanted;
+  });
+  worlds_->checked_ids(ids, due->ids);
+  mark_stale(due->ids);
+  compute(due->slots, due->ids, change, substeps);
 }
 
 void Simulation::set_control(int every, Control control) {

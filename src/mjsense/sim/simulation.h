@@ -57,7 +57,10 @@ class Simulation {
 
   // Steps the worlds `ids`; all others keep their state.
   void step(int control_steps = 1, WorldIds ids = all_worlds);
-  // Resets to keyframe `key`; -1: the model's defaults.
+  // The caller has stepped these worlds itself, `substeps` times each, and has written the resulting
+  // states. Equivalent to step(), without the physics.
+  void follow(int substeps, WorldIds ids = all_worlds);
+  // Resets to keyframe `key`; -1: the model's defaults; Worlds::kWrittenState: the state as written.
   void reset(WorldIds ids = all_worlds, int key = -1);
   // Restarts the random numbers from this seed. Usually followed by reset().
   void seed(std::uint64_t seed) { worlds_->seed(seed); }
@@ -105,14 +108,17 @@ class Simulation {
   struct Slot;
   class Hooks;
   class DrawHooks;
-  enum class Change { kStep, kForward, kReset, kNone };
+  enum class Change { kStep, kFollow, kForward, kReset, kNone };
 
   void initialize_scene();
   void initialize(Sensor& sensor);
   Slot& slot_of(const Sensor& sensor) const;
   // Performs `change` and makes `slots` (each after its inputs) current in the worlds `ids`. Here
-  // and below, `ids` are validated and sorted.
-  void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
+  // and below, `ids` are validated and sorted. `argument`: the keyframe of kReset, the substeps of
+  // kStep and kFollow.
+  void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change,
+               int argument = 0);
+  void advance(WorldIds ids, Change change, int substeps, bool last);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
   void make_current(std::span<Sensor* const> sensors, WorldIds ids);
   template <class Wanted>

@@ -139,12 +139,17 @@ void Worlds::step(int substeps, WorldHooks& hooks, WorldIds ids) {
   apply(ids, {this, Op::kStep, substeps, -1, &hooks}, true);
 }
 
+void Worlds::follow(int substeps, WorldHooks& hooks, WorldIds ids) {
+  if (substeps < 1) throw ValueError(fmt::format("substeps is {}: must be at least 1", substeps));
+  apply(ids, {this, Op::kFollow, substeps, -1, &hooks}, true);
+}
+
 void Worlds::forward(WorldIds ids, WorldHooks& hooks) {
   apply(ids, {this, Op::kForward, 0, -1, &hooks}, true);
 }
 
 void Worlds::reset(WorldIds ids, int key, WorldHooks& hooks) {
-  if (key < -1 || key >= model()->nkey) {
+  if (key < kWrittenState || key >= model()->nkey) {
     throw ValueError(fmt::format(
         "keyframe {}: the model has {} keyframes (-1: the model's defaults)", key, model()->nkey));
   }

@@ -87,7 +87,11 @@ class Worlds {
   // All ids are checked (range, duplicates) before anything else happens.
   void step(int substeps, WorldHooks& hooks, WorldIds ids = all_worlds);
   void forward(WorldIds ids, WorldHooks& hooks);
-  // key: keyframe index; -1: the model's defaults.
+  // The caller has stepped these worlds itself, `substeps` times each, and has written the resulting
+  // states. Their clocks and the sensors' memory advance by that time.
+  void follow(int substeps, WorldHooks& hooks, WorldIds ids = all_worlds);
+  // key: keyframe index; -1: the model's defaults; kWrittenState: the state that the caller wrote.
+  static constexpr int kWrittenState = -2;
   void reset(WorldIds ids, int key, WorldHooks& hooks);
   // Plain mj_step: derived fields stay one substep behind the state, as usual in MuJoCo.
   void step_raw(int substeps);
@@ -148,7 +152,7 @@ class Worlds {
     int joint, qpos, dof;  // id and addresses
     mjtNum pose[7];
   };
-  enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
+  enum class Op { kStep, kFollow, kForward, kReset, kStepRaw, kVisit };
   class Warnings;
   struct Call {
     Worlds* self;
@@ -160,6 +164,7 @@ class Worlds {
   static void run(const mjModel* m, mjData* d, int w, void* arg);
   void run_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
+  void follow_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_in_scratch(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_in_place(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);

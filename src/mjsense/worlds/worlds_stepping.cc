@@ -206,7 +206,7 @@ void Worlds::restart(const mjModel* m, mjData* d, int w, int key, WorldHooks& ho
   broken_[w] = 1;  // stays if a MuJoCo error jumps out of this function
   if (key >= 0) {
     mj_resetDataKeyframe(m, d, key);
-  } else {
+  } else if (key != kWrittenState) {
     mj_resetData(m, d);
   }
   held_[w].clear();
@@ -221,6 +221,21 @@ void Worlds::restart(const mjModel* m, mjData* d, int w, int key, WorldHooks& ho
   hooks.reset(view(m, d, w));
 }
 
+void Worlds::follow_world(const mjModel* m, mjData* d, int w, const Call& call) {
+  derived_[w].stage = mjSTAGE_NONE;
+  clocks_[w].substep += call.substeps;
+  clocks_[w].tick += call.substeps;
+  ++clocks_[w].moment;
+  if (call.hooks->wants_substep()) {
+    compute_stage(m, d, w, call.hooks->substep_stage());
+    World world = view(m, d, w);
+    if (call.substeps > 1) world.elapsed = call.substeps * m->opt.timestep;
+    call.hooks->substep(world);
+  }
+  compute_stage(m, d, w, call.hooks->stage());
+  remember(m, d, w);
+}
+
 void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   Derived& derived = derived_[w];
   if (broken_[w] && (call.op == Op::kStep || call.op == Op::kForward))
@@ -233,6 +248,9 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
         diverged_[w] = kBadState + 1;
         return;
       }
+      break;
+    case Op::kFollow:
+      follow_world(m, d, w, call);
       break;
     case Op::kForward:
       if (!bad_component(batch_, w).empty()) {

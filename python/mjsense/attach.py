@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors over a model and data that the user's own program steps."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _foreign_model, _libmujoco, _mujoco
+from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense.configs import SceneCfg
+from mjsense.errors import UnknownNameError
+from mjsense.scene import Scene
+from mjsense.simulation import Simulation, _ids
+
+if TYPE_CHECKING:
+    import mujoco
+
+_STATE = (
+    "time", "qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "qacc_warmstart",
+    "userdata",
+)  # fmt: skip
+"""Fields of mjData that determine what sensors measure."""
+_WRITTEN_STATE = -2
+"""Keyframe of a reset to the state as it is."""
+
+
+@checked
+class Attached(KnownAttributes):
+    """Sensors over data that the user's program steps; made by :func:`attach`.
+
+    ``attached["front"]`` is the sensor of that name, as ``scene["front"]`` is in a :class:`mjsense.Simulation`; world ``i`` is ``data[i]``.
+    The sensors show the states at the last :meth:`update` or :meth:`reset`. The user's model and data are never written.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: Any,
+        sensors: Sequence[Any] = (),
+        *,
+        decimation: int = 1,
+        threads: int = 0,
+        seed: Seed = 0,
+    ) -> None:
+        self.model = model
+        """The user's model."""
+        self.datas: tuple[Any, ...] = tuple(data) if isinstance(data, (list, tuple)) else (data,)
+        """The user's data, by world."""
+        if not self.datas:
+            raise ValueError("attach(): data is empty: pass one MjData, or a list with one for each world")
+        self._mujoco: Any = _foreign_model.package_of(model)
+        self._same_series = _foreign_model.is_our_series(self._mujoco)
+        copy = None if self._same_series else _foreign_model.copy_of(model)
+        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), model._address if copy is None else copy.address)
+        self._sim = Simulation(scene, len(self.datas), decimation, threads, seed)
+        state = self._sim.state
+        self._columns: dict[str, slice] = {}
+        for name in _STATE:
+            part = self._sim._component(name)
+            start = (_address(part) - _address(state)) // state.itemsize if part.size else 0
+            self._columns[name] = slice(start, start + part[0].size)
+        for world, one in enumerate(self.datas):
+            self._check_data(one, world)
+        self._times = np.zeros(len(self.datas))
+        self._seen = np.zeros_like(state)
+        self._edited = {}
+        self._complete = True
+        self.reset()
+
+    def _check_data(self, data: Any, world: int) -> None:
+        what = f"attach(): data[{world}]"
+        if self._mujoco is not None and not isinstance(data, self._mujoco.MjData):
+            raise TypeError(f"{what} must be a mujoco.MjData, not {data!r:.100}")
+        if any(data is other for other in self.datas[:world]):
+            raise ValueError(f"{what} is given twice")
+        for name, columns in self._columns.items():
+            found, expected = np.size(getattr(data, name)), columns.stop - columns.start
+            if found != expected:
+                raise ValueError(f"{what} belongs to another model: its {name} has {found} numbers, and this model's has {expected}")
+
+    def __repr__(self) -> str:
+        if self._sim._core.closed:
+            return "<attached sensors, closed>"
+        return f"<attached sensors {list(self._sim.scene.sensors)}, {self.num_worlds} worlds>"
+
+    def __enter__(self) -> Attached:
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the sensors once no array of them is referenced any more. Every later call raises RuntimeError."""
+        self._sim.close()
+
+    def __getitem__(self, name: str) -> Any:
+        sensors = self.sensors
+        if name in sensors:
+            return sensors[name]
+        near = difflib.get_close_matches(str(name), sensors, 3)
+        hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(sensors) or 'none'}"
+        raise UnknownNameError(f"no sensor named '{name}' is attached; {hint}")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.sensors
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.sensors)
+
+    def __len__(self) -> int:
+        return len(self.sensors)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self.sensors]
+
+    @property
+    def sensors(self) -> Mapping[str, Any]:
+        """The sensors by name: those that were given, then the sensors of the model."""
+        return {**self._sim.scene.sensors, **{own.uuid: own for own in self._sim._python}}
+
+    @property
+    def num_worlds(self) -> int:
+        """Number of worlds, ``B``: one for each data."""
+        return self._sim.num_worlds
+
+    @property
+    def simulation(self) -> Simulation:
+        """The copy of the worlds in which the sensors are computed, for :class:`mjsense.SensorSuite` and drawing. Do not step it."""
+        return self._sim
+
+    @property
+    def time(self) -> np.ndarray:
+        """``data.time`` of each world at the last update, s, ``[B]``."""
+        return self._times.copy()
+
+    def update(self) -> None:
+        """Makes the sensors show the current states of the data.
+
+        Air time, history, delay and everything else that remembers advances by the time by which ``data.time`` has advanced, in whole time
+        steps. A sensor with memory sees the states at which this is called: call it after every ``mj_step`` if air time must notice
+        contacts of a single step.
+
+        Raises:
+            ValueError: If ``data.time`` has run backwards (call :meth:`reset`), or if a state is not finite.
+            RuntimeError: If MuJoCo cannot compute a state.
+        """
+        rows, times = self._rows(range(self.num_worlds))
+        timestep = self._sim.physics_dt
+        moved: dict[int, list[int]] = {}
+        for world, (before, now) in enumerate(zip(self._times, times)):
+            steps = (now - before) / timestep
+            if steps < -1e-6:
+                raise ValueError(
+                    f"update(): the time of data[{world}] went back from {before:g} s to {now:g} s: call reset([{world}]) when an episode begins"
+                )
+            # An edited state at the same time has 0 steps. A time between two steps counts as the next one.
+            count = max(round(steps), int(steps > 1e-6))
+            if count or not np.array_equal(rows[world], self._seen[world]):
+                moved.setdefault(count, []).append(world)
+        self._write(range(self.num_worlds), rows, times)
+        for count, ids in moved.items():
+            if count:
+                self._sim._core.follow(count, ids)
+            else:
+                self._sim._core.forward(ids)
+            self._check_failures("update")
+
+    def reset(self, ids: Sequence[int] | None = None) -> None:
+        """Call when an episode has begun in these worlds: clears what sensors remember, and shows the current states.
+
+        Args:
+            ids: Worlds, or a mask; by default all.
+        """
+        worlds = self._worlds(ids)
+        rows, times = self._rows(worlds)
+        self._write(worlds, rows, times)
+        self._sim._core.reset(worlds, _WRITTEN_STATE, None)
+        self._check_failures("reset")
+
+    def reload(self) -> None:
+        """Call after the model was edited (masses, sizes, friction, colours ...): the sensors follow.
+
+        Raises:
+            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step
+                and other options, and the structure of the model.
+        """
+        sim, base = self._sim, self._sim.model
+        changed: dict[str, np.ndarray] = {}
+        for name, now in _foreign_model.arrays_of(self.model, base).items():
+            shown = self._edited.get(name, getattr(base, name)[: len(now)])
+            if now.shape != shown.shape:
+                raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown.shape}: attach again")
+            if not np.array_equal(now, shown, equal_nan=now.dtype.kind == "f"):
+                changed[name] = np.array(now)
+        options = _foreign_model.changed_options(self.model, base)
+        try:
+            for name in changed:
+                sim._check_randomizable(name)
+                sim.model_field(name)
+        except (ValueError, AttributeError) as error:
+            raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
+        if options:
+            raise ValueError(f"reload(): the model's opt.{options[0]} has changed, which only a new attach() follows")
+        for name, now in changed.items():
+            sim.model_field(name)[:, : len(now)] = now
+        self._edited.update(changed)
+        sim._core.model_changed(None, False)
+        sim._follow_models()
+        sim.forward()
+
+    def add(self, sensor: Any) -> Any:
+        """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.PoseSensor`. Returns it."""
+        return self._sim.add(sensor)
+
+    # ---------------------------------------------------------------------------------------------------------- states
+
+    _seen: np.ndarray
+    _edited: dict[str, np.ndarray]
+
+    def _worlds(self, ids: Sequence[int] | None) -> list[int]:
+        found = _ids(ids)
+        self._sim._rows(found)
+        return list(range(self.num_worlds)) if found is None else found
+
+    def _rows(self, worlds: Sequence[int]) -> tuple[np.ndarray, list[float]]:
+        """The states of these data in the layout of ``simulation.state``, and their times. Raises ValueError if one is not finite."""
+        rows = np.array(self._sim.state[list(worlds)])
+        for row, world in zip(rows, worlds):
+            data = self.datas[world]
+            if self._same_series and self._mujoco is not None:
+                self._mujoco.mj_getState(self.model, data, row, self._mujoco.mjtState.mjSTATE_INTEGRATION)
+            else:
+                for name, columns in self._columns.items():
+                    row[columns] = np.ravel(getattr(data, name))
+            if not np.isfinite(row).all():
+                self._refuse(row, world)
+        return rows, [self.datas[world].time for world in worlds]
+
+    def _refuse(self, row: np.ndarray, world: int) -> None:
+        for name, columns in self._columns.items():
+            bad = np.flatnonzero(~np.isfinite(row[columns]))
+            if len(bad):
+                raise ValueError(f"the state of data[{world}] is not finite: {name}, number {bad[0]}, is {row[columns][bad[0]]}")
+        raise ValueError(f"the state of data[{world}] is not finite: a history or the state of a plugin")
+
+    def _write(self, worlds: Sequence[int], rows: np.ndarray, times: Sequence[float]) -> None:
+        self._sim.state[list(worlds)] = rows
+        self._seen[list(worlds)] = rows
+        self._times[list(worlds)] = times
+
+    def _check_failures(self, call: str) -> None:
+        for world, message in self._sim.failures:
+            raise RuntimeError(f"{call}(): MuJoCo cannot compute the state of data[{world}]: {message}")
+
+
+@checked
+def attach(
+    model: Any, data: Any, sensors: Sequence[Any] = (), *, decimation: int = 1, threads: int = 0, seed: Seed = 0
+) -> Attached:
+    """Attaches sensors to a model and data that the user's own program steps::
+
+        attached = mjsense.attach(model, data, sensors=(mjs.CameraSensorCfg(name="front", camera_name="front"),))
+        while True:
+            mujoco.mj_step(model, data)
+            attached.update()
+            attached["front"].data.rgb      # uint8 [1, H, W, 3]
+
+    Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
+    the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
+
+    Args:
+        model: The ``mujoco.MjModel``. It is not changed.
+        data: A ``mujoco.MjData`` of the model, or a list with one for each world.
+        sensors: Sensor configurations and :class:`mjsense.Sensor` objects, as in :class:`mjsense.SceneCfg`. Names are those of the model;
+            an element without a name has the name of its kind and number, ``geom_3``. MuJoCo's sensors of the model are attached, too.
+        decimation: Number of ``mj_step`` calls between two updates: the control period of sensors that have one.
+        threads: Number of threads; 0: one per CPU that is available to this process.
+        seed: Seed of the random numbers (noise, delays).
+
+    Raises:
+        TypeError: If ``model`` or ``data`` is not one of MuJoCo's.
+        ValueError: If a data belongs to another model, or a sensor needs an element that the model lacks; the message says what to add.
+    """
+    return Attached(model, data, sensors, decimation=decimation, threads=threads, seed=seed)
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]

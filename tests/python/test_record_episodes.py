@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: Apache-2.0
+"""mjsense.RecordEpisodes: recordings of any Gymnasium environment."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import gymnasium
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+
+import mjsense as mjs
+
+spaces = gymnasium.spaces
+
+
+class Counter(gymnasium.Env):
+    """Counts its steps; episodes have `length` steps, and those of odd seeds are truncated. It is no MuJoCo environment."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
+
+    def __init__(self, length=4, render_mode="rgb_array"):
+        self.length, self.render_mode, self.episode = length, render_mode, -1
+        self.observation_space = spaces.Dict({
+            "count": spaces.Discrete(100), "pair": spaces.Tuple((spaces.Box(-1, 1, (2,), np.float32), spaces.MultiBinary(3))),
+            "inner": spaces.Dict({"image": spaces.Box(0, 255, (4, 6, 3), np.uint8), "state": spaces.Box(-np.inf, np.inf, (2,), np.float64)}),
+        })  # fmt: skip
+        self.action_space = spaces.Box(-1, 1, (2,), np.float32)
+
+    def _observation(self):
+        return {"count": self.count, "pair": (np.full(2, self.count / 10, np.float32), np.ones(3, np.int8)),
+                "inner": {"image": np.full((4, 6, 3), self.count, np.uint8), "state": np.array([self.count, self.episode], float)}}  # fmt: skip
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.episode += 1
+        self.count = 0
+        return self._observation(), {"start": self.episode}
+
+    def step(self, action):
+        self.count += 1
+        ends = self.count == self.length
+        info = {"distance": self.count / 2, "deep": {"flag": True}, "word": "go", "is_success": ends and self.episode == 0, "object": object()}
+        return self._observation(), float(action[0]), ends, False, info
+
+    def render(self):
+        return np.full((16, 24, 3), 10 * self.count, np.uint8)
+
+
+def run(env, steps=1000):
+    """Plays until everything is recorded."""
+    single = not hasattr(env, "num_envs")
+    env.reset(seed=5)
+    for step in range(steps):
+        if env.recording.complete:
+            break
+        action = np.full(2 if single else (env.num_envs, 2), step % 10 / 10, np.float32)
+        _, _, terminated, truncated, _ = env.step(action)
+        if single and (terminated or truncated):
+            env.reset()
+    env.close()
+
+
+def verified(folder):
+    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(folder)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(autouse=True)
+def _quiet():
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*the info 'object' is not recorded.*")
+        yield
+
+
+def test_a_single_environment(tmp_path):
+    env = mjs.RecordEpisodes(Counter(), tmp_path, 3, cameras={"view": "render"}, settings={"note": 1})
+    assert isinstance(env, gymnasium.Wrapper)
+    run(env)
+    assert "3 episodes, 15 steps, 3 videos" in verified(tmp_path)
+    data = mjs.Dataset(tmp_path)
+    assert data.fps == 20 and [e.outcome for e in data.episodes] == ["success", "terminated", "terminated"]
+    assert [e.seed for e in data.episodes] == [5, 0, 0]
+    episode = data.episodes[1]
+    assert episode["obs/extra/observation/count"].tolist() == [0, 1, 2, 3, 4]
+    assert episode["obs/extra/observation/inner/state"][:, 1].tolist() == [1] * 5
+    assert episode["obs/extra/observation/pair/0"][2].tolist() == [np.float32(0.2)] * 2
+    assert episode["obs/extra/observation/pair/1"].shape == (5, 3)
+    assert episode["obs/extra/observation/inner/image"][3].max() == 3
+    actions = episode["actions/action"]
+    assert actions[0].tolist() == [0, 0] and np.allclose(actions[1:, 0], episode["rewards"][1:])
+    assert episode["terminated"].tolist() == [False] * 4 + [True]
+    row = data[7]  # the third of the second episode
+    assert row["obs/extra/info/distance"] == 1.0 and row["obs/extra/info/deep/flag"] and row["obs/extra/info/word"] == "go"
+    assert abs(int(episode.video("view")[3].mean()) - 30) <= 2
+
+
+def test_infos_that_cannot_be_stored_are_named_once(tmp_path):
+    env = mjs.RecordEpisodes(Counter(), tmp_path, 1, info_bytes=60)
+    env.reset()
+    with pytest.warns(UserWarning) as told:
+        env.step(np.zeros(2, np.float32))
+    texts = sorted(str(w.message) for w in told)
+    assert "the info 'object' is not recorded: it is neither a number, a text nor an array" in texts[-1]
+    assert "of the 60 of info_bytes" in texts[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env.step(np.zeros(2, np.float32))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])
+def test_vector_environments(tmp_path, kind, mode):
+    lengths = (3, 4, 6)
+    env = kind([lambda n=n: Counter(n) for n in lengths], autoreset_mode=mode)
+    cameras = {} if mode == AutoresetMode.SAME_STEP else {"view": "render"}
+    env = mjs.RecordEpisodes(env, tmp_path, 6, cameras=cameras)
+    assert isinstance(env, mjs.RecordVectorEpisodes)
+    env.reset(seed=5)
+    for step in range(100):
+        if env.recording.complete:
+            break
+        _, _, terminated, _, _ = env.step(np.full((3, 2), step / 100, np.float32))
+        if mode == AutoresetMode.DISABLED and terminated.any():
+            env.reset(options={"reset_mask": terminated})
+    env.close()
+    verified(tmp_path)
+    episodes = mjs.Dataset(tmp_path).episodes
+    assert len(episodes) == 6 and [e.seed for e in episodes][:3] == [5, 6, 7]
+    for episode in episodes:
+        length = episode.length - 1
+        assert length in lengths
+        assert episode["obs/extra/observation/count"].tolist() == list(range(length + 1)), mode
+        assert len({*episode["obs/extra/observation/inner/state"][:, 1]}) == 1
+        assert episode["terminated"].tolist() == [False] * length + [True]
+        assert np.allclose(episode["actions/action"][:, 0], episode["rewards"])
+        if cameras:
+            assert abs(int(episode.video("view")[length].mean()) - 10 * length) <= 2
+
+
+def test_episodes_that_are_cut_short(tmp_path):
+    for keep in (False, True):
+        env = mjs.RecordEpisodes(Counter(), tmp_path / str(keep), 3, keep_partial=keep)
+        for _ in range(2):
+            env.reset()
+            for _ in range(2):
+                env.step(np.zeros(2, np.float32))
+        env.close()
+    assert [e.outcome for e in mjs.Dataset(tmp_path / "True").episodes] == ["the environment was reset", "the environment was closed"]
+    assert not list((tmp_path / "False").rglob("*.h5"))
+
+
+class Pendulum(gymnasium.Env):
+    """A MuJoCo environment."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012
+    frame_skip, dt = 5, 0.01
+
+    def __init__(self):
+        self.model = mujoco.MjModel.from_xml_string(
+            """<mujoco><worldbody><light pos="0 0 2"/><camera name="side" pos="0 -2 .5" xyaxes="1 0 0 0 0 1"/>
+            <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -.2"/><body><joint name="hinge" axis="0 1 0" damping=".01"/>
+            <geom name="rod" type="capsule" fromto="0 0 0 .4 0 0" size=".05" rgba="1 0 0 1"/><site name="tip" pos=".4 0 0"/></body></worldbody>
+            <actuator><motor joint="hinge"/></actuator></mujoco>"""
+        )
+        self.data = mujoco.MjData(self.model)
+        self.observation_space, self.action_space = spaces.Box(-np.inf, np.inf, (2,)), spaces.Box(-1, 1, (1,), np.float32)
+
+    def _observation(self):
+        return np.concatenate([self.data.qpos, self.data.qvel])
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[0] = self.np_random.uniform(-0.1, 0.1)
+        mujoco.mj_forward(self.model, self.data)
+        return self._observation(), {}
+
+    def step(self, action):
+        self.data.ctrl[:] = action
+        mujoco.mj_step(self.model, self.data, 5)
+        return self._observation(), 0.0, False, bool(self.data.time > 0.0999), {}
+
+
+@pytest.mark.parametrize("worlds", [0, 2])
+def test_cameras_and_sensors_of_a_mujoco_environment(tmp_path, worlds):
+    sensors = (
+        mjs.BuiltinSensorCfg(name="tip", sensor_type="framepos", obj=mjs.ObjRef("site", "tip")),
+        mjs.ContactSensorCfg(name="touch", primary=mjs.ContactMatch(mode="geom", pattern=("rod",)), fields=("found",), track_air_time=True),
+        mjs.CameraSensorCfg(name="eye", camera_name="side", width=24, height=16, data_types=("rgb", "depth")),
+    )
+    env = SyncVectorEnv([Pendulum] * worlds) if worlds else Pendulum()
+    env = mjs.RecordEpisodes(env, tmp_path, 4, cameras=["side"], camera_size=(32, 48), sensors=sensors)
+    single = not worlds
+    env.reset(seed=1)
+    while not env.recording.complete:
+        _, _, _, truncated, _ = env.step(np.zeros((1,) if single else (worlds, 1), np.float32))
+        if single and truncated:
+            env.reset()
+    env.close()
+    verified(tmp_path)
+    data = mjs.Dataset(tmp_path)
+    assert data.fps == 100 and len(data.episodes) == 4
+    for episode in data.episodes:
+        assert episode.length == 11
+        angle = episode["obs/extra/observation"][:, 0]
+        assert np.allclose(episode["obs/extra/tip"][:, 0], 0.4 * np.cos(angle), atol=1e-6)
+        assert episode["obs/extra/touch/current_air_time"][-1, 0] == pytest.approx(0.1 if not episode["obs/extra/touch/found"].any() else 0, abs=0.1)
+        assert episode.video("side")[0].shape == (32, 48, 3) and episode.video("eye_depth")[0].shape == (16, 24)
+
+
+SCRIPT = """
+import sys, time, warnings
+sys.path.insert(0, {tests!r})
+warnings.simplefilter("ignore")
+import numpy as np, mjsense as mjs
+from test_record_episodes import Counter
+env = mjs.RecordEpisodes(Counter(), sys.argv[1], 8, cameras={{"view": "render"}}, resume=sys.argv[2] == "resume", batches=2)
+env.reset()
+while not env.recording.complete:
+    _, _, ended, _, _ = env.step(np.zeros(2, np.float32))
+    if ended:
+        env.reset()
+        print(env.recording.kept, flush=True)
+        if sys.argv[2] == "slow":
+            time.sleep(0.1)
+env.close()
+"""
+
+
+def test_a_killed_recording_is_resumed(tmp_path):
+    script = SCRIPT.format(tests=str(Path(__file__).parent))
+    with subprocess.Popen([sys.executable, "-c", script, tmp_path, "slow"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        while int(process.stdout.readline()) < 3:
+            pass
+        time.sleep(0.05)
+        os.kill(process.pid, signal.SIGKILL)
+    again = [sys.executable, "-c", script, tmp_path]
+    done = subprocess.run([*again, "new"], capture_output=True, text=True, check=False)
+    assert done.returncode and "has a recording: pass resume=True to continue it" in done.stderr
+    done = subprocess.run([*again, "resume"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "8 episodes, 40 steps" in verified(tmp_path)
+    assert [e.length for e in mjs.Dataset(tmp_path).episodes] == [5] * 8
+
+
+def test_errors(tmp_path):
+    with pytest.raises(TypeError, match="has no MuJoCo `model` and `data`"):
+        mjs.RecordEpisodes(Counter(), tmp_path, 1, cameras={"front": "front"})
+    with pytest.raises(TypeError, match="unexpected arguments quality; options are house"):
+        mjs.RecordEpisodes(Counter(), tmp_path, 1, quality=3)
+    with pytest.raises(ValueError, match="episodes is 0: must be at least 1"):
+        mjs.RecordEpisodes(Counter(), tmp_path, 0)
+    with pytest.raises(ValueError, match="do not see the last state of an episode with AutoresetMode.SAME_STEP"):
+        mjs.RecordEpisodes(SyncVectorEnv([Counter], autoreset_mode=AutoresetMode.SAME_STEP), tmp_path, 1, cameras={"view": "render"})
+    with pytest.raises(ValueError, match="render_mode='rgb_array'"):
+        env = Counter()
+        env.render = lambda: None
+        mjs.RecordEpisodes(env, tmp_path, 1, cameras={"view": "render"}).reset()
+    env = AsyncVectorEnv([Pendulum])
+    with pytest.raises(TypeError, match="are in other processes.*house=0, 1, 2"):
+        mjs.RecordEpisodes(env, tmp_path, 1, cameras=["side"])
+    env.close()
+    env = Counter()
+    env.observation_space = spaces.Text(5)
+    with pytest.raises(TypeError, match="observation: .*Text.*FilterObservation"):
+        mjs.RecordEpisodes(env, tmp_path, 1)
+    env = Pendulum()
+    wrapped = mjs.RecordEpisodes(env, tmp_path, 1, cameras=["side"])
+    env.data = mujoco.MjData(env.model)
+    with pytest.raises(RuntimeError, match="env 0 has made another MjData"):
+        wrapped.reset()
