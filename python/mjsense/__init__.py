@@ -60,6 +60,7 @@ from mjsense.core_sensors import (
 )
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.dataset import Dataset, Deviation, Episode, EpisodeCheck, ReplayReport, Stream, Video, check_replay, replay
+from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
@@ -99,7 +100,7 @@ __all__ = [
     "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
     "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
     "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models",
-    "export_mcap", "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "make", "make_vec", "observations",
+    "export_mcap", "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations",
     "policy_names",
     "record", "register_policy", "register_task", "replay",
     "robot_names", "task_names",

@@ -16,6 +16,7 @@ from types import ModuleType
 COMMANDS = {
     "replay": "Replay recorded episodes and compare them with the recording.",
     "export": "Write a recording in the format of another program.",
+    "import": "Write a data set of another program as a recording.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
 
