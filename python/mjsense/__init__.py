@@ -22,7 +22,8 @@ Where to look (``help(mjs.Simulation)`` and so on):
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
     recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay; for other programs:
-                                 export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
+                                 export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
+                                 export_zarr
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -65,7 +66,15 @@ from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
-from mjsense.export import export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
+from mjsense.export import (
+    export_lerobot,
+    export_lerobot21,
+    export_mcap,
+    export_rerun,
+    export_rlds,
+    export_robomimic,
+    export_zarr,
+)
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
@@ -99,7 +108,7 @@ __all__ = [
     "Robot",
     "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite",
     "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError",
-    "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models",
+    "Video", "WorldState", "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21",
     "export_mcap", "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations",
     "policy_names",
     "record", "register_policy", "register_task", "replay",

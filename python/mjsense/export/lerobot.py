@@ -117,9 +117,9 @@ def table_of(columns: dict[str, np.ndarray]) -> Any:
     return pa.table(arrays)
 
 
-def times(length: int, fps: Fraction) -> np.ndarray:
-    """Times of frames, exact to one bit of float64. [s]"""
-    return np.arange(length) * fps.denominator / fps.numerator
+def times(length: int, fps: Fraction, first: int = 0) -> np.ndarray:
+    """Times of ``length`` frames from the frame ``first`` on, rounded once to float64. [s]"""
+    return (first + np.arange(length)) * fps.denominator / fps.numerator
 
 
 def number(fps: Fraction) -> int | float:
@@ -215,7 +215,7 @@ class _Videos:
             self._video = self._new()
             first = 0
             self._video.add(path)
-        return _place(self._file), first / float(self._fps)
+        return _place(self._file), float(times(1, self._fps, first)[0])
 
     def close(self) -> None:
         self._video.__exit__(None, None, None)
@@ -226,7 +226,7 @@ class _Videos:
     def _found_by_time(self, length: int) -> bool:
         """Whether LeRobot's reader finds every frame. It adds times of 32 bits to the time of the first frame and compares the sum, in 32 bits,
         with the time of the frame: late in a long file, a sum that is rounded to the other side differs by more than the tolerance."""
-        exact = (self._video.frames + np.arange(length)) * self._fps.denominator / self._fps.numerator
+        exact = times(length, self._fps, self._video.frames)
         added = exact[0] + times(length, self._fps).astype(np.float32).astype(np.float64)
         return bool((np.abs(added.astype(np.float32) - exact.astype(np.float32)) < _TOLERANCE_S).all())
 
@@ -276,7 +276,7 @@ class Writer:
         _write_tasks(self._path / "meta/tasks.parquet", self._source.tasks)
         write_json(self._path / "meta/stats.json", {name: lists(found) for name, found in self._statistics.all().items()})
         info = {
-            "codebase_version": "v3.0", "robot_type": self._source.robot, "total_episodes": self._count, "total_frames": self._frames,
+            "codebase_version": "v3.0", "robot_type": self._source.robot or None, "total_episodes": self._count, "total_frames": self._frames,
             "total_tasks": len(self._source.tasks), "chunks_size": FILES_PER_CHUNK, "data_files_size_in_mb": DATA_FILE_MB,
             "video_files_size_in_mb": VIDEO_FILE_MB, "fps": number(self._source.fps), "splits": {"train": f"0:{self._count}"},
             "data_path": f"data/{_PLACE}.parquet", "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,

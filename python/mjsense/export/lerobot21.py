@@ -89,7 +89,7 @@ def _write(source: Source, path: Path, statistics: Statistics, progress: Callabl
     write_json(path / "meta/modality.json", modality_of(source))
     count = len(source)
     info = {
-        "codebase_version": "v2.1", "robot_type": source.robot, "total_episodes": count, "total_frames": first,
+        "codebase_version": "v2.1", "robot_type": source.robot or None, "total_episodes": count, "total_frames": first,
         "total_tasks": len(source.tasks), "total_videos": count * len(source.cameras), "total_chunks": -(-count // FILES_PER_CHUNK),
         "chunks_size": FILES_PER_CHUNK, "fps": number(source.fps), "splits": {"train": f"0:{count}"}, "data_path": _DATA,
         "video_path": _VIDEO if source.cameras else None, "features": features_of(source, codec),

@@ -119,14 +119,14 @@ class Source:
     ) -> None:
         mapping = Mapping.of(map)
         chosen = Dataset(root, episodes=episodes, success=success)
-        if not chosen.episodes:
-            raise ValueError(f"{root}: no episode matches")
         self._chosen = chosen
         self.episodes: list[Episode] = [episode for episode in chosen.episodes if episode.length > 1]
         """The episodes that have at least one step."""
+        if not self.episodes:
+            raise ValueError(f"{root}: no episode with a step matches")
         self.fps: Fraction = chosen.fps
         """Observations per second, exactly."""
-        self.robot: str = str(self.episodes[0].settings.get("robot", "")) if self.episodes else ""
+        self.robot: str = str(self.episodes[0].settings.get("robot", ""))
         """Name of the robot; empty if the recording does not state it."""
         known = dict(chosen.streams)
         wanted = {"state": mapping.state, "action": mapping.action, **mapping.features, **_FLAGS}
@@ -138,8 +138,10 @@ class Source:
         self.cameras: dict[str, str] = {camera: camera for camera in colour} if mapping.cameras is None else dict(mapping.cameras)
         """Names of cameras in the recording by exported name."""
         for camera in self.cameras.values():
-            for episode in self.episodes:
-                episode.video(camera)  # raises UnknownNameError
+            shapes = {episode.video(camera).shape[1:]: episode.index for episode in self.episodes}
+            if len(shapes) > 1:
+                sizes = ", ".join(f"{w}x{h} (episode {i})" for (h, w, *_), i in shapes.items())
+                raise ValueError(f"{root}: the images of '{camera}' have different sizes: {sizes}; choose episodes of one size")
 
     def __len__(self) -> int:
         return len(self.episodes)
@@ -161,7 +163,11 @@ class Source:
         return episode.video(self.cameras[camera])
 
     def _feature(self, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
-        found = list(dict.fromkeys(stream for stream in self._chosen._expand_all(streams, known) if "/given/" not in stream))
+        try:
+            expanded = self._chosen._expand_all(streams, known)
+        except UnknownNameError as error:
+            raise UnknownNameError(f"Feature '{name}': {error.args[0]}. A map (map=, --map) chooses other streams") from error
+        found = list(dict.fromkeys(stream for stream in expanded if "/given/" not in stream))
         names: list[str] = []
         parts: dict[str, slice] = {}
         for stream in found:

@@ -21,7 +21,7 @@ def needs(module: str, extra: str = "export") -> Any:
 
 @contextlib.contextmanager
 def new_output(out: str | Path) -> Iterator[Path]:
-    """A path beside ``out`` to write to, a file or a folder that is to be made. At the end it is renamed to ``out``; after an error it is
+    """A path next to ``out`` to write to, a file or a folder that is to be made. At the end it is renamed to ``out``; after an error it is
     deleted. ``out`` must not exist, or be an empty folder."""
     final = Path(out)
     if final.exists() and not (final.is_dir() and not any(final.iterdir())):

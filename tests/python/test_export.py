@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""mjsense.export: the files of LeRobot's formats, read with PyArrow and PyAV. test_lerobot.py reads them with LeRobot."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("av")
+pq = pytest.importorskip("pyarrow.parquet")
+
+import av
+from mjsense.dataset import statistics
+from mjsense.export import Mapping, Source, lerobot
+from mjsense.export.mapping import _held
+
+import mjsense as mjs
+from mjsense import commands
+
+SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    """Two houses with different quality of the videos: 2 and 1 episodes of 13 observations."""
+    out = tmp_path_factory.mktemp("data")
+    mjs.record("pick", out=out, **SMALL)
+    mjs.record("pick", out=out, house=1, crf=30, **{**SMALL, "episodes": 1, "seed": 4})
+    return out
+
+
+@pytest.fixture(scope="module")
+def v3(root, tmp_path_factory):
+    return mjs.export_lerobot(root, tmp_path_factory.mktemp("export") / "v3")
+
+
+def rows(folder):
+    return pq.ParquetDataset(sorted(folder.rglob("*.parquet"))).read().to_pydict()
+
+
+def frames(path):
+    with av.open(str(path)) as video:
+        stream = video.streams.video[0]
+        found = [((frame.pts or 0) * (stream.time_base or 0), frame.to_ndarray(format="rgb24", threads=1)) for frame in video.decode(stream)]
+        assert stream.average_rate is not None
+        return stream.average_rate, [time for time, _ in found], [image for _, image in found]
+
+
+def test_rows_are_states_with_the_actions_taken_there(root, v3):
+    data, dataset = rows(v3 / "data"), mjs.Dataset(root)
+    at = 0
+    for position, episode in enumerate(dataset.episodes):
+        part = slice(at, at + 12)
+        state = np.concatenate([episode["obs/agent/qpos/arm"], episode["obs/agent/qpos/gripper"]], 1)
+        action = np.concatenate([episode["actions/joint_pos/arm"], episode["actions/joint_pos/gripper"]], 1)
+        np.testing.assert_array_equal(data["observation.state"][part], state[:-1].astype(np.float32))
+        np.testing.assert_array_equal(data["action"][part], action[1:].astype(np.float32))
+        np.testing.assert_array_equal(data["next.reward"][part], episode["rewards"][1:])
+        np.testing.assert_array_equal(data["next.success"][part], episode["success"][1:])
+        assert data["next.done"][part] == [False] * 11 + [True] and data["frame_index"][part] == list(range(12))
+        np.testing.assert_array_equal(data["timestamp"][part], (np.arange(12) * 0.066).astype(np.float32))
+        assert data["episode_index"][part] == [position] * 12 and data["index"][part] == list(range(at, at + 12))
+        tasks = pq.read_table(v3 / "meta/tasks.parquet").to_pydict()
+        assert tasks["task"][data["task_index"][at]] == episode.task
+        at += 12
+    info = json.loads((v3 / "meta/info.json").read_text())
+    assert info["total_frames"] == at == 36 and info["total_episodes"] == 3 and info["robot_type"] == "franka"
+    assert info["features"]["action"]["names"] == [*(f"arm_{i}" for i in range(7)), "gripper_0"]
+    assert info["features"]["observation.images.wrist_camera"]["shape"] == [24, 32, 3]
+    assert {name: column["dtype"] for name, column in info["features"].items()}.items() >= {
+        "action": "float32", "next.success": "bool", "task_index": "int64", "observation.images.wrist_camera": "video"}.items()  # fmt: skip
+
+
+def test_videos_have_the_same_frames(root, v3):
+    """The two houses have different codec parameters, so the second has a file of its own."""
+    episodes = rows(v3 / "meta/episodes")
+    prefix = "videos/observation.images.wrist_camera/"
+    assert episodes[prefix + "file_index"] == [0, 0, 1] and episodes[prefix + "from_timestamp"] == [0, pytest.approx(13 * 0.066), 0]
+    for position, episode in enumerate(mjs.Dataset(root).episodes):
+        file = episodes[prefix + "file_index"][position]
+        rate, times, images = frames(v3 / f"{prefix}chunk-000/file-{file:03d}.mp4")
+        assert rate == mjs.Dataset(root).fps and times == [n / rate for n in range(len(times))]
+        first = round(episodes[prefix + "from_timestamp"][position] * rate)
+        for image, expected in zip(images[first : first + 13], episode.video("wrist_camera")[:], strict=True):
+            np.testing.assert_array_equal(image[:23], expected)
+
+
+def test_statistics(root, v3):
+    found, data = json.loads((v3 / "meta/stats.json").read_text()), rows(v3 / "data")
+    actions = np.array(data["action"], np.float64)
+    for name, expected in (("mean", actions.mean(0)), ("std", actions.std(0)), ("q01", np.quantile(actions, 0.01, axis=0))):
+        np.testing.assert_allclose(found["action"][name], expected, atol=1e-9)
+    assert found["action"]["count"] == [36] and np.shape(found["timestamp"]["max"]) == (1,)
+    images = (image for episode in mjs.Dataset(root).episodes for image in episode.video("wrist_camera")[:-1])
+    for name, expected in statistics.of_images(images).items():
+        tolerance = 8 if name in ("min", "max") else 3  # levels: frames are decoded without the loop filter
+        np.testing.assert_allclose(found["observation.images.wrist_camera"][name], expected, atol=tolerance / 255, err_msg=name)
+    episodes = rows(v3 / "meta/episodes")
+    assert np.shape(episodes["stats/observation.images.wrist_camera/mean"][0]) == (3, 1, 1)
+    np.testing.assert_allclose(episodes["stats/action/max"][1], actions[12:24].max(0))
+
+
+def test_files_are_limited_in_size(root, tmp_path, monkeypatch):
+    monkeypatch.setattr(lerobot, "DATA_FILE_MB", 1e-4)
+    monkeypatch.setattr(lerobot, "VIDEO_FILE_MB", 1e-4)
+    monkeypatch.setattr(lerobot, "FILES_PER_CHUNK", 2)
+    mjs.export_lerobot(root, tmp_path / "out")
+    files = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("file-*"))
+    places = ["chunk-000/file-000", "chunk-000/file-001", "chunk-001/file-000"]
+    cameras = ["videos/observation.images.exo_camera_1", "videos/observation.images.wrist_camera"]
+    assert files == [*(f"{folder}/{place}.parquet" for folder in ("data", "meta/episodes") for place in places),
+                     *(f"{folder}/{place}.mp4" for folder in cameras for place in places)]  # fmt: skip
+    assert rows(tmp_path / "out/meta/episodes")["data/chunk_index"] == [0, 0, 1]
+
+
+def test_a_long_file_ends_before_its_times_are_inexact():
+    """LeRobot adds and compares times in 32 bits. This fails for 4 frames of an episode of 60 s in the first hour."""
+    videos = lerobot._Videos(Path("unused"), Fraction(500, 33))
+    videos._video.frames = 100
+    assert videos._found_by_time(909)
+    videos._video.frames = 53030
+    assert videos._found_by_time(100) and not videos._found_by_time(909)
+
+
+def test_lerobot21(root, tmp_path):
+    out = mjs.export_lerobot21(root, tmp_path / "v21")
+    info = json.loads((out / "meta/info.json").read_text())
+    assert (info["codebase_version"], info["total_videos"], info["total_frames"]) == ("v2.1", 6, 36)
+    for position, episode in enumerate(mjs.Dataset(root).episodes):
+        place = {"episode_chunk": 0, "episode_index": position}
+        data = pq.read_table(out / info["data_path"].format(**place)).to_pydict()
+        np.testing.assert_array_equal(np.array(data["action"])[:, :7], episode["actions/joint_pos/arm"][1:].astype(np.float32))
+        video = out / info["video_path"].format(video_key="observation.images.wrist_camera", **place)
+        assert video.read_bytes() == episode.video("wrist_camera").path.read_bytes()
+    lines = [json.loads(line) for line in (out / "meta/episodes_stats.jsonl").read_text().splitlines()]
+    assert [line["episode_index"] for line in lines] == [0, 1, 2] and lines[0]["stats"]["action"]["count"] == [12]
+    modality = json.loads((out / "meta/modality.json").read_text())
+    assert modality["state"]["gripper"] == {"start": 7, "end": 9, "original_key": "observation.state"}
+    assert modality["video"]["wrist_camera"] == {"original_key": "observation.images.wrist_camera"}
+
+
+MAP = """
+state = ["obs/agent/qpos/gripper", "obs/agent/qvel/arm"]
+action = "actions/joint_pos_rel/arm"
+[cameras]
+wrist = "wrist_camera"
+[features]
+tcp_pose = "obs/extra/tcp_pose"
+"next.phase" = ["obs/extra/policy_phase"]
+"""
+
+
+def test_a_map_chooses_features(root, tmp_path, capsys):
+    (tmp_path / "map.toml").write_text(MAP)
+    words = ["export", "lerobot", str(root), str(tmp_path / "out"), "--map", str(tmp_path / "map.toml"), "--episodes", "2"]
+    assert commands.run(words) == 0
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert info["total_episodes"] == 1 and [key for key in info["features"] if "images" in key] == ["observation.images.wrist"]
+    assert info["features"]["observation.state"]["names"][:3] == ["gripper_0", "gripper_1", "arm_0"]
+    assert info["features"]["next.phase"]["dtype"] == "int64" and info["features"]["observation.tcp_pose"]["shape"] == [7]
+    assert commands.run(words) == 2 and "exists; name another output" in capsys.readouterr().err
+
+
+def test_wrong_maps_and_recordings(root, tmp_path):
+    for table, message in (
+        ({"stat": "obs/agent/qpos"}, "unknown key 'stat'; the keys are state, action, cameras, features"),
+        ({"state": [3]}, "'state' must be the name of a stream or a list of names"),
+        ({"cameras": "wrist_camera"}, "'cameras' must be a table of names"),
+        ({"features": {"reward": "rewards"}}, "the feature name 'reward' is taken"),
+        ({"features": {"x": ["obs/extra/tcp_pose", "rewards"]}}, "mixes observations and results of steps"),
+        ({"features": {"x": "obs/sensor_data/wrist_camera"}}, "must be numbers"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Source(root, map=table)
+    with pytest.raises(mjs.UnknownNameError, match=r"Feature 'state': No stream.*qpso.*A map \(map=, --map\)"):
+        Source(root, map={"state": "obs/agent/qpso"})
+    with pytest.raises(mjs.UnknownNameError, match="no video 'wrist'"):
+        Source(root, map={"cameras": {"a": "wrist"}})
+    with pytest.raises(ValueError, match="no episode"):
+        Source(root, success=True)
+    assert Mapping.of(None) == Mapping()
+
+
+def test_images_of_one_size(root, tmp_path):
+    mjs.record("pick", out=tmp_path, **{**SMALL, "episodes": 1})
+    mjs.record("pick", out=tmp_path, house=1, **{**SMALL, "episodes": 1, "width": 40})
+    with pytest.raises(ValueError, match=r"'exo_camera_1' have different sizes: 32x23 \(episode 0\), 40x23 \(episode 1\)"):
+        Source(tmp_path)
+
+
+def test_a_failed_export_leaves_nothing(root, tmp_path):
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mjs.export_lerobot(root, tmp_path / "out", progress=stop)
+    assert not list(tmp_path.iterdir())
+
+
+def test_groups_without_an_action_hold_their_position():
+    values, given = np.array([[0.0], [1], [0], [3], [0]]), np.array([False, True, False, True, False])
+    measured = np.full((5, 1), 7.0)
+    assert _held(values, given, measured, 5, 1).ravel().tolist() == [7, 1, 1, 3, 3]
+    assert _held(None, None, np.zeros((5, 2)), 5, 1).ravel().tolist() == [0] * 5

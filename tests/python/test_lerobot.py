@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exported data sets, read with LeRobot itself in environments of its own, build/lerobot_VERSION.
+
+MJSENSE_TEST_LEROBOT=1 makes them: 8 GB for 0.4.4 and 0.3.3, which share one, 5 GB for 0.6.1, which needs Python 3.12.
+"""
+
+import glob
+import json
+import os
+import shutil
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from scenes import ball_scene
+
+pytest.importorskip("av")
+pytest.importorskip("pyarrow")
+
+from mjsense.export import Source
+
+import mjsense as mjs
+
+BUILD = Path(__file__).parents[2] / "build"
+
+
+def run_pip(python, *words):
+    pip = [python, "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", "--retries=1", *words]
+    done = subprocess.run(pip, capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip(f"pip cannot install {' '.join(map(str, words))}: {done.stderr.strip()[-300:]}")
+
+
+def python_312():
+    """A Python of at least 3.12, or None."""
+    pyenv = sorted(glob.glob(os.path.expanduser("~/.pyenv/versions/3.12*/bin/python")))
+    for name in [sys.executable, *filter(None, [shutil.which("python3.12")]), *pyenv]:
+        code = "import sys; sys.exit(sys.version_info < (3, 12))"
+        if subprocess.run([name, "-c", code], capture_output=True).returncode == 0:
+            return name
+    return None
+
+
+def environment(version):
+    """The Python of LeRobot's environment, and its PYTHONPATH."""
+    folder = BUILD / f"lerobot_{version}"
+    if version == "0.3.3":  # only this version and the datasets library that it needs; the rest is that of 0.4.4
+        python, _ = environment("0.4.4")
+        packages = ["--no-deps", "--target", folder, "lerobot==0.3.3", "datasets==3.6.0"]
+    else:
+        python = folder / "bin/python"
+        packages = ["lerobot==0.4.4"] if version == "0.4.4" else [f"lerobot[dataset]=={version}"]
+    if not (folder / "installed").exists():
+        if os.environ.get("MJSENSE_TEST_LEROBOT", "0") == "0":
+            pytest.skip(f"needs {folder}; make it: MJSENSE_TEST_LEROBOT=1 ./dev test -k test_lerobot")
+        if version != "0.3.3":
+            base = sys.executable if version == "0.4.4" else python_312()
+            if base is None:
+                pytest.skip(f"LeRobot {version} needs Python 3.12")
+            subprocess.run([base, "-m", "venv", folder], check=True)
+        run_pip(python, *packages)
+        (folder / "installed").touch()
+    return python, str(folder) if version == "0.3.3" else ""
+
+
+class Height(mjs.Sensor):
+    """Height and speed of the ball."""
+
+    uuid = "height"
+    observation_space = gymnasium.spaces.Box(-10, 10, (2,), np.float64)
+
+    def compute(self, sim):
+        return np.stack([sim.qpos[:, 2], sim.qvel[:, 2]], 1)
+
+
+MAP = {"state": "obs/extra/height", "action": "obs/extra/height"}
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    """A function that records two episodes of a bouncing ball at a rate, with moving images of 16x8 pixels."""
+    made = {}
+
+    def make(fps, steps):
+        if fps not in made:
+            camera = mjs.CameraSensorCfg(name="eye", pos=(0, -2, 0.5), quat=(0.7, 0.7, 0, 0), width=16, height=8)
+            sim = mjs.Simulation(ball_scene(camera), num_worlds=2, decimation=10)
+            made[fps] = tmp_path_factory.mktemp("data")
+            rng = np.random.default_rng(0)
+            with mjs.Recorder(made[fps], sim, [*sim.scene.sensors.values(), Height()], episodes=2, fps=fps) as recorder:
+                for world in range(2):
+                    recorder.begin_episode(world, episode=world, seed=0)
+                recorder.append()
+                for _ in range(steps):
+                    sim.qvel[:, :3] += rng.normal(size=(2, 3))
+                    sim.step()
+                    recorder.append()
+                for world in range(2):
+                    recorder.finish_episode(world, {"task_description": f"Watch ball {world}."})
+        return made[fps]
+
+    return make
+
+
+def expected_of(root, path):
+    """The rows and frames that LeRobot must find."""
+    source = Source(root, map=MAP)
+    columns, tasks = {}, []
+    for episode in source.episodes:
+        length = episode.length - 1
+        rows = source.rows(episode)
+        found = {"observation.state": rows["state"][:length].astype(np.float32), "action": rows["action"][:length].astype(np.float32)}
+        found |= {f"observation.images.{camera}": source.video(episode, camera)[:length] for camera in source.cameras}
+        for name, values in found.items():
+            columns.setdefault(name, []).append(values)
+        tasks += [episode.task] * length
+    np.savez(path, tasks=json.dumps(tasks), **{name: np.concatenate(parts) for name, parts in columns.items()})
+    return len(tasks)
+
+
+@pytest.mark.parametrize("version, format", (("0.4.4", "lerobot"), ("0.6.1", "lerobot"), ("0.3.3", "lerobot21")))
+@pytest.mark.parametrize("fps, repeats", ((Fraction(20), 1), (Fraction(500, 33), 1), (Fraction(500, 33), 141)), ids=("20", "15.15", "hour"))
+def test_lerobot_reads_every_row_and_frame(record, tmp_path, version, format, fps, repeats):
+    if format == "lerobot21" and repeats > 1:
+        pytest.skip("each episode has a file")
+    python, path = environment(version)
+    root = record(fps, 200)
+    rows = expected_of(root, tmp_path / "expected.npz")
+    out = getattr(mjs, f"export_{format}")(root, tmp_path / "out", map=MAP, episodes=[0, 1] * repeats, statistics_frames=0 if repeats == 1 else 1)
+    if repeats > 1:
+        (_video,) = out.glob("videos/*/*/*.mp4")
+        assert 2 * repeats * 201 / fps > 3700
+    script = Path(__file__).parent / "lerobot_rows.py"
+    done = subprocess.run([python, script, out, tmp_path / "expected.npz", str(1 if repeats == 1 else 7)], capture_output=True, text=True,
+                          env={**os.environ, "PYTHONPATH": path, "HF_HOME": str(tmp_path / "hf"), "HF_HUB_OFFLINE": "1"})  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
+    result = json.loads(done.stdout.splitlines()[-1])
+    assert result["rows"] == rows * repeats and result["read"] >= min(rows * repeats, 9000) and result["wrong"] == 0, result
+    assert {"mean", "std", "min", "max"} <= set(result["stats"]), result
