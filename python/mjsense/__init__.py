@@ -28,6 +28,8 @@ Where to look (``help(mjs.Simulation)`` and so on):
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay, render
+                                 export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
+                                 export_zarr
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -79,11 +81,22 @@ from mjsense.dataset import (
     render,
     replay,
 )
+from mjsense.dataset import Dataset, Deviation, Episode, EpisodeCheck, ReplayReport, Stream, Video, check_replay, replay
+from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
 from mjsense.export import export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
+from mjsense.export import (
+    export_lerobot,
+    export_lerobot21,
+    export_mcap,
+    export_rerun,
+    export_rlds,
+    export_robomimic,
+    export_zarr,
+)
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
@@ -113,14 +126,14 @@ __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
+    "EpisodeCheck", "EpisodeRecording", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
     "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
     "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
     "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
     "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer", "WorldState",
     "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun",
-    "export_rlds", "export_robomimic", "export_zarr", "make", "make_vec", "observations", "plot", "policy_names", "record",
-    "register_policy", "register_task", "render", "replay", "robot_names", "task_names", "view",
+    "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations", "plot",
+    "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names", "view",
     "__version__",
 ]

@@ -132,7 +132,7 @@ def test_lerobot_reads_every_row_and_frame(record, tmp_path, version, format, fp
     rows = expected_of(root, tmp_path / "expected.npz")
     out = getattr(mjs, f"export_{format}")(root, tmp_path / "out", map=MAP, episodes=[0, 1] * repeats, statistics_frames=0 if repeats == 1 else 1)
     if repeats > 1:
-        (video,) = out.glob("videos/*/*/*.mp4")
+        (_video,) = out.glob("videos/*/*/*.mp4")
         assert 2 * repeats * 201 / fps > 3700
     script = Path(__file__).parent / "lerobot_rows.py"
     done = subprocess.run([python, script, out, tmp_path / "expected.npz", str(1 if repeats == 1 else 7)], capture_output=True, text=True,

@@ -20,6 +20,7 @@ COMMANDS = {
     "replay": "Replay recorded episodes and report every difference.",
     "render": "Render recorded episodes with other cameras and sensors.",
     "export": "Write a recording in the format of another program.",
+    "import": "Write a data set of another program as a recording.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
 
