@@ -15,6 +15,7 @@ import mujoco
 import pytest
 
 import mjsense as mjs
+from mjsense import commands
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
@@ -90,7 +91,8 @@ def test_cpp_blocks_are_in_compiled_files(page):
 
 
 def run(arguments, cwd):
-    done = subprocess.run([PROGRAM, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+    program = [sys.executable, "-m", "mjsense"] if arguments[0] in commands.COMMANDS else [PROGRAM]
+    done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field
@@ -49,6 +48,8 @@ class Mapping:
         if source is None:
             return Mapping()
         if isinstance(source, (str, Path)):
+            import tomllib
+
             try:
                 table, about = tomllib.loads(Path(source).read_text()), str(source)
             except tomllib.TOMLDecodeError as error:
