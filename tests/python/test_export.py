@@ -183,6 +183,14 @@ def test_a_map_chooses_features(root, tmp_path, capsys):
     assert commands.run(words) == 2 and "exists; name another output" in capsys.readouterr().err
 
 
+def test_move_groups_without_joints_have_their_command(tmp_path):
+    mjs.record("pick", "floating_rum", out=tmp_path, **{**SMALL, "episodes": 1, "cameras": []})
+    source = Source(tmp_path)
+    assert source.features["action"].parts == {"gripper": slice(0, 1), "base": slice(1, 8)} and not source.cameras
+    rows, episode = source.rows(source.episodes[0]), source.episodes[0]
+    np.testing.assert_array_equal(rows["action"][:, 1:], episode["actions/commanded_action/base"][1:])
+
+
 def test_wrong_maps_and_recordings(root, tmp_path):
     for table, message in (
         ({"stat": "obs/agent/qpos"}, "unknown key 'stat'; the keys are state, action, cameras, features"),

@@ -7,6 +7,7 @@ MJSENSE_TEST_LEROBOT=1 makes them: 8 GB for 0.4.4 and 0.3.3, which share one, 5 
 import glob
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -144,3 +145,23 @@ def test_lerobot_reads_every_row_and_frame(record, tmp_path, version, format, fp
     result = json.loads(done.stdout.splitlines()[-1])
     assert result["rows"] == rows * repeats and result["read"] >= min(rows * repeats, 8000) and result["wrong"] == 0, result
     assert {"mean", "std", "min", "max"} <= set(result["stats"]), result
+
+
+TRAIN = """--policy.type=act --policy.device=cpu --policy.push_to_hub=false --policy.pretrained_backbone_weights=null --policy.dim_model=64
+--policy.n_heads=4 --policy.dim_feedforward=128 --policy.n_encoder_layers=1 --policy.n_vae_encoder_layers=1 --policy.latent_dim=8
+--policy.chunk_size=10 --policy.n_action_steps=10 --policy.optimizer_lr=2e-4 --policy.optimizer_lr_backbone=2e-4 --batch_size=2 --steps=200
+--log_freq=20 --num_workers=0 --save_checkpoint=false --wandb.enable=false --dataset.repo_id=local/pick"""
+
+
+def test_act_trains_on_an_exported_pick(tmp_path):
+    """A small ACT, 200 steps: the loss falls, and LeRobot prints no warning. About a minute of CPU time."""
+    python, _ = environment("0.4.4")
+    mjs.record("pick", out=tmp_path / "data", episodes=2, keep_failures=True, width=96, height=96, cameras=["wrist_camera"], worlds=2)
+    mjs.export_lerobot(tmp_path / "data", tmp_path / "lerobot")
+    words = [python.parent / "lerobot-train", *TRAIN.split(), f"--dataset.root={tmp_path}/lerobot", f"--output_dir={tmp_path}/act"]
+    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "HF_HOME": str(tmp_path / "hf"), "HF_HUB_OFFLINE": "1"})
+    text = done.stdout + done.stderr
+    assert done.returncode == 0, text[-3000:]
+    losses = [float(loss) for loss in re.findall(r"loss:([0-9.]+)", text)]
+    assert len(losses) == 10 and losses[-1] < 0.3 * losses[0], losses
+    assert "warn" not in text.lower(), [line for line in text.splitlines() if "warn" in line.lower()]
