@@ -24,9 +24,9 @@ ROOT = Path(__file__).parents[1]
 STREAMS = ["obs/agent/qpos", "actions/joint_pos", "obs/sensor_data/*"]
 
 
-def read(root: Path, order: str, seconds: float) -> None:
+def read(root: Path, order: str, seconds: float, cache_mb: float) -> None:
     """Prints samples per second of mjs.Dataset."""
-    dataset = mjs.Dataset(root, streams=STREAMS)
+    dataset = mjs.Dataset(root, streams=STREAMS, cache_mb=cache_mb)
     dataset[0]  # opens the files
     indices = np.arange(len(dataset)) if order == "sequential" else np.random.default_rng(0).permutation(len(dataset))
     begun, cpu = time.perf_counter(), time.process_time()
@@ -57,12 +57,13 @@ def main() -> None:
     parser.add_argument("--height", type=int, default=368)
     parser.add_argument("--episodes", type=int, default=8)
     parser.add_argument("--seconds", type=float, default=10, help="maximum time of one case")
+    parser.add_argument("--cache-mb", type=float, default=512, help="cache of mjs.Dataset; LeRobot has none")
     parser.add_argument("--keep", help="folder of the recording, which is used again if it exists")
     parser.add_argument("--lerobot", default=str(ROOT / "build/lerobot_0.4.4/bin/python"), help="Python of LeRobot's environment")
     parser.add_argument("--read", nargs=2, help=argparse.SUPPRESS)  # a process of one case
     args = parser.parse_args()
     if args.read:
-        read(Path(args.read[0]), args.read[1], args.seconds)
+        read(Path(args.read[0]), args.read[1], args.seconds, args.cache_mb)
         return
     with tempfile.TemporaryDirectory() as folder:
         root, out = Path(args.keep or folder, "recording"), Path(args.keep or folder, "lerobot")
@@ -71,7 +72,7 @@ def main() -> None:
         for frames in (1, 0):
             export(root, out, frames)
         loaders = {
-            "mjs.Dataset": [sys.executable, __file__, "--seconds", str(args.seconds), "--read", str(root)],
+            "mjs.Dataset": [sys.executable, __file__, "--seconds", str(args.seconds), "--cache-mb", str(args.cache_mb), "--read", str(root)],
             "LeRobot": [args.lerobot, str(ROOT / "bench/peers/lerobot_loader.py"), str(out)],
         }
         for order in ("sequential", "random"):
