@@ -82,7 +82,8 @@ class Viewer:
         self._stage, self._layer = Stage(self._server), ShapeLayer(self._server)
         self._events: dict[int, Callable[[], None]] = {}
         self._lock = threading.Lock()
-        self._closed = False
+        self._closed = self._playing = False
+        self._start()
 
     def _later(self, handle: Any, action: Callable[[], None]) -> None:
         """Runs ``action`` in the viewer's thread after the user has changed or clicked a control; of several changes the last counts."""
@@ -98,6 +99,20 @@ class Viewer:
         boxes = [gui.add_checkbox(f"Geom group {k}", initial_value=k in self._stage.groups) for k in range(6)]
         for box in boxes:
             self._later(box, lambda: self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}))
+
+    def _add_play(self, gui: Any) -> None:
+        """Adds the button that starts and stops time."""
+        self._button = gui.add_button("Play", hint="Start or stop; the speed is below.")
+        self._later(self._button, lambda: self._set_playing(not self._playing))
+
+    def _set_playing(self, playing: bool) -> None:
+        self._playing = playing
+        self._button.label = "Pause" if playing else "Play"
+        self._start()
+
+    def _start(self) -> None:
+        """Counts time from now on."""
+        self._due = time.perf_counter()
 
     def _look(self, position: np.ndarray, target: np.ndarray, fov: float) -> None:
         camera = self._server.initial_camera
