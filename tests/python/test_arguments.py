@@ -11,8 +11,8 @@ from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
 
-# Users write the methods of the first three; the last is made of a task, see below.
-SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.TaskVectorEnv)
+# Users write the methods of the first three; the others are made by functions.
+SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.TaskVectorEnv, mjs.Viewer)
 CLASSES = [
     value
     for value in vars(mjs).values()

@@ -15,6 +15,7 @@ import mujoco
 import pytest
 
 import mjsense as mjs
+from mjsense import commands
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
@@ -72,6 +73,9 @@ def test_python(page, tmp_path, monkeypatch):
         if re.search(rf"^\s*(import|from) {name}\b", page.read_text(), re.MULTILINE):
             for module in (name, *OTHERS[name]):
                 monkeypatch.setitem(sys.modules, module, MagicMock())
+    monkeypatch.setattr(mjs, "view", MagicMock())  # waits for a browser
+    if "matplotlib" in MISSING:
+        monkeypatch.setattr(mjs, "plot", MagicMock())
     names = {"__name__": "page"}
     for line, code in blocks(page, "python"):
         exec(compile("\n" * (line - 1) + code, str(page), "exec"), names)  # errors show the page's line
@@ -90,7 +94,14 @@ def test_cpp_blocks_are_in_compiled_files(page):
 
 
 def run(arguments, cwd):
-    done = subprocess.run([PROGRAM, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+    program = [PROGRAM]
+    if arguments[0] in commands.COMMANDS:
+        module = {"view": "viser", "plot": "matplotlib"}.get(arguments[0])
+        if ("view" in arguments and "--export" not in arguments) or (module and importlib.util.find_spec(module) is None) or "rrd" in arguments[-1]:
+            commands.parser_of(arguments[0]).parse_args(arguments[1:])  # a viewer would wait for a browser
+            return
+        program = [sys.executable, "-m", "mjsense"]
+    done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
 
 

@@ -15,7 +15,7 @@ from types import ModuleType
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
-    "plot": "Draw streams of a recording or of live worlds into a picture.",
+    "plot": "Draw streams of recordings or live worlds into a picture.",
     "replay": "Replay recorded episodes and compare them with the recording.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._arguments import checked
 from mjsense.view.layer import ShapeLayer
 from mjsense.view.stage import Stage
 
@@ -64,8 +65,9 @@ def stop(server: Any) -> None:
         server.stop()
 
 
+@checked
 class Viewer:
-    """A web page that shows one world at a time. Base class of the viewers of live worlds and of recordings.
+    """A web page that shows one world at a time; created by :func:`mjsense.view`.
 
     All work is done in the thread that calls :meth:`update` or :meth:`run`: the browser's events wait until then.
     """
