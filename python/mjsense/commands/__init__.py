@@ -16,7 +16,7 @@ from types import ModuleType
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
-    "plot": "Draw streams of a recording or of live worlds into a picture.",
+    "plot": "Draw streams of recordings or live worlds into a picture.",
     "replay": "Replay recorded episodes and report every difference.",
     "render": "Render recorded episodes with other cameras and sensors.",
     "export": "Write a recording in the format of another program.",
