@@ -68,8 +68,7 @@ from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
-from mjsense.export import export_lerobot, export_lerobot21
-from mjsense.export import export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
+from mjsense.export import export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
@@ -86,6 +85,7 @@ from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
+from mjsense.teleoperation import Teleoperation, play
 from mjsense.vector import TaskVectorEnv, make_vec
 from mjsense.view import view
 from mjsense.view.viewer import Viewer
@@ -104,9 +104,9 @@ __all__ = [
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
     "Recorder", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData",
     "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor",
-    "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer", "WorldState", "attach", "check_replay", "effects",
+    "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer", "WorldState", "attach", "check_replay", "effects",
     "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun", "export_rlds", "export_robomimic",
-    "export_zarr", "make", "make_vec", "observations", "plot", "policy_names", "record", "register_policy", "register_task",
+    "export_zarr", "make", "make_vec", "observations", "plot", "play", "policy_names", "record", "register_policy", "register_task",
     "replay", "robot_names", "task_names", "view",
     "__version__",
 ]

@@ -16,6 +16,7 @@ from types import ModuleType
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
+    "play": "Drive a robot in the browser and record demonstrations.",
     "plot": "Draw streams of a recording or of live worlds into a picture.",
     "replay": "Replay recorded episodes and compare them with the recording.",
     "export": "Write a recording in the format of another program.",
