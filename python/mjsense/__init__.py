@@ -81,13 +81,11 @@ from mjsense.dataset import (
     render,
     replay,
 )
-from mjsense.dataset import Dataset, Deviation, Episode, EpisodeCheck, ReplayReport, Stream, Video, check_replay, replay
 from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
-from mjsense.export import export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
 from mjsense.export import (
     export_lerobot,
     export_lerobot21,
@@ -113,6 +111,7 @@ from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
+from mjsense.teleoperation import Teleoperation, play
 from mjsense.vector import TaskVectorEnv, make_vec
 from mjsense.view import view
 from mjsense.view.viewer import Viewer
@@ -126,14 +125,15 @@ __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "EpisodeRecording", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
+    "EpisodeCheck", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
     "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
     "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
     "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
-    "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer", "WorldState",
-    "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun",
-    "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations", "plot",
-    "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names", "view",
+    "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
+    "WorldState", "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
+    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations",
+    "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names",
+    "view",
     "__version__",
 ]

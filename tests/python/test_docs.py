@@ -13,7 +13,6 @@ from unittest.mock import MagicMock
 
 import mujoco
 import pytest
-from mjsense.commands import COMMANDS
 
 import mjsense as mjs
 from mjsense import commands
@@ -101,7 +100,7 @@ def test_cpp_blocks_are_in_compiled_files(page):
 
 def run(arguments, cwd):
     program = [PROGRAM]
-    if arguments[0] in COMMANDS:
+    if arguments[0] in commands.COMMANDS:
         module = {"view": "viser", "plot": "matplotlib"}.get(arguments[0])
         if ("view" in arguments and "--export" not in arguments) or (module and importlib.util.find_spec(module) is None) or "rrd" in arguments[-1]:
             commands.parser_of(arguments[0]).parse_args(arguments[1:])  # a viewer would wait for a browser

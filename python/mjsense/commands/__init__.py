@@ -16,6 +16,7 @@ from types import ModuleType
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
+    "play": "Drive a robot in the browser and record demonstrations.",
     "plot": "Draw streams of recordings or live worlds into a picture.",
     "replay": "Replay recorded episodes and report every difference.",
     "render": "Render recorded episodes with other cameras and sensors.",
