@@ -9,6 +9,7 @@ namespace mjsense::python {
 void bind_libmujoco(nanobind::module_& m);
 void bind_mujoco_views(nanobind::module_& m);
 void bind_spec_views(nanobind::module_& m);
+void bind_cameras(nanobind::module_& m);
 void bind_core(nanobind::module_& m);
 void bind_scene(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);

@@ -22,6 +22,7 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_renderer(m);
   mjsense::python::bind_recorder(m);
   mjsense::python::bind_robot(m);
+  mjsense::python::bind_cameras(m);
   mjsense::python::bind_core_sensors(m);
   mjsense::python::bind_task_view(m);
   mjsense::python::bind_rollout(m);

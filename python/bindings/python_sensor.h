@@ -61,6 +61,7 @@ class PythonSensor final : public Sensor, public ControlStepListener {
       : Sensor(std::move(name)), self_(std::move(self)), spec_(std::move(spec)) {}
 
   std::string_view kind() const override { return "python"; }
+  bool updates() const { return spec_.updates; }  // it is called after every control step
   Stage stage() const override { return Stage::kBatch; }
   // The stages that it reads through the Python simulation are computed at the read.
   mjtStage needs() const override { return mjSTAGE_NONE; }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
@@ -65,6 +66,12 @@ class PyRecorder {
       *value = nb::cast<bool>(options[name]);
       options.attr("pop")(name);
     }
+    if (options.contains("archive")) {
+      const auto archive = nb::cast<nb::tuple>(options.attr("pop")("archive"));
+      const auto bytes = nb::cast<nb::bytes>(archive[1]);
+      cfg.archive_name = nb::cast<std::string>(archive[0]);
+      cfg.archive.assign(bytes.c_str(), bytes.size());
+    }
     read_options(options, struct_of<VideoCfg>(), &cfg.video);
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
@@ -99,6 +106,14 @@ class PyRecorder {
   void finish(int world, const std::string& scene, const std::string& outcome) {
     check(world);
     unlocked([&] { recorder_->finish_episode(world, scene, outcome); });
+  }
+  void carry_over(int world, const std::string& file, const std::string& trajectory,
+                  const std::vector<std::string>& skip) {
+    check(world);
+    unlocked([&] { recorder_->carry_over(world, {file, trajectory, skip}); });
+  }
+  void skip(std::int64_t episode, const std::string& why) {
+    unlocked([&] { recorder_->skip_episode(episode, why); });
   }
   void discard(int world, const std::string& why) {
     check(world);
@@ -194,6 +209,12 @@ void bind_recorder(nb::module_& m) {
       .def("append", &PyRecorder::append, nb::arg("worlds"), nb::arg("reward"),
            nb::arg("terminated"), nb::arg("truncated"), nb::arg("success"))
       .def("finish_episode", &PyRecorder::finish, world, nb::arg("obs_scene"), nb::arg("outcome"))
+      .def("carry_over", &PyRecorder::carry_over, world, nb::arg("file"), nb::arg("trajectory"),
+           nb::arg("skip"),
+           "Adds the data of a recorded episode that the running one does not have; call it before "
+           "finish_episode().")
+      .def("skip_episode", &PyRecorder::skip, nb::arg("episode"), nb::arg("why"),
+           "Marks an attempt as decided and not kept.")
       .def("discard_episode", &PyRecorder::discard, world, nb::arg("why"))
       .def("abandon_episode", &PyRecorder::abandon, world)
       .def("flush", &PyRecorder::flush)

@@ -10,6 +10,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <numeric>
@@ -25,6 +26,7 @@
 #include "python/bindings/python_policy.h"
 #include "python/bindings/python_task.h"
 #include "python/bindings/rollout_host.h"
+#include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
 
@@ -193,6 +195,7 @@ class PyRollout {
     refuse_python_callbacks();
     RolloutCfg cfg;
     cfg.default_view = nb::cast<bool>(options.attr("pop")("default_view", false));
+    cfg.replay_sensor = nb::cast<bool>(options.attr("pop")("replay_sensor", false));
     read_options(options, struct_of<RolloutCfg>(), &cfg);
     parts_.join(cfg);
     nb::gil_scoped_release unlock;
@@ -224,6 +227,23 @@ class PyRollout {
   }
   void step() {
     sim_lock_->change("step", [&] { rollout_->step(); });
+  }
+  // (world, written, ctrl or None, mocap or None) of recorded steps.
+  using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+  void repeat(
+      const std::vector<std::tuple<int, Row, std::optional<Row>, std::optional<Row>>>& steps) {
+    std::vector<Rollout::RecordedStep> recorded;
+    const auto span = [](const Row& row) { return std::span(row.data(), row.size()); };
+    const mjModel* m = rollout_->simulation().model();
+    const auto state = static_cast<std::size_t>(mj_stateSize(m, mjSTATE_INTEGRATION));
+    for (const auto& [world, written, ctrl, mocap] : steps) {
+      if (world < 0 || world >= rollout_->num_worlds() || written.size() != state)
+        throw ValueError(fmt::format("repeat: world {}, {} numbers of the state, which has {}",
+                                     world, written.size(), state));
+      recorded.push_back({world, span(written), ctrl ? span(*ctrl) : std::span<const double>(),
+                          mocap ? span(*mocap) : std::span<const double>()});
+    }
+    sim_lock_->change("repeat", [&] { rollout_->repeat(recorded); });
   }
   void reseed(std::uint64_t seed) {
     sim_lock_->change("reseed", [&] { rollout_->reseed(seed); });
@@ -344,6 +364,7 @@ void bind_rollout(nb::module_& m) {
       .def("stop", &PyRollout::stop, nb::arg("world"))
       .def("act", &PyRollout::act)
       .def("step", &PyRollout::step)
+      .def("repeat", &PyRollout::repeat, nb::arg("steps"), "Repeats recorded control steps.")
       .def("reseed", &PyRollout::reseed, nb::arg("seed"))
       .def("step_chunk", &PyRollout::step_chunk, nb::arg("values"), nb::arg("stop_on_success"))
       .def("set_actions", &PyRollout::set_actions, nb::arg("values"), nb::arg("done") = nb::none())
@@ -353,6 +374,16 @@ void bind_rollout(nb::module_& m) {
       .def(
           "streams", [](PyRollout& s) { return suite_streams(s.rollout()); },
           "(sensor, spec, array) of every stream")
+      .def(
+          "sensors",
+          [](PyRollout& s) {
+            nb::list list;
+            SensorSuite& suite = s.rollout().suite();
+            for (const auto& sensor : suite.sensors())
+              list.append(nb::make_tuple(SensorHandle{sensor}, suite.owner(sensor->name())));
+            return list;
+          },
+          "(handle, owner) of every sensor; valid while the rollout exists")
       .def("outcomes", &outcomes, "(reward, success, terminal, truncated, {world: fault})")
       .def(
           "description", [](PyRollout& s, int w) { return s.rollout().task().description(w); },

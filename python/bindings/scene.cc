@@ -173,6 +173,14 @@ void bind_scene(nb::module_& m) {
       .def_prop_ro("kind", [](const SensorHandle& h) { return std::string(h.sensor->kind()); })
       .def_prop_ro("bytes_per_world",
                    [](const SensorHandle& h) { return h.sensor->bytes_per_world(); })
+      .def_prop_ro(
+          "has_memory",
+          [](const SensorHandle& h) {
+            const auto* python = dynamic_cast<const PythonSensor*>(h.sensor.get());
+            return h.sensor->wants_substep() || h.sensor->needs_every_step() ||
+                   (python && python->updates());
+          },
+          "Whether its rows depend on the steps since the start of the episode.")
       .def(
           "specs",
           [](const SensorHandle& h) {

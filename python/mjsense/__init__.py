@@ -28,6 +28,9 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  export_zarr; import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
+    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay, render
+                                 export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
+                                 export_zarr
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
@@ -64,13 +67,35 @@ from mjsense.core_sensors import (
     TcpPoseSensor,
 )
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
-from mjsense.dataset import Dataset, Deviation, Episode, EpisodeCheck, ReplayReport, Stream, Video, check_replay, replay
+from mjsense.dataset import (
+    Dataset,
+    Deviation,
+    Episode,
+    EpisodeCheck,
+    RenderProgress,
+    RenderSummary,
+    ReplayReport,
+    SensorCheck,
+    Stream,
+    Video,
+    check_replay,
+    render,
+    replay,
+)
+from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
-from mjsense.export import export_lerobot, export_lerobot21
-from mjsense.export import export_mcap, export_rerun, export_rlds, export_robomimic, export_zarr
+from mjsense.export import (
+    export_lerobot,
+    export_lerobot21,
+    export_mcap,
+    export_rerun,
+    export_rlds,
+    export_robomimic,
+    export_zarr,
+)
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
@@ -87,6 +112,7 @@ from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
+from mjsense.teleoperation import Teleoperation, play
 from mjsense.vector import TaskVectorEnv, make_vec
 from mjsense.view import view
 from mjsense.view.viewer import Viewer
@@ -100,14 +126,15 @@ __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "EpisodeRecording", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
+    "EpisodeCheck", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
     "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
-    "Recorder", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera", "Scene", "Sensor", "SensorData",
-    "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task", "TaskEnv", "TaskVectorEnv", "TcpPoseSensor",
-    "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer", "WorldState", "attach", "check_replay", "effects",
-    "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap", "export_rerun", "export_rlds", "export_robomimic",
-    "export_zarr", "make", "make_vec", "observations", "plot", "policy_names", "record", "register_policy", "register_task",
-    "replay", "robot_names", "task_names", "view",
+    "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
+    "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
+    "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
+    "WorldState", "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
+    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations",
+    "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names",
+    "view",
     "__version__",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -63,6 +63,21 @@ def tracked(items: Iterable[T], total: int, what: str, *, enabled: bool | None =
     finally:
         if done < total:
             line.show(f"{done}/{total} {what}", last=True)
+
+
+def counter(what: str, progress: bool | Callable[[int, int], None] | None) -> Callable[[int, int], None]:
+    """``progress`` itself if it is a function; otherwise a function of the number of items that are done and of all, which shows them.
+
+    Args:
+        what: Name of the items in the plural.
+        progress: None: only where the line can be overwritten.
+    """
+    if callable(progress):
+        return progress
+    if progress is False or (progress is None and not interactive()):
+        return lambda done, total: None
+    line = ProgressLine()
+    return lambda done, total: line.show(f"{done}/{total} {what}", last=done == total)
 
 
 def clock(seconds: float) -> str:

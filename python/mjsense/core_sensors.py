@@ -354,7 +354,7 @@ def _robot(sim: Simulation, sensor: CoreSensor) -> _core.TaskView:
 
 
 def _camera(sim: Simulation, sensor: CoreSensor, name: str) -> NativeSensor:
-    cameras = {key: s for key, s in sim.scene.sensors.items() if s.kind == "camera"} if sim.scene.sensors else {}
+    cameras = {key: s for key, s in sim.scene.sensors.items() if getattr(s, "kind", "") == "camera"} if sim.scene.sensors else {}
     if name not in cameras:
         raise UnknownNameError(_core.unknown_name(f"sensor '{sensor.name}'", "camera sensor", name, list(cameras)))
     return cameras[name]

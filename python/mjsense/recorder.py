@@ -81,20 +81,12 @@ class Recorder(KnownAttributes):
             settings: Settings that produced the data, as JSON. They are stored in every file and must be equal when a recording
                 is resumed.
         """
-        chosen = list(simulation.scene.sensors.values() if sensors is None else sensors)
-        chosen = [as_sensor(sensor) for sensor in chosen]
-        for sensor in chosen:
-            if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
-                simulation.add(sensor)
-            if isinstance(sensor, Sensor) and not sensor._mjs_fields:
-                raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
-        SensorSuite(chosen)  # raises if names are not unique
+        chosen, handles = recorded_sensors(simulation, sensors)
         rate = _rate(fps, simulation)
         options = {
             "episodes": episodes, "resume": resume, "append": append, "overwrite": overwrite, "house": house, "batches": batches, "gzip": gzip, "ffmpeg": ffmpeg, "crf": crf,
             "preset": preset, "keyint": keyint, "molmospaces_depth": molmospaces_depth,
         }  # fmt: skip
-        handles = [sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle for sensor in chosen]
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
         self._core = _core.Recorder(
             simulation._core, simulation.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, options
@@ -215,6 +207,19 @@ class Recorder(KnownAttributes):
     def stats(self) -> dict[str, float]:
         """Rows, frames and bytes recorded so far, and seconds by activity."""
         return self._core.stats()
+
+
+def recorded_sensors(simulation: Simulation, sensors: Iterable[Any] | None) -> tuple[list[Any], list[Any]]:
+    """The sensors and their C++ handles; None: all of the scene. Adds those that belong to no simulation yet."""
+    chosen = list(simulation.scene.sensors.values() if sensors is None else sensors)
+    chosen = [as_sensor(sensor) for sensor in chosen]
+    for sensor in chosen:
+        if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
+            simulation.add(sensor)
+        if isinstance(sensor, Sensor) and not sensor._mjs_fields:
+            raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
+    SensorSuite(chosen)  # raises if names are not unique
+    return chosen, [sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle for sensor in chosen]
 
 
 def _rate(fps: float | Fraction | None, simulation: Simulation) -> Fraction:

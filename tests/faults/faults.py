@@ -69,6 +69,14 @@ class Lab:
         assert done.returncode == 0, done.stderr
         return out
 
+    @functools.cached_property
+    def carried(self) -> Path:
+        """A file of a recording with more cameras, whose data other recordings carry over, as `mjsense render` does."""
+        out = self.fresh("carried")
+        done = self.run(out, "--episodes", 1, "--worlds", 1, "--steps", 8, "--cameras", 3, "--no-video")
+        assert done.returncode == 0, done.stderr
+        return next(out.rglob("*.h5"))
+
     def copy(self, name="copy") -> Path:
         out = self.fresh(name)
         shutil.copytree(self.sound, out, dirs_exist_ok=True)
@@ -251,14 +259,14 @@ def kills(lab: Lab, trials: int, seed=3) -> Row:
     """kill -9 at a random time, then --resume: every finished episode is kept, and the final files are equal byte for byte."""
     row = Row("kill -9 of the program, then --resume")
     rng = random.Random(seed)
-    whole = lab.fresh("whole")
-    assert lab.run(whole, *KILLED).returncode == 0
+    whole, options = lab.fresh("whole"), [*KILLED, "--carry", lab.carried]
+    assert lab.run(whole, *options).returncode == 0
     expected = contents(whole)
     while row.trials < trials:
         out, finished = lab.fresh("killed"), []
         for _ in range(12):
             process = subprocess.Popen(
-                [lab.program, out, *KILLED, "--resume", "--step-ms", "3"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                [lab.program, out, *options, "--resume", "--step-ms", "3"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             )
             time.sleep(rng.uniform(0.02, 0.8))
             process.send_signal(signal.SIGKILL)
@@ -269,7 +277,7 @@ def kills(lab: Lab, trials: int, seed=3) -> Row:
             row.trials += 1
             if process.returncode != -signal.SIGKILL:
                 row.wrong("crashed", f"{process.returncode} {said[1]}")
-        done = lab.run(out, *KILLED, "--resume")
+        done = lab.run(out, *options, "--resume")
         if done.returncode != 0:
             row.wrong("crashed", done.stderr)
         if contents(out) != expected or len(set(finished)) != len(finished):
@@ -282,7 +290,8 @@ def killed_changes(lab: Lab, trials: int) -> Row:
     equal."""
     row = Row("kill -9 before each change of the file system, then --resume")
     # More episodes are played than requested; the surplus is dropped.
-    options = ["--episodes", "5", "--batches", "2", "--worlds", "3", "--steps", "4", "--discard", "4", "--no-depth", "--cameras", "1"]
+    options = ["--episodes", "5", "--batches", "2", "--worlds", "3", "--steps", "4", "--discard", "4", "--no-depth", "--cameras", "1",
+               "--carry", lab.carried]  # fmt: skip
     whole = lab.fresh("whole")
     counted = lab.run(whole, *options, env=os.environ | {"MJSENSE_COUNT_CHANGES": "1"})
     changes, expected = int(counted.stderr.split("changes ")[1]), contents(whole)

@@ -4,7 +4,6 @@
 import base64
 import itertools
 import json
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -14,7 +13,7 @@ import urllib.request
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "site"))
-from browser import chromium  # noqa: E402
+from browser import chromium
 
 
 class Page:
@@ -29,7 +28,8 @@ class Page:
                    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "about:blank"]  # fmt: skip
         self._process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
         address = next(line for line in self._process.stderr if "DevTools listening on" in line).split("ws://")[1].split("/")[0]
-        threading.Thread(target=self._process.stderr.read, daemon=True).start()
+        self._drain = threading.Thread(target=self._process.stderr.read, daemon=True)
+        self._drain.start()
         pages = []
         while not pages:
             with urllib.request.urlopen(f"http://{address}/json") as answer:
@@ -63,13 +63,19 @@ class Page:
         return self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)["result"].get("value")
 
     def click(self, selector, text):
-        """Clicks the element of this selector and text."""
-        where = self.run(f"""(() => {{
-            const found = [...document.querySelectorAll({json.dumps(selector)})].find((e) => e.textContent.trim() == {json.dumps(text)});
-            if (!found) return null;
-            const box = found.getBoundingClientRect();
-            return [box.x + box.width / 2, box.y + box.height / 2]; }})()""")
-        assert where, f"no {selector} with the text {text}"
+        """Clicks the element of this selector and text once it is there and has stopped moving."""
+        before, end = None, time.monotonic() + 30
+        while True:
+            where = self.run(f"""(() => {{
+                const found = [...document.querySelectorAll({json.dumps(selector)})].find((e) => e.textContent.trim() == {json.dumps(text)});
+                if (!found) return null;
+                const box = found.getBoundingClientRect();
+                return [box.x + box.width / 2, box.y + box.height / 2]; }})()""")
+            if where and where == before:
+                break
+            assert time.monotonic() < end, f"no {selector} with the text {text}"
+            before = where
+            time.sleep(0.5)
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
 
@@ -80,6 +86,8 @@ class Page:
         self._socket.close()
         self._process.kill()
         self._process.wait()
+        self._drain.join()
+        self._process.stderr.close()
         self._profile.cleanup()
 
     def __enter__(self):

@@ -27,6 +27,9 @@ for i in read:
     right = item["task"] == tasks[at]
     for name, values in expected.items():
         value = item[name].numpy()
+        if name.startswith("observation.images.") and values.ndim == 3:  # depth: mm, to be compared with m
+            right = right and (np.abs(value[0] / 1000 - values[at].clip(0.01, 10)) < 0.003).all()
+            continue
         if name.startswith("observation.images."):
             value = np.rint(value * 255).astype(np.uint8).transpose(1, 2, 0)
         right = right and np.array_equal(value, values[at])

@@ -11,9 +11,9 @@ from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
 
-# Users write the methods of the first three; environments have those of Gymnasium, see below.
+# Users write the methods of the first three; environments have those of Gymnasium, see below. A viewer is made by a function.
 ENVS = (mjs.TaskVectorEnv, mjs.RecordEpisodes, mjs.RecordVectorEpisodes)
-SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, *ENVS)
+SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.Viewer, *ENVS)
 CLASSES = [
     value
     for value in vars(mjs).values()
@@ -23,7 +23,7 @@ CLASSES = [
     and value.__module__.startswith("mjsense.")
     and value is not mjs.SensorSpec
 ]
-FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
+FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.render, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
 
 
 def methods_of(cls):

@@ -15,6 +15,7 @@ import mujoco
 import pytest
 
 import mjsense as mjs
+from mjsense import commands
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
@@ -23,6 +24,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Module that pages import -> names used of it. Modules that are not installed are replaced by stubs.
 OTHERS: dict[str, list[str]] = {"matplotlib": ["matplotlib.pyplot"], "rerun": [], "stable_baselines3": ["mjsense.rl.sb3"], "torch": []}
+EXPORT_LIBRARIES = {"lerobot": "pyarrow", "lerobot21": "pyarrow", "rlds": "google_crc32c", "zarr": "zarr", "rerun": "rerun", "mcap": "mcap_protobuf"}
 MISSING = [name for name in OTHERS if importlib.util.find_spec(name) is None]
 SHORT = ["--episodes", "1", "--horizon", "2", "--keep-failures", "--size", "64x48", "-q", "--no-sheet"]  # of recordings
 
@@ -73,6 +75,12 @@ def test_python(page, tmp_path, monkeypatch):
         if re.search(rf"^\s*(import|from) {name}\b", page.read_text(), re.MULTILINE):
             for module in (name, *OTHERS[name]):
                 monkeypatch.setitem(sys.modules, module, MagicMock())
+    for name, library in EXPORT_LIBRARIES.items():
+        if f"export_{name}(" in page.read_text():
+            pytest.importorskip(library)
+    monkeypatch.setattr(mjs, "view", MagicMock())  # waits for a browser
+    if "matplotlib" in MISSING:
+        monkeypatch.setattr(mjs, "plot", MagicMock())
     names = {"__name__": "page"}
     for line, code in blocks(page, "python"):
         exec(compile("\n" * (line - 1) + code, str(page), "exec"), names)  # errors show the page's line
@@ -91,7 +99,14 @@ def test_cpp_blocks_are_in_compiled_files(page):
 
 
 def run(arguments, cwd):
-    done = subprocess.run([PROGRAM, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+    program = [PROGRAM]
+    if arguments[0] in commands.COMMANDS:
+        module = {"view": "viser", "plot": "matplotlib"}.get(arguments[0])
+        if ("view" in arguments and "--export" not in arguments) or (module and importlib.util.find_spec(module) is None) or "rrd" in arguments[-1]:
+            commands.parser_of(arguments[0]).parse_args(arguments[1:])  # a viewer would wait for a browser
+            return
+        program = [sys.executable, "-m", "mjsense"]
+    done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
 
 
@@ -115,6 +130,7 @@ def test_command_lines(page, tmp_path):
     # Files that the command lines refer to.
     import numpy as np
 
+    (tmp_path / "map.toml").write_text('state = "obs/agent/qpos/arm"')
     np.save(tmp_path / "mid360.npy", np.random.default_rng(0).uniform(-0.5, 0.5, (20000, 2)))
     lines = command_lines(page)
     if not any(line[0] == "record" for line in lines):
@@ -123,6 +139,9 @@ def test_command_lines(page, tmp_path):
         if line[0] == "record":
             words = [line[i] for i in range(len(line)) if "--episodes" not in line[max(0, i - 1) : i + 1]]
             run([*words, *SHORT], tmp_path)
+        elif line[0] == "export":
+            if importlib.util.find_spec(EXPORT_LIBRARIES.get(line[1], "h5py")):
+                run([word for word in line if word != "--success"], tmp_path)
         else:
             run(line, tmp_path)
 

@@ -13,7 +13,7 @@ pq = pytest.importorskip("pyarrow.parquet")
 
 import av
 from mjsense.dataset import statistics
-from mjsense.export import Mapping, Source, lerobot
+from mjsense.export import Mapping, Source, lerobot, lerobot_depth
 from mjsense.export.mapping import _held
 
 import mjsense as mjs
@@ -124,6 +124,26 @@ def test_a_long_file_ends_before_its_times_are_inexact():
     assert videos._found_by_time(100) and not videos._found_by_time(909)
 
 
+def test_depth_in_lerobot_form_with_the_exact_file(tmp_path):
+    mjs.record("pick", out=tmp_path / "data", depth=True, cameras=["wrist_camera"], **{**SMALL, "episodes": 1})
+    cameras = {"cameras": {"eye": "wrist_camera", "eye_depth": "wrist_camera_depth"}}
+    out = mjs.export_lerobot(tmp_path / "data", tmp_path / "out", map=cameras)
+    video = mjs.Dataset(tmp_path / "data").episodes[0].video("wrist_camera_depth")
+    assert (out / "extras/depth/eye_depth/episode_000000.mkv").read_bytes() == video.path.read_bytes()
+    key = "observation.images.eye_depth"
+    with av.open(str(out / f"videos/{key}/chunk-000/file-000.mp4")) as file:
+        codes = np.stack([frame.to_ndarray(format="gray12le") for frame in file.decode(video=0)])
+    expected = video[:].clip(0.01, 10)
+    assert (np.abs(lerobot_depth.LEVELS[codes] - expected) <= (expected + 3.5) * 1.7e-4).all()
+    info = json.loads((out / "meta/info.json").read_text())["features"][key]
+    assert info["shape"] == [23, 32, 1] and info["info"]["is_depth_map"] and info["info"]["video.depth_max"] == 10
+    stats = json.loads((out / "meta/stats.json").read_text())[key]
+    np.testing.assert_allclose(stats["mean"], expected[:-1].mean().reshape(1, 1, 1), rtol=1e-3)
+    np.testing.assert_allclose(np.ravel(stats["q50"]), np.median(expected[:-1]), atol=2e-3)
+    with pytest.raises(ValueError, match=r"LeRobot v2\.1 has no depth images; leave 'eye_depth' out"):
+        mjs.export_lerobot21(tmp_path / "data", tmp_path / "v21", map=cameras)
+
+
 def test_lerobot21(root, tmp_path):
     out = mjs.export_lerobot21(root, tmp_path / "v21")
     info = json.loads((out / "meta/info.json").read_text())
@@ -161,6 +181,14 @@ def test_a_map_chooses_features(root, tmp_path, capsys):
     assert info["features"]["observation.state"]["names"][:3] == ["gripper_0", "gripper_1", "arm_0"]
     assert info["features"]["next.phase"]["dtype"] == "int64" and info["features"]["observation.tcp_pose"]["shape"] == [7]
     assert commands.run(words) == 2 and "exists; name another output" in capsys.readouterr().err
+
+
+def test_move_groups_without_joints_have_their_command(tmp_path):
+    mjs.record("pick", "floating_rum", out=tmp_path, **{**SMALL, "episodes": 1, "cameras": []})
+    source = Source(tmp_path)
+    assert source.features["action"].parts == {"gripper": slice(0, 1), "base": slice(1, 8)} and not source.cameras
+    rows, episode = source.rows(source.episodes[0]), source.episodes[0]
+    np.testing.assert_array_equal(rows["action"][:, 1:], episode["actions/commanded_action/base"][1:])
 
 
 def test_wrong_maps_and_recordings(root, tmp_path):

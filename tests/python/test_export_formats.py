@@ -151,7 +151,7 @@ def test_png_is_lossless():
 
 
 def test_rlds_files(root, source, tmp_path):
-    checksum = pytest.importorskip("google_crc32c").value
+    checksum = pytest.importorskip("google_crc32c", reason="needs google-crc32c").value
     out = mjs.export_rlds(root, tmp_path / "pick")
     info = json.loads((out / "1.0.0/dataset_info.json").read_text())
     assert info["name"] == "pick" and info["splits"][0]["shardLengths"] == ["2"]
@@ -173,7 +173,7 @@ def test_rlds_files(root, source, tmp_path):
 
 
 def test_tensorflow_datasets_reads_rlds(root, source, tmp_path):
-    pytest.importorskip("google_crc32c")
+    pytest.importorskip("google_crc32c", reason="needs google-crc32c")
     python = reader("rlds", ["tensorflow-cpu==2.21.*", "tensorflow-datasets==4.9.10", "importlib_resources"])
     out = mjs.export_rlds(root, tmp_path / "pick")
     expected = {"episodes": np.array(2)}

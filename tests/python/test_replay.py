@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded episodes in plain MuJoCo: equal bit for bit, and deviations are named."""
 
+import json
 import re
 import shutil
+import subprocess
+import sys
 
 import h5py
 import mujoco
@@ -126,6 +129,23 @@ def test_every_part_of_the_state_has_a_name(door):
         assert found.count == 1 and found.replayed == 1
         fields.add(found.field)
     assert {"time", "qpos", "qvel", "warmstart", "ctrl", "xfrc_applied", "mocap_pos", "mocap_quat"} <= fields
+
+
+def test_program(pick, door):
+    """``mjsense replay``: exit code, report and JSON."""
+
+    def run(*words):
+        return subprocess.run([sys.executable, "-m", "mjsense", "replay", *map(str, words)], capture_output=True, text=True)
+
+    done = run(pick, "--verify", "--episodes", 1, "--json")
+    report = json.loads(done.stdout)
+    assert done.returncode == 0 and report["ok"] and [e["episode"] for e in report["episodes"]] == [1], done.stderr
+    assert "env_states/articulations/franka" in report["episodes"][0]["sensors"]["equal"]
+    done = run(door, "--from", "states")  # a robot with several control ticks in a step
+    assert done.returncode == 0 and "2 of 2 episodes (40 steps) replay equal bit for bit" in done.stdout, done.stdout
+    assert "actions/joint_pos_rel: the action that the policy chose" in done.stdout
+    wrong = run(pick, "--from", "state")
+    assert wrong.returncode == 2 and "invalid choice: 'state'" in wrong.stderr and wrong.stderr.count("\n") == 1
 
 
 def test_without_data_for_replay(tmp_path):

@@ -14,11 +14,11 @@ import devtools
 import mujoco
 import numpy as np
 import pytest
+from mjsense.view import geometry, surfaces
+from mjsense.view.poses import PoseStream
 from scenes import BALL
 
 import mjsense as mjs
-from mjsense.view import geometry, surfaces
-from mjsense.view.poses import PoseStream
 
 needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
 needs_browser = pytest.mark.skipif(devtools.chromium() is None, reason="there is no Chromium")
@@ -298,44 +298,58 @@ def own_silhouette(model, data, position, target, size):
     return renderer.render()[..., 0] >= 0
 
 
+def eventually(condition, seconds=30):
+    """Waits until the browser, which draws by software here, has caught up."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "the page did not change in time"
+        time.sleep(0.05)
+
+
 @needs_viser
 @needs_browser
 def test_silhouettes_equal_those_of_the_renderer(port):
     size = 240, 320
-    for robot in ROBOTS:
-        scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=f"embedded:robots/{robot}.xml")}))
-        sim = mjs.Simulation(scene)
-        with Running(mjs.view(sim, port=port, block=False, open_browser=False)) as running:
+    models = [mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=f"embedded:robots/{robot}.xml")})) for robot in ROBOTS]
+    sims = [mjs.Simulation(scene) for scene in models]
+    with Running(mjs.view(sims[0], port=port, block=False, open_browser=False)) as running:
+        for robot, sim in zip(ROBOTS, sims):
             model, data = sim.model_of(0), sim.env.mj_datas[0]
+            running.viewer._stage.set_model(model)
+            running.viewer._stage.set_poses(data.xpos, data.xquat)
             target = np.array(model.stat.center)
             position = target + 1.4 * model.stat.extent * np.array([0.8, -0.5, 0.4])
-            time.sleep(1.5)
-            seen = silhouette(running.viewer, position, target, size)
             expected = own_silhouette(model, data, position, target, size)
-            overlap = (seen & expected).sum() / (seen | expected).sum()
-            assert expected.sum() > 2000 and overlap >= 0.97, (robot, overlap)
-            assert not running.page.console
+            overlaps = []
+
+            def similar():
+                seen = silhouette(running.viewer, position, target, size)
+                overlaps.append((seen & expected).sum() / (seen | expected).sum())
+                return overlaps[-1] >= 0.97
+
+            assert expected.sum() > 2000, robot
+            try:
+                eventually(similar, 15)
+            except AssertionError:
+                raise AssertionError(f"{robot}: intersection over union {max(overlaps):.3f}") from None
+        assert not running.page.console
 
 
 @needs_viser
 @needs_browser
-def test_the_page_of_a_task(port, tmp_path):
+def test_the_page_of_a_task(port):
     with Running(mjs.view("pick", port=port, block=False, open_browser=False)) as running:
         viewer, page = running.viewer, running.page
         page.click("button", "Step")
-        page.click("[role=tab]", "Curves")
-        viewer._events[1] = lambda: viewer._curves.choose("tcp_pose")
-        time.sleep(1)
+        eventually(lambda: viewer._source.time(0) > 0)
         assert viewer._source.time(0) == pytest.approx(viewer._source.period)
         page.click("[role=tab]", "Cameras")
-        time.sleep(0.5)
-        assert page.run("[...document.querySelectorAll('img')].some((image) => image.naturalWidth == 320)")
+        eventually(lambda: page.run("[...document.querySelectorAll('img')].some((image) => image.naturalWidth == 320)"))
         page.click("[role=tab]", "Play")
-        time.sleep(0.5)
-        page.run("document.querySelectorAll('input[type=checkbox]')[0].click()")
-        time.sleep(2)
-        assert viewer._playing.value and viewer._source.time(0) > 0.5
-        page.screenshot(tmp_path / "page.png")
+        page.click("button", "Play")
+        eventually(lambda: viewer._playing and viewer._source.time(0) > 0.5)
+        page.click("button", "Pause")
+        eventually(lambda: not viewer._playing)
         assert not page.console
 
 
@@ -346,14 +360,9 @@ def test_the_page_of_a_recording(recording, port):
         viewer, page = running.viewer, running.page
         viewer._events[1] = lambda: viewer.seek(12)
         page.click("[role=tab]", "Videos")
-        time.sleep(1.5)
+        eventually(lambda: page.run("[...document.querySelectorAll('img')].filter((image) => image.naturalWidth == 48).length") == 2)
         assert viewer._shown == 12
-        assert page.run("[...document.querySelectorAll('img')].filter((image) => image.naturalWidth == 48).length") == 2
         page.click("[role=tab]", "Curves")
-        time.sleep(0.5)
         viewer._events[2] = lambda: viewer._curves.choose("obs/extra/tcp_pose")
-        time.sleep(1.5)
-        assert page.run("document.querySelector('.uplot canvas').width") > 100
+        eventually(lambda: (page.run("document.querySelector('.uplot canvas')?.width") or 0) > 100)
         assert not page.console
-
-

@@ -4,23 +4,27 @@
 //   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--discard K]
 //               [--width W] [--height H] [--cameras C] [--no-video] [--no-depth] [--red-green]
 //               [--encoders E] [--threads n] [--gzip G] [--timeout S] [--resume]
-//               [--step-ms MS] [--stop-after N] [--print] [--measure]
+//               [--step-ms MS] [--stop-after N] [--print] [--measure] [--carry FILE.h5]
 //   record_fake verify PATH [decode]
 //   record_fake repair|inspect PATH
 //   record_fake sheet PATH PNG
 // Every K-th attempt is discarded (0: none). --print prints "finished E" after each episode that
-// is stored on disk; --measure prints the duration of the recording.
+// is stored on disk; --measure prints the duration of the recording. --carry adds to every episode
+// the data of traj_0 of a recording's file that it does not have.
 
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/replay/recording_tools.h"
@@ -36,6 +40,9 @@ struct Options {
     return at == values.end() ? otherwise : std::atoi(at->second.c_str());
   }
   bool flag(const std::string& key) const { return values.contains(key); }
+  std::string text(const std::string& key) const {
+    return flag(key) ? values.at(key) : std::string();
+  }
 };
 
 Options parse(int argc, char** argv) {
@@ -77,6 +84,18 @@ class Rows {
   std::vector<std::vector<std::byte>> rows_;
 };
 
+// Data for replay that do not depend on the step.
+std::vector<EpisodeArray> replay_arrays(std::int64_t episode) {
+  std::vector<double> sizes(300, std::numeric_limits<double>::quiet_NaN());
+  sizes[episode % 300] = 0.02;
+  const auto bytes = std::as_bytes(std::span(sizes));
+  return {{"model/geom_size",
+           "Values of this episode's model; NaN: the value of the archived model.",
+           DType::kFloat64,
+           {100, 3},
+           {bytes.begin(), bytes.end()}}};
+}
+
 struct Running {
   std::int64_t episode = -1;
   int t = 0;
@@ -96,6 +115,10 @@ int record(const std::string& out, const Options& o) {
   cfg.fps = Fps::from_period_ms(66);
   cfg.sensors = suite.sensors();
   cfg.settings = R"({"task": "fake", "seed": 0})";
+  cfg.archive = std::string(5000, 'a');  // stands for a ZIP archive of a model
+  Checksum sum;
+  sum.add(cfg.archive.data(), cfg.archive.size());
+  cfg.archive_name = fmt::format("model_{}.zip", sum.text());
   cfg.resume = o.flag("--resume");
   cfg.gzip = o.number("--gzip", 4);
   cfg.video.max_encoders = o.number("--encoders", 0);
@@ -103,6 +126,7 @@ int record(const std::string& out, const Options& o) {
   cfg.video.molmospaces_depth = o.flag("--red-green");
   if (o.flag("--timeout")) cfg.video.ffmpeg_timeout = o.number("--timeout", 60);
   Recorder recorder(cfg);
+  const EpisodeSource source{o.text("--carry"), "traj_0", {"obs/sensor_data"}};
 
   const bool measure = o.flag("--measure");
   std::optional<Rows> rows;
@@ -145,7 +169,10 @@ int record(const std::string& out, const Options& o) {
       if (rejected(r.episode)) {
         recorder.discard_episode(w, "every so many");
       } else {
-        recorder.finish_episode(w, FakeSuite::obs_scene(r.episode), "success");
+        if (!source.file.empty()) recorder.carry_over(w, source);
+        recorder.finish_episode(
+            w, FakeSuite::obs_scene(r.episode), "success",
+            source.file.empty() ? replay_arrays(r.episode) : std::vector<EpisodeArray>());
         if (o.flag("--print")) {
           recorder.flush();
           fmt::print("finished {}\n", r.episode);

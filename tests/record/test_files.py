@@ -30,7 +30,26 @@ def test_names(house, files):
     assert [f.name for f in files] == ["trajectories_batch_1_of_2.h5", "trajectories_batch_2_of_2.h5"]
     kept = [i for i in range(9) if i != 4]  # attempt 4 was discarded
     videos = {f"episode_{i:08d}_wrist_camera{k}" for i in kept for k in (".mp4", "_depth.mp4", "_depth.mkv")}
-    assert {p.name for p in house.iterdir()} == videos | {f.name for f in files}
+    archive = {f"model_{zlib.crc32(b'a' * 5000):08x}.zip"}
+    assert {p.name for p in house.iterdir()} == videos | {f.name for f in files} | archive
+
+
+def test_carried_data(record_fake, house, tmp_path):
+    """Data of another recording that the new one does not have, with their attributes, equal byte for byte."""
+    record_fake(tmp_path / "more", "--episodes", 1, "--worlds", 1, "--steps", 10, "--cameras", 2, "--no-video")
+    source = next((tmp_path / "more").rglob("*.h5"))
+    record_fake(tmp_path / "out", "--episodes", 1, "--worlds", 1, "--steps", 10, "--carry", source)
+    assert "intact" in record_fake("verify", tmp_path / "out").stdout
+    with h5py.File(source) as old, h5py.File(next((tmp_path / "out").rglob("*.h5"))) as new:
+        names = []
+        old["traj_0"].visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+        for name in names:
+            if name != "obs_scene":
+                a, b = old["traj_0"][name], new["traj_0"][name]
+                assert a[()].tobytes() == b[()].tobytes() and dict(a.attrs) == dict(b.attrs), name
+        assert {name.split("/")[2] for name in names if name.startswith("obs/sensor_param/")} == {"wrist_camera", "exo_camera_1"}
+    missing = record_fake(tmp_path / "other", "--episodes", 1, "--steps", 10, "--carry", tmp_path / "nothing.h5", check=False)
+    assert missing.returncode == 2 and "nothing.h5" in missing.stderr
 
 
 def test_molmospaces_scripts_accept_every_trajectory(files):

@@ -16,9 +16,12 @@ from types import ModuleType
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
-    "plot": "Draw streams of a recording or of live worlds into a picture.",
-    "replay": "Replay recorded episodes and compare them with the recording.",
+    "play": "Drive a robot in the browser and record demonstrations.",
+    "plot": "Draw streams of recordings or live worlds into a picture.",
+    "replay": "Replay recorded episodes and report every difference.",
+    "render": "Render recorded episodes with other cameras and sensors.",
     "export": "Write a recording in the format of another program.",
+    "import": "Write a data set of another program as a recording.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
 

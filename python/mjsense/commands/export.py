@@ -22,23 +22,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
+    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show progress.")
     parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
 
 
 def run(arguments: argparse.Namespace) -> int:
     import importlib
-    import sys
+
+    from mjsense._progress import counter
 
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
     options = {"encode_again": True} if arguments.encode_again else {}
     function = getattr(importlib.import_module(f"mjsense.export.{arguments.format}"), f"export_{arguments.format}")
-    shown = sys.stderr.isatty()
-
-    def progress(done: int, total: int) -> None:
-        if shown:
-            print(f"\r{done} of {total} episodes", end="" if done < total else "\n", file=sys.stderr, flush=True)
-
     success = arguments.success or None
-    function(arguments.path, arguments.out, map=arguments.map, episodes=arguments.episodes, success=success, progress=progress, **options)
+    function(arguments.path, arguments.out, map=arguments.map, episodes=arguments.episodes, success=success, progress=counter("episodes", False if arguments.quiet else None), **options)
     return 0

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading of recordings: rows and frames, statistics, and replay in MuJoCo. h5py is imported at the first access to a file."""
+"""Reading of recordings: rows and frames, statistics, replay in MuJoCo, and rendering again. h5py is imported at the first access to a file."""
 
 from mjsense.dataset.dataset import Dataset
+from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import Episode, Stream
-from mjsense.dataset.replay_check import Deviation, EpisodeCheck, ReplayReport, check_replay, replay
+from mjsense.dataset.render import RenderProgress, RenderSummary, render
+from mjsense.dataset.replay_check import EpisodeCheck, ReplayReport, check_replay, replay
+from mjsense.dataset.sensor_check import SensorCheck
 from mjsense.dataset.video import Video
 
-__all__ = ["Dataset", "Deviation", "Episode", "EpisodeCheck", "ReplayReport", "Stream", "Video", "check_replay", "replay"]
+__all__ = [
+    "Dataset", "Deviation", "Episode", "EpisodeCheck", "RenderProgress", "RenderSummary", "ReplayReport", "SensorCheck", "Stream", "Video",
+    "check_replay", "render", "replay",
+]  # fmt: skip

@@ -48,7 +48,8 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
         ValueError: The recording has no data for replay, or a changed field of the model cannot be written as MJCF.
     """
     model = playback.model_of(episode)
-    text, assets = playback.archive_of(episode)
+    assets = playback.read_archive(playback.archive_of(episode))
+    text = assets.pop(playback.MODEL_FILE).decode()
     spec = mujoco.MjSpec.from_string(text, assets=assets)
     archived = spec.compile()  # also gives the elements their ids
     changed = [field for field in playback.changed_fields(episode) if field not in _DERIVED]

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import copy
 import zipfile
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +24,7 @@ else:
     mujoco = _libmujoco.shared
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if _libmujoco.shared else 0
-_MODEL_FILE = "model.xml"
+MODEL_FILE = "model.xml"
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class ReplayInputs:
     held: np.ndarray
 
 
-def _where(episode: Episode) -> str:
+def where(episode: Episode) -> str:
     return f"episode {episode.index} ({episode.path.name}, {episode.trajectory})"
 
 
@@ -49,7 +51,7 @@ def inputs_of(episode: Episode) -> ReplayInputs:
         group = file[episode.trajectory].get("replay")
         if group is None:
             raise ValueError(
-                f"{_where(episode)} has no data for replay. Record it again without --no-replay (replay=False); "
+                f"{where(episode)} has no data for replay. Record it again without --no-replay (replay=False); "
                 "recordings of versions without replay lack parts of the state."
             )
         arrays: dict[str, Any] = {name: group[name][:] if name in group else None for name in ("state", "written", "ctrl", "mocap", "held")}
@@ -65,29 +67,42 @@ def _require_mujoco() -> None:
         raise RuntimeError(f"replay needs the series of MuJoCo that mjsense records with: {_libmujoco.explain()}")
 
 
-def archive_of(episode: Episode) -> tuple[str, dict[str, bytes]]:
-    """MJCF of the archived model, and the files that it names."""
+def archive_of(episode: Episode) -> Path:
+    """The file with the model and its assets."""
     name = episode._recording.get("model_archive")
     if not name:
         inputs_of(episode)  # states the reason if there is no data for replay at all
-        raise ValueError(f"{_where(episode)}: the attribute 'recording' names no model_archive")
+        raise ValueError(f"{where(episode)}: the attribute 'recording' names no model_archive")
     path = episode.path.parent / name
     if not path.exists():
-        raise FileNotFoundError(f"{_where(episode)} needs the model archive {path}, which is missing; copy it from the recording's folder")
-    with zipfile.ZipFile(path) as archive:
-        assets = {file: archive.read(file) for file in archive.namelist() if file != _MODEL_FILE}
-        return archive.read(_MODEL_FILE).decode(), assets
+        raise FileNotFoundError(f"{where(episode)} needs the model archive {path}, which is missing; copy it from the recording's folder")
+    return path
+
+
+def read_archive(path: Path) -> dict[str, bytes]:
+    """The files of a model archive."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            files = {name: archive.read(name) for name in archive.namelist()}
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+        raise ValueError(f"the model archive {path} cannot be read: {error}; copy it from the original recording") from error
+    if MODEL_FILE not in files or any(Path(name).is_absolute() or ".." in Path(name).parts for name in files):
+        raise ValueError(f"the model archive {path} cannot be read: it contains no {MODEL_FILE}, or names outside of its folder")
+    return files
 
 
 def archived_model(episode: Episode) -> mujoco.MjModel:
+    path = archive_of(episode)
+
     def compile_model() -> tuple[mujoco.MjModel, int]:
-        text, assets = archive_of(episode)
+        assets = read_archive(path)
+        text = assets.pop(MODEL_FILE).decode()
         try:
             return mujoco.MjModel.from_xml_string(text, assets), 1
         except ValueError as error:
-            raise ValueError(f"MuJoCo {mujoco.__version__} cannot compile the model archive of {_where(episode)}: {error}") from error
+            raise ValueError(f"MuJoCo {mujoco.__version__} cannot compile {path}: {error}") from error
 
-    return episode._store.models.get((episode.path.parent, episode._recording.get("model_archive")), compile_model)
+    return episode._store.models.get(path, compile_model)
 
 
 def changed_fields(episode: Episode) -> list[str]:
@@ -107,7 +122,7 @@ def model_of(episode: Episode) -> mujoco.MjModel:
     size, stored = mujoco.mj_stateSize(model, STATE), inputs_of(episode).state.shape[1]
     if size != stored:
         raise ValueError(
-            f"{_where(episode)}: the recorded state has {stored} numbers, that of MuJoCo {mujoco.__version__} has {size}. "
+            f"{where(episode)}: the recorded state has {stored} numbers, that of MuJoCo {mujoco.__version__} has {size}. "
             "Replay needs a MuJoCo of the series that recorded."
         )
     return model

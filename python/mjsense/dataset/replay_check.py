@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,9 +12,11 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
-from mjsense._progress import tracked
+from mjsense._progress import counter
 from mjsense.dataset.dataset import Dataset
+from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.playback import STATE, Stepper, inputs_of, model_of
+from mjsense.dataset.sensor_check import SensorCheck, check_sensors
 
 if TYPE_CHECKING:
     import mujoco
@@ -49,40 +51,29 @@ def replay(
 
 
 @dataclass(frozen=True)
-class Deviation:
-    """The first place at which a replayed state differs from the recorded one."""
-
-    step: int
-    """Observation."""
-    field: str
-    """Part of the state: ``qpos``, ``qvel``, ``act``, ``ctrl`` and so on."""
-    element: str
-    """Joint, body, actuator or equality constraint, and the index inside it."""
-    recorded: float
-    replayed: float
-    count: int
-    """Number of values of the state that differ at this step."""
-
-    def __str__(self) -> str:
-        return (f"step {self.step}: {self.field} of {self.element}: recorded {self.recorded!r}, replayed {self.replayed!r} "
-                f"(difference {self.replayed - self.recorded:.3g}; {self.count} values differ at this step)")  # fmt: skip
-
-
-@dataclass(frozen=True)
 class EpisodeCheck:
-    """Result of the replay of one episode; None: every step is equal bit for bit."""
+    """Result of the replay of one episode."""
 
     episode: int
+    """Position in the recording."""
     steps: int
-    stepwise: Deviation | None
-    """First deviation if each step starts from the recorded state."""
-    open_loop: Deviation | None
-    """First deviation if only the first state is set."""
+    stepwise: Deviation | None = None
+    """First deviation of the simulation if each step starts from the recorded state; None: equal bit for bit, or not simulated."""
+    open_loop: Deviation | None = None
+    """The same if only the first state is set."""
+    sensors: SensorCheck | None = None
+    """Comparison of the sensors; None: not compared."""
+
+    @property
+    def deviations(self) -> dict[str, Deviation]:
+        """All deviations: ``stepwise``, ``open loop``, or the name of a stream."""
+        found = {name: one for name, one in (("stepwise", self.stepwise), ("open loop", self.open_loop)) if one}
+        return found | {one.field: one for one in (self.sensors.deviations if self.sensors else ())}
 
     @property
     def ok(self) -> bool:
-        """Whether both replays are equal bit for bit."""
-        return self.stepwise is None and self.open_loop is None
+        """Whether everything that was compared is equal bit for bit."""
+        return not self.deviations
 
 
 @dataclass(frozen=True)
@@ -93,7 +84,7 @@ class ReplayReport:
 
     @property
     def ok(self) -> bool:
-        """Whether all episodes are equal bit for bit."""
+        """Whether everything that was compared is equal bit for bit."""
         return all(episode.ok for episode in self.episodes)
 
     def __bool__(self) -> bool:
@@ -102,9 +93,22 @@ class ReplayReport:
     def __repr__(self) -> str:
         equal, steps = sum(e.ok for e in self.episodes), sum(e.steps for e in self.episodes)
         lines = [f"{equal} of {len(self.episodes)} episodes ({steps} steps) replay equal bit for bit"]
+        checks = [e.sensors for e in self.episodes if e.sensors]
+        if checks:
+            streams = {name for check in checks for name in (*check.equal, *(found.field for found in check.deviations))}
+            lines.append(f"{len(streams)} streams were computed from the states and compared")
+            reasons: dict[str, set[str]] = {}
+            for check in checks:
+                for name, reason in check.not_computed.items():
+                    reasons.setdefault(reason, set()).add(name)
+            lines += [f"not computed: {', '.join(sorted(names))}: {reason}" for reason, names in sorted(reasons.items())]
         for e in self.episodes:
-            lines += [f"  episode {e.episode}, {how}: {d}" for how, d in (("stepwise", e.stepwise), ("open loop", e.open_loop)) if d]
+            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()]
         return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as JSON objects."""
+        return {"ok": self.ok, "episodes": [asdict(episode) | {"ok": episode.ok} for episode in self.episodes]}
 
 
 def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, i: int, inside: int) -> str:
@@ -170,14 +174,43 @@ def check_episode(episode: Episode) -> EpisodeCheck:
 
 
 @checked
-def check_replay(root: str | Path | Dataset, *, episodes: Sequence[int] | None = None, progress: bool | None = None) -> ReplayReport:
-    """Replays episodes in plain MuJoCo, stepwise from each recorded state and open loop from the first one, and compares all states bit
-    for bit with the recorded ones. The report names the first deviation of each by step, part of the state, and joint, body or actuator.
+def check_replay(
+    root: str | Path | Dataset,
+    *,
+    actions: bool = True,
+    states: bool = False,
+    episodes: Sequence[int] | None = None,
+    worlds: int = 4,
+    threads: int = 0,
+    progress: bool | Callable[[int, int], None] | None = None,
+) -> ReplayReport:
+    """Replays recorded episodes and compares everything bit for bit with the recording.
+
+    The report names the first deviation of each kind by step, part of the state or stream, and joint, body or index.
 
     Args:
         root: Folder of a recording, or a :class:`Dataset`.
+        actions: Simulate in plain MuJoCo with the recorded controls, stepwise from each recorded state and open loop from the first one,
+            and compare the states.
+        states: Build the recording's task again, repeat each step from the recorded state, and compare every stream, rewards and success.
+            Depth is compared bit for bit, rgb by its video, because the encoder makes equal files of equal images. Streams of the policy,
+            and others that cannot be computed, are listed with the reason.
         episodes: Positions of episodes in the recording; by default all.
-        progress: Show the progress on stderr; by default where it is a terminal or a notebook.
+        worlds: Number of episodes whose sensors are computed in parallel.
+        threads: Number of threads that compute sensors; 0: one per available CPU.
+        progress: Show the progress on stderr, or a function that is called with the number of checks done and of all; by default
+            shown where stderr is a terminal or a notebook.
     """
     chosen = _dataset(root, episodes).episodes
-    return ReplayReport([check_episode(episode) for episode in tracked(chosen, len(chosen), "episodes", enabled=progress)])
+    checks: dict[int, EpisodeCheck] = {}
+    report, done, total = counter("checks", progress), 0, len(chosen) * (actions + states)
+    for episode in chosen if actions else ():
+        checks[episode.index] = check_episode(episode)
+        done += 1
+        report(done, total)
+    for episode, sensors in check_sensors(chosen, worlds=worlds, threads=threads) if states else ():
+        made = checks.get(episode.index) or EpisodeCheck(episode.index, episode.length - 1)
+        checks[episode.index] = replace(made, sensors=sensors)
+        done += 1
+        report(done, total)
+    return ReplayReport([checks[index] for index in sorted(checks)])

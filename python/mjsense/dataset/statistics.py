@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+LEVELS = np.arange(256) / 255
 
 
 def of_rows(rows: np.ndarray) -> dict[str, np.ndarray]:
@@ -41,15 +42,14 @@ def of_images(frames: Iterable[np.ndarray]) -> dict[str, np.ndarray]:
     return of_histograms(*histograms(frames))
 
 
-def of_histograms(counts: np.ndarray, images: int) -> dict[str, np.ndarray]:
-    """The same of the result of :func:`histograms`, or of the sums of several."""
-    levels = np.arange(256) / 255
+def of_histograms(counts: np.ndarray, images: int, levels: np.ndarray = LEVELS) -> dict[str, np.ndarray]:
+    """The same of the result of :func:`histograms`, or of the sums of several. ``levels`` are the values of the bins."""
     below = np.cumsum(counts, 1)
     total = below[:, -1]
     mean = counts @ levels / total
 
     def ranked(rank: np.ndarray) -> np.ndarray:  # the values at these positions of the sorted pixels of each channel
-        return levels[[np.searchsorted(below[c], rank[c], "right") for c in range(3)]]
+        return levels[[np.searchsorted(below[c], rank[c], "right") for c in range(len(counts))]]
 
     result = {"min": ranked(np.zeros(3)), "max": ranked(total - 1), "mean": mean}
     result["std"] = np.sqrt(np.maximum(0, counts @ levels**2 / total - mean**2))
@@ -57,7 +57,7 @@ def of_histograms(counts: np.ndarray, images: int) -> dict[str, np.ndarray]:
         at = q * (total - 1)
         low, high = ranked(np.floor(at)), ranked(np.ceil(at))
         result[name] = low + (high - low) * (at - np.floor(at))
-    return {name: value.reshape(3, 1, 1) for name, value in result.items()} | {"count": np.array([images], np.int64)}
+    return {name: value.reshape(-1, 1, 1) for name, value in result.items()} | {"count": np.array([images], np.int64)}
 
 
 def of_depth(frames: Iterable[np.ndarray]) -> dict[str, np.ndarray]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.dataset import Episode, statistics
+from mjsense.export import lerobot_depth
 from mjsense.export.frame_statistics import frame_histograms
 from mjsense.export.mapping import Feature, Mapping, Source
 from mjsense.export.output import needs, new_output
@@ -71,6 +73,10 @@ def image_key(camera: str) -> str:
     return f"observation.images.{camera}"
 
 
+def is_depth(source: Source, camera: str) -> bool:
+    return len(source.video(source.episodes[0], camera).shape) == 3
+
+
 def exported(source: Source) -> list[Feature]:
     """The features that become columns. LeRobot has ``next.done`` instead of ``terminated`` and ``truncated``."""
     return [feature for name, feature in source.features.items() if name not in ("terminated", "truncated")]
@@ -84,9 +90,10 @@ def features_of(source: Source, codec: dict[str, Any]) -> dict[str, Any]:
     found["next.done"] = {"dtype": "bool", "shape": [1], "names": ["done"]}
     for camera in source.cameras:
         height, width = _stored_size(source.video(source.episodes[0], camera).shape)
-        info = {"video.height": height, "video.width": width, "video.fps": number(source.fps), "video.channels": 3,
-                "has_audio": False, "is_depth_map": False, **codec}  # fmt: skip
-        found[image_key(camera)] = {"dtype": "video", "shape": [height, width, 3], "names": ["height", "width", "channels"], "info": info}
+        special = lerobot_depth.INFO if is_depth(source, camera) else {"is_depth_map": False, "video.channels": 3, **codec}
+        info = {"video.height": height, "video.width": width, "video.fps": number(source.fps), "has_audio": False, **special}
+        shape = [height, width, info["video.channels"]]
+        found[image_key(camera)] = {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": info}
     found["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
     for name in ("frame_index", "episode_index", "index", "task_index"):
         found[name] = {"dtype": "int64", "shape": [1], "names": None}
@@ -145,27 +152,28 @@ def codec_of(path: Path) -> dict[str, Any]:
 class Statistics:
     """Statistics of all columns and cameras, of each episode and of all of them together."""
 
-    def __init__(self, source: Source, frames: int) -> None:
-        self._source, self._frames = source, frames
+    def __init__(self) -> None:
         self._columns: dict[str, list[np.ndarray]] = {}
         self._histograms: dict[str, tuple[np.ndarray, int]] = {}
 
-    def add(self, episode: Episode, columns: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
-        """The statistics of an episode."""
-        result = {}
+    def add(self, columns: dict[str, np.ndarray], histograms: dict[str, tuple[np.ndarray, int]]) -> dict[str, dict[str, np.ndarray]]:
+        """The statistics of an episode with these columns and histograms of images."""
         for name, values in columns.items():
             self._columns.setdefault(name, []).append(values)
-            result[name] = statistics.of_rows(values)
-        for camera in self._source.cameras:
-            counts, images = frame_histograms(self._source.video(episode, camera).path, episode.length - 1, self._frames)
-            before = self._histograms.get(camera, (0, 0))
-            self._histograms[camera] = before[0] + counts, before[1] + images
-            result[image_key(camera)] = statistics.of_histograms(counts, images)
-        return result
+        for name, (counts, images) in histograms.items():
+            before = self._histograms.get(name, (0, 0))
+            self._histograms[name] = before[0] + counts, before[1] + images
+        return _statistics_of(columns, histograms)
 
     def all(self) -> dict[str, dict[str, np.ndarray]]:
-        result = {name: statistics.of_rows(np.concatenate(parts)) for name, parts in self._columns.items()}
-        return result | {image_key(camera): statistics.of_histograms(*found) for camera, found in self._histograms.items()}
+        return _statistics_of({name: np.concatenate(parts) for name, parts in self._columns.items()}, self._histograms)
+
+
+def _statistics_of(columns: dict[str, np.ndarray], histograms: dict[str, tuple[np.ndarray, int]]) -> dict[str, dict[str, np.ndarray]]:
+    result = {name: statistics.of_rows(values) for name, values in columns.items()}
+    for name, (counts, images) in histograms.items():
+        result[name] = statistics.of_histograms(counts, images, statistics.LEVELS if len(counts) == 3 else lerobot_depth.LEVELS)
+    return result
 
 
 class _Tables:
@@ -242,7 +250,7 @@ class Writer:
         self._source, self._path = source, path
         self._data, self._episodes = _Tables(path / "data"), _Tables(path / "meta/episodes")
         self._videos = {camera: _Videos(path / "videos" / image_key(camera), source.fps) for camera in source.cameras}
-        self._statistics = Statistics(source, statistics_frames)
+        self._statistics, self._statistics_frames = Statistics(), statistics_frames
         self._count = self._frames = 0
         self._codec: dict[str, Any] = {}
 
@@ -254,19 +262,36 @@ class Writer:
         entry |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + length}
         entry |= {f"data/{name}": value for name, value in self._data.place.items()}
         self._data.add(table_of(columns))
+        histograms: dict[str, tuple[np.ndarray, int]] = {}
         for camera, videos in self._videos.items():
-            path = self._source.video(episode, camera).path
-            self._codec = self._codec or codec_of(path)
-            place, first = videos.add(path, length)
-            prefix = f"videos/{image_key(camera)}/"
-            entry |= {prefix + name: value for name, value in place.items()}
-            entry |= {prefix + "from_timestamp": first, prefix + "to_timestamp": first + length / float(self._source.fps)}
-        for name, found in self._statistics.add(episode, columns).items():
+            key = image_key(camera)
+            if is_depth(self._source, camera):
+                place, first, histograms[key] = self._add_depth(episode, camera, videos)
+            else:
+                path = self._source.video(episode, camera).path
+                self._codec = self._codec or codec_of(path)
+                place, first = videos.add(path, length)
+                histograms[key] = frame_histograms(path, length, self._statistics_frames)
+            entry |= {f"videos/{key}/{name}": value for name, value in place.items()}
+            entry |= {f"videos/{key}/from_timestamp": first, f"videos/{key}/to_timestamp": first + length / float(self._source.fps)}
+        for name, found in self._statistics.add(columns, histograms).items():
             entry |= {f"stats/{name}/{key}": value for key, value in lists(found).items()}
         entry |= {f"meta/episodes/{name}": value for name, value in self._episodes.place.items()}
         self._episodes.add(pa.Table.from_pylist([entry]))
         self._count += 1
         self._frames += length
+
+    def _add_depth(self, episode: Episode, camera: str, videos: _Videos) -> tuple[dict[str, int], float, tuple[np.ndarray, int]]:
+        """Encodes a depth video as LeRobot expects it, and copies the exact one to ``extras``."""
+        video = self._source.video(episode, camera)
+        exact = self._path / f"extras/depth/{camera}/episode_{self._count:06d}{video.path.suffix}"
+        exact.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(video.path, exact)
+        encoded = self._path / "depth.mp4"
+        histogram = lerobot_depth.encode_depth(video, encoded, self._source.fps, episode.length - 1)
+        place, first = videos.add(encoded, episode.length - 1)
+        encoded.unlink()
+        return place, first, histogram
 
     def close(self) -> None:
         self._data.flush()
@@ -301,5 +326,6 @@ def _dtype(dtype: np.dtype[Any]) -> str:
 
 
 def _stored_size(shape: tuple[int, ...]) -> tuple[int, int]:
-    """Height and width of the stored frames: odd sizes have one more row or column."""
-    return shape[1] + shape[1] % 2, shape[2] + shape[2] % 2
+    """Height and width of the stored frames: colour images of odd sizes have one more row or column."""
+    _, height, width, *colour = shape
+    return (height + height % 2, width + width % 2) if colour else (height, width)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsense._arguments import checked
+from mjsense.export.frame_statistics import frame_histograms
 from mjsense.export.lerobot import (
     FILES_PER_CHUNK,
     Statistics,
@@ -18,6 +19,7 @@ from mjsense.export.lerobot import (
     exported,
     features_of,
     image_key,
+    is_depth,
     key_of,
     lists,
     number,
@@ -57,27 +59,32 @@ def export_lerobot21(
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success)
+    if depth := [camera for camera in source.cameras if is_depth(source, camera)]:
+        raise ValueError(f"LeRobot v2.1 has no depth images; leave '{depth[0]}' out of the map, or export to LeRobot v3.0")
     with new_output(out) as path:
-        _write(source, path, Statistics(source, statistics_frames), progress)
+        _write(source, path, statistics_frames, progress)
     return Path(out)
 
 
-def _write(source: Source, path: Path, statistics: Statistics, progress: Callable[[int, int], None] | None) -> None:
+def _write(source: Source, path: Path, statistics_frames: int, progress: Callable[[int, int], None] | None) -> None:
     entries: list[dict[str, Any]] = []
     found: list[dict[str, Any]] = []
     codec: dict[str, Any] = {}
+    statistics = Statistics()
     first = 0
     for position, episode in enumerate(source.episodes):
         place = {"episode_chunk": position // FILES_PER_CHUNK, "episode_index": position}
         columns = columns_of(source, episode, position, first)
         file = _made(path / _DATA.format(**place))
         needs("pyarrow.parquet").write_table(table_of(columns), file)
+        histograms = {}
         for camera in source.cameras:
             video = source.video(episode, camera).path
             codec = codec or codec_of(video)
+            histograms[image_key(camera)] = frame_histograms(video, episode.length - 1, statistics_frames)
             shutil.copyfile(video, _made(path / _VIDEO.format(video_key=image_key(camera), **place)))
         entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1})
-        stats = {name: lists(value) for name, value in statistics.add(episode, columns).items()}
+        stats = {name: lists(value) for name, value in statistics.add(columns, histograms).items()}
         found.append({"episode_index": position, "stats": stats})
         first += episode.length - 1
         if progress:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field
@@ -30,8 +29,8 @@ class Mapping:
 
     state: tuple[str, ...] = ("obs/agent/qpos",)
     """Streams of the robot's state."""
-    action: tuple[str, ...] = ("actions/joint_pos",)
-    """Streams of the action."""
+    action: tuple[str, ...] | None = None
+    """Streams of the action; None: ``actions/joint_pos``, and ``actions/commanded_action`` of move groups without joint targets."""
     cameras: dict[str, str] | None = None
     """Cameras by exported name; None: all colour cameras with their own names."""
     features: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -49,6 +48,8 @@ class Mapping:
         if source is None:
             return Mapping()
         if isinstance(source, (str, Path)):
+            import tomllib
+
             try:
                 table, about = tomllib.loads(Path(source).read_text()), str(source)
             except tomllib.TOMLDecodeError as error:
@@ -129,7 +130,7 @@ class Source:
         self.robot: str = str(self.episodes[0].settings.get("robot", ""))
         """Name of the robot; empty if the recording does not state it."""
         known = dict(chosen.streams)
-        wanted = {"state": mapping.state, "action": mapping.action, **mapping.features, **_FLAGS}
+        wanted = {"state": mapping.state, "action": _default_action(known) if mapping.action is None else mapping.action, **mapping.features, **_FLAGS}
         self.features: dict[str, Feature] = {name: self._feature(name, streams, known) for name, streams in wanted.items()}
         """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features."""
         self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
@@ -198,6 +199,12 @@ class Source:
             columns.append(values.reshape(episode.length, size))
         rows = np.concatenate(columns, 1).astype(feature.dtype, copy=False)
         return rows[1:] if feature.of_step else rows
+
+
+def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:
+    joints, commands = "actions/joint_pos/", "actions/commanded_action/"
+    groups = [name[len(commands) :] for name in known if name.startswith(commands) and "/given/" not in name]
+    return "actions/joint_pos", *(commands + group for group in groups if joints + group not in known)
 
 
 def _measured(stream: str) -> str:

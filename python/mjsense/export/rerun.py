@@ -75,13 +75,15 @@ def _blueprint(source: Source, episode: Episode) -> Any:
     if poses:
         still = min(poses, key=lambda pose: float(np.abs(pose - pose[0]).max()))[0]
         target = still[:3, 3] + still[:3, 2]  # 1 m in front of the camera
-        x, y, z = still[:3, 3] - target
-        eye = rrb.EyeControls3D(position=target + [0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y, z + 0.3], look_target=target, eye_up=[0, 0, 1])
+        x, y, z = 1.6 * (still[:3, 3] - target)
+        eye = rrb.EyeControls3D(position=target + [0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y, z], look_target=target, eye_up=[0, 0, 1])
     else:
         eye = None
     cameras = [rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name) for name in source.cameras]
     curves = [rrb.TimeSeriesView(origin=f"features/{name}", name=name) for name in source.features]
-    left = rrb.Vertical(rrb.Spatial3DView(origin="world", name="scene", eye_controls=eye), rrb.TextDocumentView(origin="task", name="task"), row_shares=[9, 1])
+    shown = ["$origin/**", *(f"- $origin/cameras/{name}/depth" for name in source.cameras)]  # depth images would cover the scene with points
+    scene = rrb.Spatial3DView(origin="world", name="scene", contents=shown, eye_controls=eye)
+    left = rrb.Vertical(scene, rrb.TextDocumentView(origin="task", name="task"), row_shares=[9, 1])
     right = rrb.Vertical(*cameras, rrb.Tabs(*curves)) if cameras else rrb.Tabs(*curves)
     return rrb.Blueprint(rrb.Horizontal(left, right, column_shares=[3, 2]), rrb.TimePanel(timeline="time"))
 

@@ -15,37 +15,49 @@ View = tuple[np.ndarray, np.ndarray, float]
 
 # From the side and above, in the robot's directions: x forward, z up. m
 _AHEAD = np.array([0.2, 0.0, 0.0])  # from the middle of the robot to the point that is looked at
-_OFFSET = np.array([1.2, -1.3, 0.9])  # from there to the eye
+_OFFSET = np.array([1.0, -1.1, 0.75])  # from there to the eye, for a robot of 0.6 m around its middle
 _TURNS = np.radians([0, 90, -50, 140, 180, -120])  # about the target, if something is in the way
 _NEARER = (1.0, 0.7, 0.45)
+_MIN_SCALE, _MAX_SCALE = 0.5, 4.0
 _FOV = float(np.radians(45))
 
 
 def first_view(model: Any, xpos: np.ndarray, xmat: np.ndarray) -> View:
-    """From the side of the first robot of an episode, where no wall is in the way; in other models MuJoCo's free camera.
+    """From the side of the first robot of an episode, in other models of the largest mechanism, where no wall is in the way. Models
+    without joints are shown by MuJoCo's free camera.
 
     Args:
         xpos: Positions of the bodies. [m]
         xmat: Rotation matrices of the bodies.
     """
-    robot = [i for i in range(model.nbody) if model.body(i).name.startswith("robot_0/")]
+    robot = [i for i in range(model.nbody) if model.body(i).name.startswith("robot_0/")] or _largest_mechanism(model)
     if not robot:
         return free_camera(model)
     base = next((i for i in robot if model.body_geomnum[i] > 0), robot[0])  # mobile robots have bodies without geoms before it
     forward = xmat[base].reshape(3, 3)[:2, 0]
     yaw = float(np.arctan2(forward[1], forward[0]))
-    target = xpos[robot].mean(0) + _turned(_AHEAD, yaw)
+    middle = xpos[robot].mean(0)
+    size = float(np.linalg.norm(xpos[robot] - middle, axis=1).max())
+    target = middle + _turned(_AHEAD, yaw)
     centres, turns, halves = _boxes(model, xpos, xmat, set(robot), target)
     best, best_free = _OFFSET, -1.0
     for scale in _NEARER:
         for turn in _TURNS:
-            offset = scale * _turned(_OFFSET, yaw + turn)
+            offset = scale * min(max(0.4 + size, _MIN_SCALE), _MAX_SCALE) * _turned(_OFFSET, yaw + turn)
             free = _free(target, offset, centres, turns, halves)
             if free >= 1:
                 return target + offset, target, _FOV
             if free * scale > best_free:
                 best, best_free = 0.9 * free * offset, free * scale
     return target + best, target, _FOV
+
+
+def _largest_mechanism(model: Any) -> list[int]:
+    """The bodies of the kinematic tree with the most degrees of freedom."""
+    if model.nv == 0:
+        return []
+    roots, counts = np.unique(np.asarray(model.body_rootid)[model.dof_bodyid], return_counts=True)
+    return np.flatnonzero(np.asarray(model.body_rootid) == roots[counts.argmax()]).tolist()
 
 
 def _turned(point: np.ndarray, yaw: float) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-MAX_CURVES = 16
+MAX_CURVES = 32
 """Maximum number of components of a stream that is shown as curves."""
 COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f", "#bcbd22", "#17becf")
 """Colours of the components of a stream, in turn."""

@@ -25,15 +25,12 @@ class LiveViewer(Viewer):
             raise ValueError(f"world {world}: must be in [0, {source.num_worlds})")
         super().__init__(source.title, host, port)
         self._source, self._world = source, world
-        self._due = time.perf_counter()
         self._panels_due = 0.0
-        self._syncing = False
         gui = self._server.gui
         tabs = gui.add_tab_group()
         with tabs.add_tab("Play"):
             self._clock = gui.add_markdown("")
-            self._playing = gui.add_checkbox("Play", initial_value=False, hint="Step the worlds in real time.")
-            self._later(self._playing, self._start)
+            self._add_play(gui)
             self._later(gui.add_button("Step", hint="One control step."), self._step_once)
             self._speed = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
             self._later(self._speed, self._start)
@@ -83,11 +80,8 @@ class LiveViewer(Viewer):
         write(self._world, index, float(slider.value))
         self._show()
 
-    def _start(self) -> None:
-        self._due = time.perf_counter()
-
     def _step_once(self) -> None:
-        self._playing.value = False
+        self._set_playing(False)
         self._step()
         self._show()
 
@@ -118,7 +112,7 @@ class LiveViewer(Viewer):
         self._curves.append(self._source.time(self._world), lambda name: self._source.value(name, self._world))
 
     def _advance(self, now: float) -> bool:
-        if not self._playing.value:
+        if not self._playing:
             return False
         speed = self._speed.value
         period = 0.0 if speed == _SPEEDS[-1] else self._source.period / float(speed)
@@ -145,7 +139,7 @@ class LiveViewer(Viewer):
         if self._layer_used:
             self._draw()
         now = time.perf_counter()
-        if now < self._panels_due and self._playing.value:
+        if now < self._panels_due and self._playing:
             return
         self._panels_due = now + _PANELS
         self._clock.content = f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s"

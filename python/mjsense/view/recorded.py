@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,6 @@ class RecordingViewer(Viewer):
         self._model: Any = None
         self._data: Any = None
         self._shown = -1
-        self._due = time.perf_counter()
         gui = self._server.gui
         tabs = gui.add_tab_group()
         with tabs.add_tab("Episodes"):
@@ -55,11 +53,11 @@ class RecordingViewer(Viewer):
             self._text = gui.add_text("Task contains", "", hint="Only episodes whose instruction contains this text.")
             self._choice = gui.add_dropdown("Episode", ["0"])
             self._about = gui.add_markdown("")
-            self._playing = gui.add_checkbox("Play", initial_value=False)
+            self._add_play(gui)
             self._time = gui.add_slider("Step", min=0, max=1, step=1, initial_value=0)
             self._speed = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
             for handle, action in ((self._outcome, self._filter), (self._text, self._filter), (self._choice, self._choose),
-                                   (self._playing, self._start), (self._time, self._show), (self._speed, self._start)):  # fmt: skip
+                                   (self._time, self._show), (self._speed, self._start)):  # fmt: skip
                 self._later(handle, action)
         with tabs.add_tab("Show"):
             self._add_groups(gui)
@@ -139,12 +137,12 @@ class RecordingViewer(Viewer):
     # ----------------------------------------------------------------------------------------------------------- showing
 
     def _start(self) -> None:
-        if self._playing.value and self._time.value >= self._episode.length - 1:
+        if self._playing and self._time.value >= self._episode.length - 1:
             self._time.value = 0
-        self._due = time.perf_counter()
+        super()._start()
 
     def _advance(self, now: float) -> bool:
-        if not self._playing.value:
+        if not self._playing:
             self._show_pictures()
             return False
         period = 1 / (float(self._dataset.fps) * float(self._speed.value))
@@ -153,7 +151,7 @@ class RecordingViewer(Viewer):
             self._due += steps * period
             self.seek(int(self._time.value) + steps)
             if self._time.value >= self._episode.length - 1:
-                self._playing.value = False
+                self._set_playing(False)
         self._show_pictures()
         return True
 

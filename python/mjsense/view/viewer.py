@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._arguments import checked
 from mjsense.view.layer import ShapeLayer
 from mjsense.view.stage import Stage
 
@@ -64,8 +65,9 @@ def stop(server: Any) -> None:
         server.stop()
 
 
+@checked
 class Viewer:
-    """A web page that shows one world at a time. Base class of the viewers of live worlds and of recordings.
+    """A web page that shows one world at a time; created by :func:`mjsense.view`.
 
     All work is done in the thread that calls :meth:`update` or :meth:`run`: the browser's events wait until then.
     """
@@ -82,7 +84,8 @@ class Viewer:
         self._stage, self._layer = Stage(self._server), ShapeLayer(self._server)
         self._events: dict[int, Callable[[], None]] = {}
         self._lock = threading.Lock()
-        self._closed = False
+        self._closed = self._playing = False
+        self._start()
 
     def _later(self, handle: Any, action: Callable[[], None]) -> None:
         """Runs ``action`` in the viewer's thread after the user has changed or clicked a control; of several changes the last counts."""
@@ -98,6 +101,20 @@ class Viewer:
         boxes = [gui.add_checkbox(f"Geom group {k}", initial_value=k in self._stage.groups) for k in range(6)]
         for box in boxes:
             self._later(box, lambda: self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}))
+
+    def _add_play(self, gui: Any) -> None:
+        """Adds the button that starts and stops time."""
+        self._button = gui.add_button("Play", hint="Start or stop; the speed is below.")
+        self._later(self._button, lambda: self._set_playing(not self._playing))
+
+    def _set_playing(self, playing: bool) -> None:
+        self._playing = playing
+        self._button.label = "Pause" if playing else "Play"
+        self._start()
+
+    def _start(self) -> None:
+        """Counts time from now on."""
+        self._due = time.perf_counter()
 
     def _look(self, position: np.ndarray, target: np.ndarray, fov: float) -> None:
         camera = self._server.initial_camera

@@ -6,14 +6,20 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/system/os.h"
+#include "mjsense/hdf5/chunk_checks.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/molmospaces.h"
 
 namespace mjsense {
 namespace {
+
+constexpr std::string_view kVideos = "obs/sensor_data/";  // names of videos
 
 // Every dataset has these attributes; "" means that it has no unit or no frame.
 void describe(hid_t dataset, std::string_view unit, std::string_view frame,
@@ -56,7 +62,7 @@ void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& v
 void add_file_name(hid_t trajectory, const RecordingCfg& cfg, const VideoStream& video) {
   const hsize_t size = kFileNameBytes;
   const h5::Id space(H5Screate_simple(1, &size, nullptr), H5Sclose, "HDF5 space");
-  const std::string path = "obs/sensor_data/" + video.key;
+  const std::string path = std::string(kVideos) + video.key;
   const h5::Id dataset(H5Dcreate2(trajectory, path.c_str(), H5T_STD_U8LE, space,
                                   h5::link_properties(), h5::dataset_properties(), H5P_DEFAULT),
                        H5Dclose, path);
@@ -222,12 +228,56 @@ void EpisodeFile::write_array(const EpisodeArray& array) {
   h5::set_attribute(dataset, kChecksumAttribute, sum.text());
 }
 
+void EpisodeFile::carry_over(const EpisodeSource& source) {
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(source.file);
+  const h5::Id from = h5::open_group(file, source.trajectory);
+  h5::each_dataset(from, [&](const std::string& path) {
+    const auto is_inside = [&](std::string_view group) {
+      return path.starts_with(group) && (path.size() == group.size() || path[group.size()] == '/');
+    };
+    if (path == "obs_scene" || std::ranges::any_of(source.skip, is_inside)) return;
+    if (h5::exists(trajectory_, path)) return;
+    const h5::Id dataset = h5::open_dataset(from, path);
+    // The HDF5 library copies chunks that cannot be unpacked, and frees them twice.
+    h5::check_storage(dataset, path);
+    h5::check_chunks(dataset, path);
+    h5::check(
+        H5Ocopy(from, path.c_str(), trajectory_, path.c_str(), H5P_DEFAULT, h5::link_properties()),
+        fmt::format("cannot copy '{}' of '{}'", path, source.file.string()));
+    if (path.starts_with(kVideos)) carry_video(source.file.parent_path(), path);
+  });
+}
+
+void EpisodeFile::carry_video(const std::filesystem::path& folder, const std::string& path) {
+  std::string name = h5::read_bytes(trajectory_, path, kFileNameBytes);
+  name.resize(name.find_last_not_of('\0') + 1);
+  const Fd file = open_plain(folder, name);
+  std::string bytes(static_cast<std::size_t>(size_of(file)), '\0');
+  std::ifstream(os::path_of(file.get()), std::ios::binary)
+      .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  Checksum sum;
+  sum.add(bytes.data(), bytes.size());
+  const h5::Id dataset = h5::open_dataset(trajectory_, path);
+  const std::string stated = h5::text_attribute(dataset, kChecksumAttribute);
+  if (!stated.empty() && stated != sum.text())
+    throw RuntimeError(
+        fmt::format("'{}' is damaged: its checksum is wrong", (folder / name).string()));
+  const std::string copy =
+      path.substr(kVideos.size()) + std::filesystem::path(name).extension().string();
+  folder_->write(copy, bytes);
+  char padded[kFileNameBytes] = {};
+  std::memcpy(padded, copy.data(), std::min(copy.size(), kFileNameBytes));
+  h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded), path);
+}
+
 void EpisodeFile::finish(std::span<const VideoSum> videos) {
   const h5::H5Lock lock;
   for (const Dataset& dataset : datasets_)
     h5::write_text_attribute(dataset.crc, dataset.sum.text());
   for (std::size_t v = 0; v < videos.size(); ++v) {
-    const h5::Id dataset = h5::open_dataset(trajectory_, "obs/sensor_data/" + plan_.videos[v].key);
+    const h5::Id dataset =
+        h5::open_dataset(trajectory_, std::string(kVideos) + plan_.videos[v].key);
     h5::set_attribute(dataset, kChecksumAttribute, videos[v].crc);
     h5::set_attribute(dataset, kBytesAttribute, videos[v].bytes);
   }

@@ -40,6 +40,8 @@ class EpisodeFile {
   // `steps`: policy steps of the episode, which is one less than its observations.
   void write_scene(std::string_view obs_scene, std::string_view outcome, std::int64_t steps);
   void write_array(const EpisodeArray& array);
+  // Copies what this file does not have yet. Throws RuntimeError if the source cannot be read.
+  void carry_over(const EpisodeSource& source);
   // Checksums and sizes of the videos, in the order of the plan. finish() writes them and closes
   // the file; it throws if the disk reports an error.
   struct VideoSum {
@@ -59,6 +61,8 @@ class EpisodeFile {
   // Returns a chunk converted to text; valid until the next call.
   std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
                                          std::span<const std::uint8_t> kept);
+  // Copies the video that the dataset `path` names, and names the copy.
+  void carry_video(const std::filesystem::path& folder, const std::string& path);
   void add_dataset(std::string_view path, DType dtype, const Shape& row, std::int64_t chunk_rows);
 
   std::shared_ptr<const Folder> folder_;

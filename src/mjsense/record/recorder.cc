@@ -147,7 +147,12 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
   {
     const std::lock_guard lock(mutex);
     if (failure) std::rethrow_exception(failure);
-    check_begin(world, meta.episode);
+    if (worlds[world]) {
+      throw ValueError(
+          fmt::format("world {} is still recording episode {}: finish or discard it first", world,
+                      worlds[world]->meta.episode));
+    }
+    check_number(meta.episode);
     episode->folder = house->begin(meta.episode);
     worlds[world] = episode;
     ++unsettled;
@@ -163,12 +168,7 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
   wait_s += seconds_since(start);
 }
 
-void Recorder::Impl::check_begin(int world, std::int64_t number) const {
-  if (worlds[world]) {
-    throw ValueError(
-        fmt::format("world {} is still recording episode {}: finish or discard it first", world,
-                    worlds[world]->meta.episode));
-  }
+void Recorder::Impl::check_number(std::int64_t number) const {
   if (house->ended())
     throw ValueError(fmt::format("'{}' is complete: no more episodes", house->dir().string()));
   if (number < cfg.first_attempt) {
@@ -225,6 +225,29 @@ void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_v
   for (EncoderPool::Stream* stream : kept->videos) pool->close(stream);
   kept->videos.clear();
   leave(world, *kept);
+}
+
+void Recorder::Impl::carry_over(int world, EpisodeSource source) {
+  running(world, "carry data over");
+  rethrow();
+  Job job{Job::kCarry, worlds[world]};
+  job.source = std::move(source);
+  post(std::move(job));
+}
+
+void Recorder::Impl::skip(std::int64_t number, std::string_view why) {
+  const auto episode = std::make_shared<Episode>();
+  episode->meta.episode = number;
+  episode->outcome = Outcome::kDiscarded;
+  episode->why = why;
+  {
+    const std::lock_guard lock(mutex);
+    if (failure) std::rethrow_exception(failure);
+    check_number(number);
+    decisions.add(number, false);
+    ++unsettled;
+  }
+  post({Job::kSettle, episode});
 }
 
 void Recorder::Impl::give_up(int world, Outcome outcome, std::string_view why) {
@@ -292,6 +315,12 @@ void Recorder::append(int world, const StepRow& row) { impl_->append(world, row)
 void Recorder::finish_episode(int world, std::string_view obs_scene, std::string_view outcome,
                               std::vector<EpisodeArray> arrays) {
   impl_->finish(world, obs_scene, outcome, std::move(arrays));
+}
+void Recorder::carry_over(int world, EpisodeSource source) {
+  impl_->carry_over(world, std::move(source));
+}
+void Recorder::skip_episode(std::int64_t episode, std::string_view why) {
+  impl_->skip(episode, why);
 }
 void Recorder::discard_episode(int world, std::string_view why) {
   impl_->running(world, "discard an episode");

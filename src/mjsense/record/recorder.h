@@ -65,8 +65,12 @@ class Recorder {
   // cfg.archive.
   void finish_episode(int world, std::string_view obs_scene, std::string_view outcome = "",
                       std::vector<EpisodeArray> arrays = {});
+  // Adds the data of a recorded episode, before finish_episode().
+  void carry_over(int world, EpisodeSource source);
   // Marks the attempt as decided but not kept: a resumed recording does not repeat it.
   void discard_episode(int world, std::string_view why = "");
+  // The same for an attempt that was not begun.
+  void skip_episode(std::int64_t episode, std::string_view why);
   // Leaves the attempt undecided: a resumed recording repeats it.
   void abandon_episode(int world);
 

@@ -54,13 +54,14 @@ struct Recorder::Impl {
   using EpisodePtr = std::shared_ptr<Episode>;
 
   struct Job {
-    enum Kind { kOpen, kChunk, kClose, kSettle } kind;
+    enum Kind { kOpen, kChunk, kCarry, kClose, kSettle } kind;
     EpisodePtr episode;
     int stream = 0;
     std::int64_t rows = 0;
     Buffer chunk;
     std::string obs_scene, outcome;
     std::vector<EpisodeArray> arrays;
+    EpisodeSource source;
   };
 
   RecordingCfg cfg;
@@ -100,7 +101,7 @@ struct Recorder::Impl {
   Episode& running(int world, const char* action) const;
   void check_world(int world) const;
   void begin(int world, const EpisodeMeta& meta);
-  void check_begin(int world, std::int64_t number) const;
+  void check_number(std::int64_t number) const;
   void open_video(const EpisodePtr& episode, const VideoStream& video);
   void append(int world, const StepRow& row);
   // Throws if a text was truncated, because it is not valid JSON any more. Nothing of that step is
@@ -114,6 +115,8 @@ struct Recorder::Impl {
   void hand_over(const EpisodePtr& episode, int s);
   void finish(int world, std::string_view obs_scene, std::string_view outcome,
               std::vector<EpisodeArray> arrays);
+  void carry_over(int world, EpisodeSource source);
+  void skip(std::int64_t number, std::string_view why);
   void give_up(int world, Outcome outcome, std::string_view why);
   void leave(int world, const Episode& episode);
   void abort_videos(Episode& episode);

@@ -62,6 +62,9 @@ void Recorder::Impl::run(Job& job, bool failed) {
     case Job::kChunk:
       if (!failed && episode.file) episode.file->write_chunk(job.stream, job.rows, job.chunk);
       break;
+    case Job::kCarry:
+      if (!failed && episode.file) episode.file->carry_over(job.source);
+      break;
     case Job::kClose:
       if (!failed && episode.file && episode.outcome == Outcome::kKept) {
         episode.file->write_scene(job.obs_scene, job.outcome, episode.rows - 1);

@@ -137,6 +137,14 @@ struct EpisodeArray {
   std::vector<std::byte> values;
 };
 
+// A recorded episode whose data are carried over into a new one: every dataset of the trajectory that
+// the new episode does not have, with its attributes, and the videos that these datasets name.
+struct EpisodeSource {
+  std::filesystem::path file;
+  std::string trajectory;         // "traj_0"
+  std::vector<std::string> skip;  // datasets and groups that are left out: "obs/sensor_data"
+};
+
 // Data of a step in addition to the sensors' rows.
 struct StepRow {
   float reward = 0;

@@ -78,8 +78,13 @@ class FileVerifier {
     if (!sealed_ && H5Fget_eoa(file, &end) >= 0 && end < bytes_)
       error(recorded_.name, fmt::format("has {} bytes after its end", bytes_ - end));
     ours_ = h5::has_attribute(file, "recording");
-    if (ours_ && !parse_description(h5::text_attribute(file, "recording")).is_object())
-      error(recorded_.name, "has a description of the recording that cannot be read");
+    if (ours_) {
+      const Json description = parse_description(h5::text_attribute(file, "recording"));
+      if (!description.is_object())
+        error(recorded_.name, "has a description of the recording that cannot be read");
+      else if (const auto archive = description.find("model_archive"); archive != description.end())
+        out_["archive"] = *archive;
+    }
     const std::vector<std::string> names = trajectory_names(file);
     if (names.empty()) error(recorded_.name, "contains no trajectory");
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -268,6 +273,7 @@ class Verifier {
     listed_ = recorded_files(path);
     for (const RecordedFile& file : listed_) check_file(file);
     check_videos();
+    for (const auto& [folder, name] : archives_) check_archive(folder, name);
     for (const fs::path& house : recorded_houses(path)) {
       if (fs::is_directory(path)) check_leftovers(house);
     }
@@ -312,6 +318,8 @@ class Verifier {
   }
 
   void take(const RecordedFile& recorded, const Json& found) {
+    if (recorded.published && found.contains("archive"))
+      archives_.emplace(recorded.path.parent_path(), found.at("archive").get<std::string>());
     result_.episodes += found.at("episodes").get<int>();
     result_.steps += static_cast<int>(std::min<std::int64_t>(
         found.at("steps").get<std::int64_t>(), std::numeric_limits<int>::max() - result_.steps));
@@ -327,6 +335,21 @@ class Verifier {
       } else {
         error(video.context, fmt::format("'{}' is also the video of another episode", video.name));
       }
+    }
+  }
+
+  // The name of a model archive contains the checksum of its bytes: model_1a2b3c4d.zip.
+  void check_archive(const fs::path& folder, const std::string& name) {
+    const std::string context = folder.filename().string();
+    if (!is_plain_name(name))
+      return error(context,
+                   fmt::format("names a model archive '{}', which is not a plain file name", name));
+    try {
+      const std::string crc = checksum_of(open_plain(folder, name).get());
+      if (name != fmt::format("model_{}.zip", crc))
+        error(context, fmt::format("'{}' is damaged: its checksum is {}", name, crc));
+    } catch (const Error& e) {
+      error(context, fmt::format("the model archive, which replay needs: {}", e.what()));
     }
   }
 
@@ -441,6 +464,7 @@ class Verifier {
   std::vector<RecordedFile> listed_;
   std::vector<VideoCheck> videos_;
   std::set<fs::path> used_;
+  std::set<std::pair<fs::path, std::string>> archives_;  // folder and name
 };
 
 }  // namespace

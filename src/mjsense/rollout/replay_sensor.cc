@@ -31,6 +31,7 @@ ReplaySensor::ReplaySensor(Worlds& worlds, int ticks)
 
 void ReplaySensor::initialize(const SensorInit& init) {
   clear_fields();
+  played_.assign(init.num_worlds, {});
   const Shape row{mj_stateSize(init.model, mjSTATE_INTEGRATION)};
   state_ = &add_field("state", spec_of(row, "MuJoCo's state, in the order of mjSTATE_INTEGRATION."),
                       init.num_worlds);
@@ -75,16 +76,28 @@ void ReplaySensor::note_written(std::span<const int> worlds) {
   }
 }
 
-void ReplaySensor::note_tick(const World& world, int tick) {
-  if (!ctrl_ || tick >= ticks_) return;
+void ReplaySensor::play(int world, std::span<const double> ctrl, std::span<const double> mocap) {
+  played_[world] = {ctrl, mocap};
+}
+
+bool ReplaySensor::note_tick(const World& world, int tick) {
+  if (!ctrl_ || tick >= ticks_) return false;
   const mjModel* m = world.model;
+  const Played& played = played_[world.id];
+  if (!played.ctrl.empty()) std::copy_n(&played.ctrl[tick * m->nu], m->nu, world.data->ctrl);
+  for (int i = 0; i < m->nmocap && !played.mocap.empty(); ++i) {
+    const double* pose = &played.mocap[(tick * m->nmocap + i) * 7];
+    std::copy_n(pose, 3, world.data->mocap_pos + 3 * i);
+    std::copy_n(pose + 3, 4, world.data->mocap_quat + 4 * i);
+  }
   std::copy_n(world.data->ctrl, m->nu, ctrl_->data.row<double>(world.id).data() + tick * m->nu);
-  if (!mocap_) return;
+  if (!mocap_) return !played.ctrl.empty();
   double* to = mocap_->data.row<double>(world.id).data() + tick * m->nmocap * 7;
   for (int i = 0; i < m->nmocap; ++i, to += 7) {
     std::copy_n(world.data->mocap_pos + 3 * i, 3, to);
     std::copy_n(world.data->mocap_quat + 4 * i, 4, to + 3);
   }
+  return !played.ctrl.empty();
 }
 
 }  // namespace mjsense

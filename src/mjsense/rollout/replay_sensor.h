@@ -31,12 +31,21 @@ class ReplaySensor final : public Sensor {
 
   // Call before the physics step, after all controls are written.
   void note_written(std::span<const int> worlds);
-  // Call at control tick `tick` of a step, after the controllers.
-  void note_tick(const World& world, int tick);
+  // Call at control tick `tick` of a step, after the controllers. Returns whether controls were
+  // replaced (see play()).
+  bool note_tick(const World& world, int tick);
+
+  // From now on note_tick() replaces the controls and mocap poses of this world by recorded ones
+  // before it stores them. The rows must stay valid until the next call; empty rows replace nothing.
+  void play(int world, std::span<const double> ctrl, std::span<const double> mocap);
 
  private:
+  struct Played {
+    std::span<const double> ctrl, mocap;
+  };
   Worlds& worlds_;
   int ticks_;
+  std::vector<Played> played_;
   Field *state_ = nullptr, *written_ = nullptr, *ctrl_ = nullptr, *mocap_ = nullptr;
 };
 

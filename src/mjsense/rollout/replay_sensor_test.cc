@@ -173,6 +173,35 @@ TEST(Replay, ControllersThatRunSeveralTimesAStep) {
 
 TEST(Replay, ScenesWithMeshFiles) { expect_replays(cfg_of("nav_to_obj", "auto"), 10); }
 
+// Without a policy: what actions and controllers write is replaced.
+void expect_repeats(RolloutCfg cfg, int steps) {
+  Rollout played(cfg);
+  const Recorded recorded = play(played, steps);
+  cfg.policy = "";
+  Rollout repeated(cfg);
+  const int world = 0;
+  const std::int64_t episode = 1;
+  repeated.start({&world, 1}, {&episode, 1});
+  EXPECT_EQ(row_of(*repeated.replay_sensor(), "state"), recorded.state[0]);
+  for (int t = 1; t <= steps; ++t) {
+    const Rollout::RecordedStep step{0, recorded.written[t], recorded.ctrl[t], recorded.mocap[t]};
+    repeated.repeat({&step, 1});
+    ASSERT_EQ(row_of(*repeated.replay_sensor(), "state"), recorded.state[t]) << t;
+  }
+  EXPECT_EQ(repeated.evaluation(0).reward, played.evaluation(0).reward);
+}
+
+TEST(Replay, StepsAreRepeated) {
+  RolloutCfg cfg = cfg_of("pick", "franka");
+  cfg.perturb = 1;
+  expect_repeats(cfg, 40);
+  expect_repeats(cfg_of("pick", "floating_rum"), 25);
+}
+
+TEST(Replay, StepsWithSeveralControlTicksAreRepeated) {
+  expect_repeats(cfg_of("door_opening", "rby1"), 15);
+}
+
 TEST(Replay, OnlyInputsAreWritten) {
   Rollout rollout(cfg_of("pick", "franka"));
   const Recorded recorded = play(rollout, 12);

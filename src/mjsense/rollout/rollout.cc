@@ -147,8 +147,7 @@ void Rollout::make() {
   if (controls) {
     simulation_->set_control(task_->control_decimation(), [this](const World& world, int index) {
       const mjtStage valid = index == 0 ? mjSTAGE_ACC : task_->robot().control(world, index);
-      if (replay_) replay_->note_tick(world, index);
-      return valid;
+      return replay_ && replay_->note_tick(world, index) ? mjSTAGE_NONE : valid;
     });
   }
   if (policy_) task_->register_policy(*policy_);

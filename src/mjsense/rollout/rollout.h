@@ -225,6 +225,14 @@ class Rollout {
   Action& action(int world) { return actions_[world]; }
   // One control step. Updates the suite and the evaluations of the active worlds.
   void step();
+  // Repeats a recorded control step of each of these worlds: what actions and controllers write is
+  // replaced by what was written when the step was recorded. Needs cfg.replay_sensor.
+  struct RecordedStep {
+    int world;
+    std::span<const double> written;      // row of replay/written; NaN: the current value
+    std::span<const double> ctrl, mocap;  // rows of replay/ctrl and replay/mocap, or empty
+  };
+  void repeat(std::span<const RecordedStep> steps);
   // Control steps with these actions [steps, B]; sensors are computed only after the last one. A
   // world stops early at the end of its episode or, with `stop_on_success`, at its first success.
   // Its evaluation is that of its last step, with the sum of all rewards. Throws ValueError unless
@@ -247,7 +255,8 @@ class Rollout {
   void make();
   std::vector<std::shared_ptr<Sensor>> robot_sensors();
   std::span<const int> active_worlds();
-  void move(std::span<const int> worlds, bool answers);
+  void move(std::span<const int> worlds, bool answers, std::span<const RecordedStep> recorded = {});
+  void write_recorded(const RecordedStep& step, std::span<const double> before);
   void evaluate(std::span<const int> worlds);
   void finish_rows();
   bool guard_rows(const std::function<void()>& body);

@@ -22,6 +22,17 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+std::span<double> state_row(Simulation& simulation, int world) {
+  const ArrayView rows = simulation.worlds().state();
+  return {reinterpret_cast<double*>(rows.data + world * rows.strides[0]),
+          static_cast<std::size_t>(rows.shape[1])};
+}
+
+std::vector<double> state_of(Simulation& simulation, int world) {
+  const std::span<const double> row = state_row(simulation, world);
+  return {row.begin(), row.end()};
+}
+
 }  // namespace
 
 // Runs a function on the fresh data of some worlds, in parallel.
@@ -153,9 +164,13 @@ void Rollout::act() {
 }
 
 // Applies the actions of these worlds and advances them. `answers`: the actions answer the current
-// observation (false for the later steps of a chunk).
-void Rollout::move(std::span<const int> worlds, bool answers) {
+// observation (false for the later steps of a chunk). `recorded`: steps that replace what was
+// written.
+void Rollout::move(std::span<const int> worlds, bool answers,
+                   std::span<const RecordedStep> recorded) {
   auto begun = Clock::now();
+  std::vector<std::vector<double>> before;
+  for (const RecordedStep& step : recorded) before.push_back(state_of(*simulation_, step.world));
   if (answers) {
     for_each(worlds, [this](const World& world) {
       log_->remember(world, task_->robot());
@@ -167,6 +182,7 @@ void Rollout::move(std::span<const int> worlds, bool answers) {
     });
   }
   task_->advance();
+  for (std::size_t k = 0; k < recorded.size(); ++k) write_recorded(recorded[k], before[k]);
   if (replay_) replay_->note_written(worlds);
   times_.policy += since(begun);
 
@@ -180,6 +196,33 @@ void Rollout::move(std::span<const int> worlds, bool answers) {
   times_.sensing += spent_rows;
   times_.rendering += spent_cast;
   times_.physics += since(begun) - spent_rows - spent_cast;
+}
+
+void Rollout::write_recorded(const RecordedStep& step, std::span<const double> before) {
+  const std::span<double> row = state_row(*simulation_, step.world);
+  for (std::size_t i = 0; i < row.size(); ++i)
+    row[i] = std::isnan(step.written[i]) ? before[i] : step.written[i];
+  replay_->play(step.world, step.ctrl, step.mocap);
+}
+
+void Rollout::repeat(std::span<const RecordedStep> steps) {
+  if (!replay_) throw ValueError("repeat: this rollout has no replay sensor");
+  moving_.clear();
+  for (const RecordedStep& step : steps) {
+    if (active_[step.world] && faults_[step.world].empty()) moving_.push_back(step.world);
+  }
+  std::ranges::sort(moving_);
+  std::vector<RecordedStep> recorded(steps.begin(), steps.end());
+  std::erase_if(recorded, [this](const RecordedStep& step) {
+    return std::ranges::find(moving_, step.world) == moving_.end();
+  });
+  if (recorded.empty()) return;
+  move(moving_, true, recorded);
+  for (const RecordedStep& step : recorded) replay_->play(step.world, {}, {});
+  sense();
+  std::erase_if(moving_, [this](int w) { return !faults_[w].empty(); });
+  evaluate(moving_);
+  finish_rows();
 }
 
 void Rollout::step() {

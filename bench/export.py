@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Export to LeRobot, and reading: mjs.Dataset compared with LeRobot's loader on the same episodes.
+
+    python bench/export.py [--width 640 --height 368] [--episodes 8] [--keep FOLDER] [--lerobot PYTHON]
+
+A sample contains the state, the action and one frame of each of two cameras. Every case starts with empty caches. The two loaders run in
+turn, each in a process of its own; LeRobot's environment is the one that tests/python/test_lerobot.py makes. Rates are per second of wall
+clock, and in parentheses per second of CPU time, which other programs of the machine disturb less.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import mjsense as mjs
+
+ROOT = Path(__file__).parents[1]
+STREAMS = ["obs/agent/qpos", "actions/joint_pos", "obs/sensor_data/*"]
+
+
+def read(root: Path, order: str, seconds: float, cache_mb: float) -> None:
+    """Prints samples per second of mjs.Dataset."""
+    dataset = mjs.Dataset(root, streams=STREAMS, cache_mb=cache_mb)
+    dataset[0]  # opens the files
+    indices = np.arange(len(dataset)) if order == "sequential" else np.random.default_rng(0).permutation(len(dataset))
+    begun, cpu = time.perf_counter(), time.process_time()
+    for n, i in enumerate(indices, 1):
+        dataset[int(i)]
+        if time.perf_counter() - begun > seconds:
+            break
+    print(n / (time.perf_counter() - begun), n / (time.process_time() - cpu))
+
+
+def export(root: Path, out: Path, frames: int) -> None:
+    shutil.rmtree(out, ignore_errors=True)
+    mjs.export_lerobot(root, out / "warm", episodes=[0])  # imports the libraries
+    shutil.rmtree(out)
+    begun, cpu = time.perf_counter(), time.process_time()
+    mjs.export_lerobot(root, out, statistics_frames=frames)
+    wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
+    dataset = mjs.Dataset(root)
+    cameras = sum(stream.kind == "video" and len(stream.shape) == 3 for stream in dataset.streams.values())
+    images = len(dataset) * cameras
+    about = "all frames" if frames == 0 else f"{frames} frame per video"
+    print(f"export, statistics of {about:20} {images / wall:9.0f} ({images / cpu:.0f}) frames/s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--width", type=int, default=640)
+    parser.add_argument("--height", type=int, default=368)
+    parser.add_argument("--episodes", type=int, default=8)
+    parser.add_argument("--seconds", type=float, default=10, help="maximum time of one case")
+    parser.add_argument("--cache-mb", type=float, default=512, help="cache of mjs.Dataset; LeRobot has none")
+    parser.add_argument("--keep", help="folder of the recording, which is used again if it exists")
+    parser.add_argument("--lerobot", default=str(ROOT / "build/lerobot_0.4.4/bin/python"), help="Python of LeRobot's environment")
+    parser.add_argument("--read", nargs=2, help=argparse.SUPPRESS)  # a process of one case
+    args = parser.parse_args()
+    if args.read:
+        read(Path(args.read[0]), args.read[1], args.seconds, args.cache_mb)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        root, out = Path(args.keep or folder, "recording"), Path(args.keep or folder, "lerobot")
+        if not list(root.glob("house_*/*.h5")):
+            mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, worlds=2)
+        for frames in (1, 0):
+            export(root, out, frames)
+        loaders = {
+            "mjs.Dataset": [sys.executable, __file__, "--seconds", str(args.seconds), "--cache-mb", str(args.cache_mb), "--read", str(root)],
+            "LeRobot": [args.lerobot, str(ROOT / "bench/peers/lerobot_loader.py"), str(out)],
+        }
+        for order in ("sequential", "random"):
+            for name, command in loaders.items():
+                words = [*command, order, *([str(args.seconds)] if name == "LeRobot" else [])]
+                done = subprocess.run(words, capture_output=True, text=True, check=True)
+                wall, cpu = map(float, done.stdout.split()[-2:])
+                print(f"{order:11} {name:12} {wall:9.1f} ({cpu:.1f}) samples/s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjsense play``"""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLES = [
+    ("mjsense play pick", "Drive the Franka until an object is lifted, and record it into demonstrations/."),
+    ("mjsense play pick_and_place --robot i2rt_yam --episodes 10 --out mine", "Record ten demonstrations with another robot."),
+    ("mjsense play open --device spacemouse", "Drive with a SpaceMouse."),
+]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("task", help="Name of the task.")
+    parser.add_argument("--robot", help="Name or .toml of the robot; by default the task's.")
+    parser.add_argument("--scene", default="", help="Name or file of the scene; by default the task's.")
+    parser.add_argument("--out", default="demonstrations", help="Output directory; by default demonstrations.")
+    parser.add_argument("--episodes", type=int, default=1, metavar="N", help="Number of successful episodes to keep.")
+    parser.add_argument("--append", action="store_true", help="Add episodes to a completed recording.")
+    parser.add_argument("--resume", action="store_true", help="Continue an interrupted recording.")
+    parser.add_argument("--device", choices=("keyboard", "spacemouse"), default="keyboard", help="What drives the tool beside the page's handle.")
+    parser.add_argument("--arm", default="arm", help="Move group that is driven; by default arm.")
+    parser.add_argument("--gripper", default="gripper", help="Move group that is opened and closed; by default gripper.")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="Random seed of the starts.")
+    parser.add_argument("--host", default="127.0.0.1", help="Address to listen at; by default 127.0.0.1, this computer only.")
+    parser.add_argument("--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one.")
+    parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from mjsense.commands import FAILED
+    from mjsense.teleoperation import play
+
+    given = {name: getattr(arguments, name) for name in ("out", "scene", "episodes", "append", "resume", "device", "arm", "gripper", "seed", "host", "port")}
+    summary = play(arguments.task, arguments.robot, open_browser=not arguments.no_open, **given)
+    print(f"{summary.kept} of {summary.wanted} episodes are in {summary.path}.")
+    return 0 if summary.enough else FAILED

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The cameras of a rendering: those of the recording, added ones, and those of a camera system."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _core, _mujoco
+from mjsense.configs import CameraSensorCfg
+from mjsense.core_sensors import CameraImageSensor, CameraParameterSensor
+from mjsense.dataset.files import open_h5, text_of
+from mjsense.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from mjsense.dataset.episode import Episode
+    from mjsense.dataset.episode_worlds import EpisodeWorlds
+
+ROBOT_PREFIX = "robot_0/"
+_DEFAULT_SIZE = (640, 480)
+
+
+@dataclass(frozen=True)
+class RenderCamera:
+    """A camera to render. If ``camera`` is empty, it is added to the model at ``pos``, ``quat`` in the frame of ``body``."""
+
+    name: str
+    width: int
+    height: int
+    depth: bool = False
+    segmentation: bool = False
+    camera: str = ""
+    body: str = ""
+    pos: tuple[float, ...] = ()
+    quat: tuple[float, ...] = ()
+    fovy: float | None = None
+
+    @property
+    def fields(self) -> list[str]:
+        return ["rgb", *(["depth"] if self.depth else []), *(["segmentation"] if self.segmentation else [])]
+
+    def scene_sensor(self, shadows: bool, samples: int) -> CameraSensorCfg:
+        about: dict[str, Any] = dict(
+            name=self.name, width=self.width, height=self.height, data_types=tuple(self.fields), use_shadows=shadows, samples=samples
+        )
+        if self.camera:
+            return CameraSensorCfg(camera_name=self.camera, **about)
+        return CameraSensorCfg(parent_body=self.body or None, pos=self.pos, quat=self.quat, fovy=self.fovy, **about)
+
+    def streams(self) -> list[Any]:
+        """The sensors that a recording has of a camera, in its order."""
+        parameters = CameraParameterSensor(self.camera or self.name, self.width, self.height, f"sensor_param_{self.name}")
+        return [parameters, *(CameraImageSensor(self.name, field) for field in self.fields)]
+
+    def settings(self) -> dict[str, Any]:
+        """Its entry in ``cameras`` of the recording's settings."""
+        return {key: value for key, value in asdict(self).items() if key not in ("segmentation", "camera", "body", "pos", "quat", "fovy") or value}
+
+
+def recorded_cameras(episode: Episode, names: Sequence[str] | None) -> list[RenderCamera]:
+    """Cameras of the recording, all or some, as they were recorded."""
+    entries = {entry["name"]: entry for entry in episode.settings.get("cameras", [])}
+    chosen = list(entries) if names is None else list(names)
+    cameras = []
+    with open_h5(episode.path) as file:
+        for name in chosen:
+            if name not in entries:
+                raise UnknownNameError(_core.unknown_name(str(episode.path), "camera", name, list(entries)))
+            entry = entries[name]
+            if "pos" not in entry and "camera" not in entry:
+                frame = text_of(file[episode.trajectory][f"obs/sensor_data/{name}"].attrs["frame"])
+                entry = {**entry, "camera": frame.removeprefix("camera ")}
+            about: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+            cameras.append(RenderCamera(**about))
+    return cameras
+
+
+_KEYS = ("pos", "lookat", "quat", "body", "up", "fovy", "width", "height", "depth", "segmentation")
+
+
+def _vector(name: str, key: str, value: Any, size: int) -> np.ndarray:
+    try:
+        vector = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        vector = np.zeros(0)
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise ValueError(f"camera '{name}': {key} is {value!r}; it must be {size} numbers")
+    return vector
+
+
+def _looking(name: str, pos: np.ndarray, target: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Orientation (wxyz) of a camera at ``pos`` that looks at ``target``."""
+    forward = target - pos
+    if not np.linalg.norm(forward) > 1e-9:
+        raise ValueError(f"camera '{name}': lookat is at the camera's position, so the viewing direction is undefined")
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    if np.linalg.norm(right) < 1e-6 * np.linalg.norm(up):  # straight up or down
+        right = np.cross(forward, [0.0, 1.0, 0.0] if abs(forward[1]) < 0.9 else [1.0, 0.0, 0.0])
+    if not np.linalg.norm(right) > 0:
+        raise ValueError(f"camera '{name}': up is zero")
+    right /= np.linalg.norm(right)
+    return _quaternion(np.stack([right, np.cross(right, forward), -forward], 1))
+
+
+def _quaternion(axes: np.ndarray) -> np.ndarray:
+    """Quaternion of a rotation matrix: the eigenvector of a symmetric matrix (Bar-Itzhack), which has no special cases."""
+    m = axes
+    k = np.array([[m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+                  [0, m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2]],
+                  [0, 0, m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2]],
+                  [0, 0, 0, m[2, 2] - m[0, 0] - m[1, 1]]])  # fmt: skip
+    q = np.linalg.eigh(k + np.triu(k, 1).T)[1][:, -1]
+    return q if q[0] >= 0 else -q
+
+
+def added_camera(name: str, given: Mapping[str, Any], size: tuple[int, int]) -> RenderCamera:
+    """A camera from ``{"pos": ..., "lookat": ...}`` or ``{"pos": ..., "quat": ...}``, and optionally ``body``, ``up``, ``fovy``,
+    ``width``, ``height``, ``depth``, ``segmentation``."""
+    for key in given:
+        if key not in _KEYS:
+            near = difflib.get_close_matches(key, _KEYS, 1)
+            raise UnknownNameError(f"camera '{name}' has no '{key}'; {f'did you mean {near[0]!r}?' if near else 'it has ' + ', '.join(_KEYS)}")
+    if "pos" not in given or ("lookat" in given) == ("quat" in given):
+        raise ValueError(f"camera '{name}' needs pos, and either lookat or quat; given: {', '.join(given) or 'nothing'}")
+    pos = _vector(name, "pos", given["pos"], 3)
+    if "quat" in given:
+        quat = _vector(name, "quat", given["quat"], 4)
+        if not np.linalg.norm(quat) > 1e-9:
+            raise ValueError(f"camera '{name}': quat is zero")
+    else:
+        quat = _looking(name, pos, _vector(name, "lookat", given["lookat"], 3), _vector(name, "up", given.get("up", (0, 0, 1)), 3))
+    fovy = given.get("fovy")
+    return RenderCamera(
+        name, int(given.get("width", size[0])), int(given.get("height", size[1])), bool(given.get("depth", False)),
+        bool(given.get("segmentation", False)), "", str(given.get("body") or ""), tuple(pos.tolist()), tuple(quat.tolist()),
+        None if fovy is None else float(fovy),
+    )  # fmt: skip
+
+
+class CameraSystem:
+    """A camera system of the recording's robot, by name or file. Its variation is that of a recording with the same seed."""
+
+    def __init__(self, name: str, episode: Episode) -> None:
+        robot = episode.settings.get("robot")
+        if not robot:
+            raise ValueError(f"camera_system '{name}': {episode.path} was recorded without a robot; use add_cameras")
+        self._robot = _core.Robot(robot)
+        self._system = _core.CameraSystem(name, self._robot.file, ROBOT_PREFIX, self._robot.base)
+        self.cameras: list[RenderCamera] = []
+        for m in self._system.mounts():
+            about = {key: m[key] for key in ("name", "width", "height", "depth", "segmentation")}
+            if m["is_new"]:
+                about |= {"body": m["body"], "pos": tuple(m["pos"]), "quat": tuple(m["quat"]), "fovy": m["fovy"]}
+            else:
+                about |= {"camera": m["camera"]}
+            self.cameras.append(RenderCamera(**about))
+
+    def bind(self, worlds: EpisodeWorlds) -> None:
+        self._worlds = worlds
+        self._system.initialize(worlds.sim._core)
+        model = worlds.sim.model
+        sites = [ROBOT_PREFIX + group["leaf_site"] for group in self._robot.groups if group["kind"] == "gripper"]
+        self._sites = [_mujoco.name2id(model, _mujoco.Obj.SITE, site) for site in sites]
+
+    def place(self, world: int, episode: Episode) -> None:
+        """Places the cameras for an episode, of which the world shows the first state."""
+        if not self._system.varies:
+            return
+        sim = self._worlds.sim
+        roles = episode.obs_scene.get("objects", {}).values()
+        bodies = [_mujoco.name2id(sim.model, _mujoco.Obj.BODY, role["body"]) for role in roles]
+        points = [sim.data.xpos[world, body] for body in bodies if body >= 0]
+        points += [sim.data.site_xpos[world, site] for site in self._sites if site >= 0]
+        centre = sum(points, np.zeros(3)) * (1.0 / len(points)) if points else np.zeros(3)
+        why = self._system.place(sim._core, world, episode.seed or 0, episode.number, list(centre), [b for b in bodies if b >= 0])
+        if why:
+            raise ValueError(f"episode {episode.index}: {why}")
+
+
+def sized(camera: RenderCamera, width: int | None, height: int | None) -> RenderCamera:
+    """The camera with another size. One side alone keeps the aspect ratio, to an even number."""
+    if width is None and height is None:
+        return camera
+    if width is None:
+        assert height is not None
+        width = max(2, 2 * round(0.5 * height * camera.width / camera.height))
+    if height is None:
+        height = max(2, 2 * round(0.5 * width * camera.height / camera.width))
+    return replace(camera, width=width, height=height)
+
+
+def choose(
+    episode: Episode,
+    cameras: Sequence[str] | None,
+    add_cameras: Mapping[str, Mapping[str, Any]],
+    camera_system: str,
+    *,
+    width: int | None,
+    height: int | None,
+    depth: bool | None,
+    segmentation: bool | None,
+) -> tuple[list[RenderCamera], CameraSystem | None, list[RenderCamera]]:
+    """The cameras in the order of the new recording, the camera system, and those cameras that are as recorded."""
+    system = CameraSystem(camera_system, episode) if camera_system else None
+    if cameras is None and system is not None:
+        cameras = []
+    recorded = recorded_cameras(episode, cameras)
+    chosen = [*recorded, *(system.cameras if system else [])]
+    every = recorded or recorded_cameras(episode, None)
+    size = (every[0].width, every[0].height) if every else _DEFAULT_SIZE
+    chosen += [added_camera(name, given, size) for name, given in add_cameras.items()]
+    chosen = [sized(camera, width, height) for camera in chosen]
+    if depth is not None:
+        chosen = [replace(camera, depth=depth) for camera in chosen]
+    if segmentation is not None:
+        chosen = [replace(camera, segmentation=segmentation) for camera in chosen]
+    names = [camera.name for camera in chosen]
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise ValueError(f"two cameras are named '{sorted(twice)[0]}'; a camera that is added needs a new name")
+    return chosen, system, [camera for camera, before in zip(chosen, recorded) if camera == before]
