@@ -28,9 +28,6 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  export_zarr; import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
-    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay, render
-                                 export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
-                                 export_zarr
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
