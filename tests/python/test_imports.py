@@ -8,6 +8,7 @@ An import inside a function hides a cycle, so it counts like one at the top of t
 import ast
 import graphlib
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
@@ -74,6 +75,30 @@ def test_the_package_has_no_import_cycle():
     graph = import_graph(PACKAGE)
     assert "mjsense.scene" in graph["mjsense.simulation"] and "mjsense.peer.env" in graph["mjsense.peer"]
     assert cycle_in(graph) == ""
+
+
+def allowed_imports(page):
+    """Folder of the package -> folders that it may import, from the table in docs/architecture.md."""
+    table = page.split("## The Python package", 1)[1].split("\n## ", 1)[0]
+    cells = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*) \|$", table, re.MULTILINE))
+    named = {folder: set(re.findall(r"`(\w+)`", cell)) for folder, cell in cells.items()}
+    return {
+        folder: set(cells) - named[folder] if cell.startswith("all but") else named[folder] & set(cells)
+        for folder, cell in cells.items()
+    }
+
+
+def test_folders_import_what_the_architecture_page_allows():
+    allowed = allowed_imports((PACKAGE.parents[1] / "docs" / "architecture.md").read_text())
+    assert set(allowed) == {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    wrong = []
+    for module, imported in import_graph(PACKAGE).items():
+        folder = module.split(".")[1] if "." in module else "__init__"
+        for other in {name.split(".")[1] for name in imported if "." in name} & set(allowed) - {folder}:
+            permitted = allowed.get(folder, {"plot": {"view", "dataset"}}.get(folder, {"peer"}))
+            if folder not in ("__init__", "__main__") and other not in permitted:
+                wrong.append(f"{module} imports {other}")
+    assert not wrong
 
 
 @pytest.mark.parametrize(
