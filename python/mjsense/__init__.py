@@ -21,10 +21,10 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv)
-    recording                    record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: any gymnasium.Env;
+    making recordings            record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: any gymnasium.Env;
                                  Recorder: your own loop; mjsense.cluster: on many machines with Ray
-    recordings                   Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
-    other programs               export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
+    reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
+    files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
                                  export_zarr; import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
