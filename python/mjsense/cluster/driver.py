@@ -112,6 +112,15 @@ def record_on_ray(
         resume: Continue an interrupted recording.
         runtime_env: Ray's runtime environment: ``working_dir``, ``pip`` and so on.
         progress: Called about once per second.
+
+    Returns:
+        Counts, reasons of failures, and whether all wanted episodes are recorded.
+
+    Raises:
+        FileExistsError: ``job.out`` contains a recording, and ``resume`` is False.
+        ValueError: ``job.out`` contains a recording with other settings.
+        TypeError: An argument of the job cannot be sent to the workers.
+        ModuleNotFoundError: Ray, fsspec or pyarrow is not installed.
     """
     try:
         import ray

@@ -141,6 +141,13 @@ def play(
         port: Port of the server; if it is taken, the next free one.
         open_browser: Open the page in the default browser.
         options: Further options of :func:`record`, such as ``append=True``.
+
+    Returns:
+        The summary of :func:`record`.
+
+    Raises:
+        ValueError: The robot has no such move groups, or the arm has no controller ``ee_pose``.
+        ModuleNotFoundError: viser, or the package of the device, is not installed.
     """
     policy = Teleoperation(
         f"{task}", arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser
