@@ -91,6 +91,8 @@ std::vector<EpisodeArray> replay_arrays(std::int64_t episode) {
   const auto bytes = std::as_bytes(std::span(sizes));
   return {{"model/geom_size",
            "Values of this episode's model; NaN: the value of the archived model.",
+           "m",
+           "",
            DType::kFloat64,
            {100, 3},
            {bytes.begin(), bytes.end()}}};

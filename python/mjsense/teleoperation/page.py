@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -59,7 +60,7 @@ class DrivePage(Viewer):
         self._handle = self._server.scene.add_transform_controls("/target", scale=0.15, depth_test=False)
         self._later(self._handle, self._dragged)
         for key, (what, steps) in MOVES.items():
-            self._key(key, what, lambda steps=np.array(steps): self.move(STEP * steps[:3], TURN * steps[3:]))
+            self._key(key, what, partial(self.move, STEP * np.array(steps[:3]), TURN * np.array(steps[3:])))
         self._key("space", "Open or close the gripper", self.toggle_gripper)
         self._key("enter", "End the episode", self._finish)
         self._presses: list[Callable[[], None]] = []
@@ -85,7 +86,7 @@ class DrivePage(Viewer):
 
     @property
     def paused(self) -> bool:
-        """Whether the worlds wait: the user has paused, or nobody looks."""
+        """Whether the worlds wait: the user has paused, or no browser shows the page."""
         return bool(self._paused.value) or not self.watched
 
     def toggle_gripper(self) -> None:
