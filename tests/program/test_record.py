@@ -220,6 +220,9 @@ def test_policy_period(mjsense):
     frames = subprocess.run(["ffprobe", "-v", "error", "-select_streams", "v", "-show_entries", "frame=pict_type", "-of", "csv=p=0",
                              house / "episode_00000000_wrist_camera.mp4"], capture_output=True, text=True, check=True).stdout
     assert "".join(frames.replace(",", "").split()) == "IPPIPPI"
+    packets = subprocess.run(["ffprobe", "-v", "error", "-select_streams", "v", "-show_entries", "packet=pts,dts", "-of", "csv=p=0",
+                              house / "episode_00000000_wrist_camera.mp4"], capture_output=True, text=True, check=True).stdout.split()
+    assert all(len(set(packet.strip(",").split(","))) == 1 for packet in packets) and len(packets) == 7  # decoded in the order of time
     assert "policy_dt_ms = 5 must be a positive multiple" in mjsense(*QUICK, "--policy-dt", 5, "--out", "no", rc=2).stderr
 
 
