@@ -35,6 +35,9 @@ namespace mjsense {
 // Set of the attempts that were kept or discarded.
 class Decisions {
  public:
+  // `first`: the first attempt of the recording.
+  explicit Decisions(std::int64_t first = 0) : next_(first) {}
+
   void add(std::int64_t episode, bool kept);  // call once per episode
 
   bool contains(std::int64_t episode) const { return kept_by_episode_.contains(episode); }
@@ -43,9 +46,6 @@ class Decisions {
   // Kept episodes, in order, that no undecided attempt can precede any more.
   const std::vector<std::int64_t>& settled() const { return settled_; }
   std::vector<std::int64_t> all_kept() const;
-
-  // `first`: the first attempt of the recording.
-  explicit Decisions(std::int64_t first = 0) : next_(first) {}
 
  private:
   std::map<std::int64_t, bool> kept_by_episode_;
@@ -58,8 +58,8 @@ class RecordingFolder {
  public:
   // Opens or creates a recording. Throws ValueError if there is one and `resume` is false, if it
   // has another fingerprint, or if another process records into it. Throws RuntimeError if the
-  // directory cannot be written. Completed recordings that this one continues (Start::batch) must
-  // have the same settings.
+  // directory cannot be written. The completed recordings that this one continues, if any,
+  // must have the same settings.
   RecordingFolder(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
   // Removes the recording if nothing was decided, so that a run that failed at its first step does
   // not block later ones.
