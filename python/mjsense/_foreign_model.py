@@ -63,8 +63,9 @@ def copy_of(model: Any) -> Any:
     version = mujoco.mj_versionString()
     if not hasattr(model, "M_rownnz"):  # the structure of its sparse matrices, which data had
         raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3.6 is the first version that can be attached")
-    if model.nflex:
-        raise ValueError(f"attach(): the model has flexes, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
+    for size, what in (("nflex", "flexes"), ("nplugin", "plugins"), ("nhistory", "histories of sensors or actuators")):
+        if getattr(model, size, 0):
+            raise ValueError(f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
     view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
     _refuse_unknown(model, view, version)
     for name, place in _core.model_fields(view._address).items():

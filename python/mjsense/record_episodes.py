@@ -348,7 +348,10 @@ class _Recording:
     def _write(self, world: int, step: _Step, images: Mapping[str, np.ndarray]) -> None:
         for name, values in (("observation", step.observation), ("actions/action", step.action)):
             for i, row in enumerate(self._rows[name]):
-                self._written["/".join((name, *row.path))][world] = 0 if values is None else values[i]
+                stream = "/".join((name, *row.path))
+                if values is not None and np.shape(values[i]) != row.shape:
+                    raise ValueError(f"RecordEpisodes: '{stream}' has the shape {np.shape(values[i])}, expected {row.shape} as in its space")
+                self._written[stream][world] = 0 if values is None else values[i]
         for name, image in images.items():
             if image.shape != self._written[name].shape[1:]:
                 raise ValueError(f"RecordEpisodes: the image of '{name}' was {self._written[name].shape[1:]} and is now {image.shape}")
