@@ -315,7 +315,3 @@ def test_errors(tmp_path):
     env.observation_space = spaces.Box(-1, 1, (3,))
     with pytest.raises(ValueError, match=r"'observation' has the shape \(2,\), expected \(3,\) as in its space"):
         mjs.RecordEpisodes(env, tmp_path / "shape", 1).reset()
-    env = SyncVectorEnv([Pendulum, Pendulum])
-    env.envs[1].model.geom_size[1, 0] = 0.06
-    with pytest.raises(ValueError, match="the models of environments 0 and 1 differ in geom_size"):
-        mjs.RecordEpisodes(env, tmp_path, 1, sensors=(mjs.CameraSensorCfg(name="eye", camera_name="side"),))
