@@ -239,7 +239,8 @@ def test_an_environment_may_make_its_model_anew(tmp_path):
 
 
 def made(folder, house):
-    return mjs.RecordEpisodes(Pendulum(), folder, 2, cameras=["side"], camera_size=(16, 16), house=house)
+    tip = mjs.BuiltinSensorCfg(name="tip", sensor_type="framepos", obj=mjs.ObjRef("site", "tip"))
+    return mjs.RecordEpisodes(Pendulum(), folder, 2, cameras=["side"], camera_size=(16, 16), sensors=(tip,), house=house)
 
 
 def test_environments_in_other_processes_record_to_folders_of_their_own(tmp_path):
@@ -251,7 +252,7 @@ def test_environments_in_other_processes_record_to_folders_of_their_own(tmp_path
     verified(tmp_path)
     data = mjs.Dataset(tmp_path)
     assert [(e.house, e.length, e.seed) for e in data.episodes] == [(0, 11, 3), (0, 11, 0), (1, 11, 4), (1, 11, 0)]
-    assert data.episodes[3].video("side")[10].shape == (16, 16, 3)
+    assert data.episodes[3].video("side")[10].shape == (16, 16, 3) and data.episodes[3]["obs/extra/tip"].shape == (11, 3)
 
 
 SCRIPT = """
