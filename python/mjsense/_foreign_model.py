@@ -44,17 +44,13 @@ def is_our_series(mujoco: Any) -> bool:
     return mujoco is None or _libmujoco._series(mujoco.mj_versionString()) == _libmujoco.SERIES
 
 
-def arrays_of(model: Any, like: Any) -> dict[str, np.ndarray]:
-    """The arrays of a model, without names; `like` has all arrays of mjsense's MuJoCo."""
-    names = [name for name, place in _core.model_fields(like._address).items() if isinstance(place, tuple) and place[2] != ()]
-    kept = [name for name in names if not name.startswith("name") and name != "paths" and name != "text_data"]
-    return {name: value for name in kept if isinstance(value := getattr(model, name, None), np.ndarray)}
-
-
-def options_of(model: Any, like: Any) -> dict[str, np.ndarray]:
-    """The fields of ``opt`` of a model; `like` has all of them."""
-    fields = _core.model_fields(like._address)["opt"]
-    return {name: np.array(getattr(model.opt, name), kind) for name, (_, kind, _) in fields.items() if hasattr(model.opt, name)}
+def values_of(model: Any, like: Any) -> dict[str, np.ndarray]:
+    """The arrays of a model, without names, and its options, as ``opt.gravity``; `like` has all fields of mjsense's MuJoCo."""
+    fields = _core.model_fields(like._address)
+    names = [name for name, place in fields.items() if isinstance(place, tuple) and place[2] != () and not name.startswith("name")]
+    arrays = {name: value for name in names if isinstance(value := getattr(model, name, None), np.ndarray)}
+    options = {f"opt.{name}": np.atleast_1d(np.array(getattr(model.opt, name), kind)) for name, (_, kind, _) in fields["opt"].items()}
+    return {**arrays, **options}
 
 
 def copy_of(model: Any) -> Any:
@@ -63,8 +59,9 @@ def copy_of(model: Any) -> Any:
     version = mujoco.mj_versionString()
     if not hasattr(model, "M_rownnz"):  # the structure of its sparse matrices, which data had
         raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3.6 is the first version that can be attached")
-    if model.nflex:
-        raise ValueError(f"attach(): the model has flexes, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
+    for size, what in (("nflex", "flexes"), ("nplugin", "plugins"), ("nhistory", "histories of sensors or actuators")):
+        if getattr(model, size, 0):
+            raise ValueError(f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
     view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
     _refuse_unknown(model, view, version)
     for name, place in _core.model_fields(view._address).items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from mjsense.configs import SceneCfg
 from mjsense.errors import UnknownNameError
 from mjsense.scene import Scene
 from mjsense.simulation import Simulation, _ids
-
-if TYPE_CHECKING:
-    import mujoco
 
 _STATE = (
     "time", "qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "qacc_warmstart",
@@ -38,7 +35,7 @@ class Attached(KnownAttributes):
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: Any,
         data: Any,
         sensors: Sequence[Any] = (),
         *,
@@ -46,16 +43,20 @@ class Attached(KnownAttributes):
         threads: int = 0,
         seed: Seed = 0,
     ) -> None:
-        self.model = getattr(model, "_model", model)
-        """The user's model."""
         self.datas: tuple[Any, ...] = tuple(getattr(one, "_data", one) for one in (data if isinstance(data, (list, tuple)) else [data]))
         """The user's data, by world."""
         if not self.datas:
             raise ValueError("attach(): data is empty: pass one MjData, or a list with one for each world")
-        self._mujoco: Any = _foreign_model.package_of(self.model)
+        given = model if isinstance(model, (list, tuple)) else [model] * len(self.datas)
+        if len(given) != len(self.datas):
+            raise ValueError(f"attach(): got {len(given)} models for {len(self.datas)} data: pass one model, or one for each data")
+        self.models: tuple[Any, ...] = tuple(getattr(one, "_model", one) for one in given)
+        """The user's model of each world."""
+        packages = [_foreign_model.package_of(one) for one in self.models]
+        self._mujoco: Any = packages[0]
         self._same_series = _foreign_model.is_our_series(self._mujoco)
-        copy = None if self._same_series else _foreign_model.copy_of(self.model)
-        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), (self.model if copy is None else copy)._address)
+        first = self.models[0] if self._same_series else _foreign_model.copy_of(self.models[0])
+        scene = Scene._of_model(SceneCfg(sensors=tuple(sensors)), first._address)
         self._sim = Simulation(scene, len(self.datas), decimation, threads, seed)
         state = self._sim.state
         self._columns: dict[str, slice] = {}
@@ -67,8 +68,11 @@ class Attached(KnownAttributes):
             self._check_data(one, world)
         self._times = np.zeros(len(self.datas))
         self._seen = np.zeros_like(state)
-        self._edited, self._options = {}, {}
+        self._base = _foreign_model.values_of(self._sim.model, self._sim.model)
+        self._edited = [{}] * len(self.datas)
         self._complete = True
+        if any(one is not self.models[0] for one in self.models):
+            self._read_models("attach()")
         self.reset()
 
     def _check_data(self, data: Any, world: int, call: str = "attach()") -> None:
@@ -150,8 +154,9 @@ class Attached(KnownAttributes):
         """
         rows, times = self._rows(range(self.num_worlds))
         timestep = self._sim.physics_dt
-        if self.model.opt.timestep != timestep:
-            raise ValueError(f"update(): the model's time step was {timestep:g} s and is now {self.model.opt.timestep:g} s: attach again")
+        for model in {id(model): model for model in self.models}.values():
+            if model.opt.timestep != timestep:
+                raise ValueError(f"update(): the model's time step was {timestep:g} s and is now {model.opt.timestep:g} s: attach again")
         moved: dict[int, list[int]] = {}
         for world, (before, now) in enumerate(zip(self._times, times)):
             steps = (now - before) / timestep
@@ -190,39 +195,8 @@ class Attached(KnownAttributes):
             ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step,
                 and the structure of the model.
         """
-        sim, base = self._sim, self._sim.model
-        model = self.model if self._same_series else _foreign_model.copy_of(self.model)
-        changed: dict[str, np.ndarray] = {}
-        shown: dict[str, np.ndarray] = {}
-        for name, now in _foreign_model.arrays_of(model, base).items():
-            shown[name] = self._edited[name] if name in self._edited else getattr(base, name)[: len(now)]
-            if now.shape != shown[name].shape:
-                raise ValueError(f"reload(): the model's {name} has the shape {now.shape} instead of {shown[name].shape}: attach again")
-            if not np.array_equal(now, shown[name], equal_nan=now.dtype.kind == "f"):
-                changed[name] = np.array(now)
-        used = {**_foreign_model.options_of(base, base), **self._options}
-        options = {name: now for name, now in _foreign_model.options_of(model, base).items() if not np.array_equal(now, used[name])}
-        if "timestep" in options:
-            raise ValueError("reload(): the model's time step has changed, which only a new attach() follows")
-        writes = []
-        for name, now in {**changed, **{f"opt.{name}": now for name, now in options.items()}}.items():
-            try:
-                if name in changed and name != "bvh_aabb":
-                    sim._check_randomizable(name)
-                rows = sim._core.model_field(name)  # bytes
-            except ValueError as error:
-                raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows ({error})") from None
-            size = min(rows.shape[1], now.nbytes)  # of bvh_aabb, worlds have the boxes of bodies, but not those of meshes
-            if name in changed and not np.array_equal(_bytes(now)[size:], _bytes(shown[name])[size:]):
-                raise ValueError(f"reload(): the model's {name} has changed, which only a new attach() follows")
-            writes.append((rows[:, :size], _bytes(now)[:size]))
-        for rows, now in writes:
-            rows[:] = now
-        self._edited.update(changed)
-        self._options.update(options)
-        sim._core.model_changed(None, False)
-        sim._follow_models()
-        sim.forward()
+        self._read_models("reload()")
+        self._sim.forward()
 
     def replace(self, world: int, data: Any, model: Any = None) -> None:
         """Call when the program has made a new data for a world, and perhaps a new model; an episode begins in it.
@@ -230,7 +204,7 @@ class Attached(KnownAttributes):
         Args:
             world: Id of the world.
             data: The new ``mujoco.MjData``.
-            model: The new model of all worlds, of the same structure; its values are read as by :meth:`reload`.
+            model: The world's new model, of the same structure; its values are read as by :meth:`reload`.
 
         Raises:
             ValueError: If the new model or data has another structure; it needs a new :func:`attach`.
@@ -239,9 +213,9 @@ class Attached(KnownAttributes):
         data = getattr(data, "_data", data)
         self._check_data(data, world, "replace()")
         self.datas = (*self.datas[:world], data, *self.datas[world + 1 :])
-        if model is not None and getattr(model, "_model", model) is not self.model:
-            self.model = getattr(model, "_model", model)
-            self.reload()
+        if model is not None:
+            self.models = (*self.models[:world], getattr(model, "_model", model), *self.models[world + 1 :])
+            self._read_models("replace()")
         self.reset([world])
 
     def add(self, sensor: Any) -> Any:
@@ -251,8 +225,52 @@ class Attached(KnownAttributes):
     # ---------------------------------------------------------------------------------------------------------- states
 
     _seen: np.ndarray
-    _edited: dict[str, np.ndarray]
-    _options: dict[str, np.ndarray]
+    _edited: list[dict[str, np.ndarray]]
+    """By world: the values of its model that differ from those of the first model at the start, or did so at the last reading."""
+
+    def _read_models(self, call: str) -> None:
+        """Copies the values in which the models differ from what the worlds have."""
+        groups: dict[tuple[int, int], list[int]] = {}
+        for world, model in enumerate(self.models):
+            groups.setdefault((id(model), id(self._edited[world])), []).append(world)
+        edited, writes = [*self._edited], []
+        for worlds in groups.values():
+            values, rows = self._changes(self.models[worlds[0]], self._edited[worlds[0]], f"{call}: {{}} of the model of data[{worlds[0]}]")
+            writes += [(target, worlds, new) for target, new in rows]
+            for world in worlds:
+                edited[world] = values
+        for target, worlds, new in writes:
+            target[worlds, : len(new)] = new
+        self._edited = edited
+        if writes:
+            self._sim._core.model_changed(None, False)
+            self._sim._follow_models()
+
+    def _changes(
+        self, model: Any, known: dict[str, np.ndarray], what: str
+    ) -> tuple[dict[str, np.ndarray], list[tuple[np.ndarray, np.ndarray]]]:
+        """Returns the new `known`, and the rows of all worlds with the bytes to write. Raises ValueError for changes that cannot be written."""
+        sim = self._sim
+        values, rows = dict(known), []
+        copy = model if self._same_series else _foreign_model.copy_of(model)
+        for name, now in _foreign_model.values_of(copy, sim.model).items():
+            old = known[name] if name in known else self._base[name][: len(now)]
+            if now.shape != old.shape:
+                raise ValueError(f"{what.format(name)} has the shape {now.shape} instead of {old.shape}: it needs its own attach()")
+            if np.array_equal(now, old, equal_nan=now.dtype.kind == "f"):
+                continue
+            try:
+                if name != "bvh_aabb":
+                    sim._check_randomizable(name)
+                target = sim._core.model_field(name)  # bytes
+            except ValueError as error:
+                raise ValueError(f"{what.format(name)} is different, which only a new attach() follows ({error})") from None
+            size = min(target.shape[1], now.nbytes)  # of bvh_aabb, worlds have the boxes of bodies, but not those of meshes
+            if name == "opt.timestep" or not np.array_equal(_bytes(now)[size:], _bytes(old)[size:]):
+                raise ValueError(f"{what.format(name)} is different, which only a new attach() follows")
+            values[name] = np.array(now)
+            rows.append((target, _bytes(values[name])[:size]))
+        return values, rows
 
     def _worlds(self, ids: Sequence[int] | None) -> list[int]:
         found = _ids(ids)
@@ -265,7 +283,7 @@ class Attached(KnownAttributes):
         for row, world in zip(rows, worlds):
             data = self.datas[world]
             if self._same_series and self._mujoco is not None:
-                self._mujoco.mj_getState(self.model, data, row, self._mujoco.mjtState.mjSTATE_INTEGRATION)
+                self._mujoco.mj_getState(self.models[world], data, row, self._mujoco.mjtState.mjSTATE_INTEGRATION)
             else:
                 for name, columns in self._columns.items():
                     row[columns] = np.ravel(getattr(data, name))
@@ -306,7 +324,8 @@ def attach(
     the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
 
     Args:
-        model: The ``mujoco.MjModel``, or robosuite's or dm_control's wrapper of it. It is not changed.
+        model: The ``mujoco.MjModel``, or robosuite's or dm_control's wrapper of it, or a list with one of the same structure for each world.
+            It is not changed.
         data: A ``mujoco.MjData`` of the model, or a list with one for each world.
         sensors: Sensor configurations and :class:`mjsense.Sensor` objects, as in :class:`mjsense.SceneCfg`. Names are those of the model;
             an element without a name has the name of its kind and number, ``geom_3``. MuJoCo's sensors of the model are attached, too.

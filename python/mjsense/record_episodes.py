@@ -83,16 +83,8 @@ class _MujocoEnvs:
         if sensors:
             inner = envs[0].unwrapped
             steps = decimation or int(getattr(inner, "frame_skip", getattr(inner, "n_substeps", 1)))
-            self._check_models()
-            self.attached = Attached(self._pairs[0][0], [data for _, data in self._pairs], sensors, decimation=steps)
-
-    def _check_models(self) -> None:
-        first = self._pairs[0][0]
-        for world, (model, _) in enumerate(self._pairs[1:], 1):
-            for name in dir(first):
-                mine = getattr(model, name, None) if name[0] != "_" else None
-                if isinstance(mine, np.ndarray) and not np.array_equal(mine, getattr(first, name), equal_nan=mine.dtype.kind == "f"):
-                    raise ValueError(f"RecordEpisodes: the models of environments 0 and {world} differ in {name}; sensors need equal models")
+            models, datas = zip(*self._pairs)
+            self.attached = Attached(models, datas, sensors, decimation=steps)
 
     @staticmethod
     def _pair(env: Any) -> tuple[Any, Any]:
@@ -115,10 +107,8 @@ class _MujocoEnvs:
             if world in self._renderers:
                 self._renderers.pop(world).close()
         if self.attached is not None:
-            if made:
-                self._check_models()
             for world in made:
-                self.attached.replace(world, pairs[world][1], pairs[0][0])
+                self.attached.replace(world, pairs[world][1], pairs[world][0])
             self.attached.reset(begun)
             self.attached.update()
 
@@ -348,7 +338,10 @@ class _Recording:
     def _write(self, world: int, step: _Step, images: Mapping[str, np.ndarray]) -> None:
         for name, values in (("observation", step.observation), ("actions/action", step.action)):
             for i, row in enumerate(self._rows[name]):
-                self._written["/".join((name, *row.path))][world] = 0 if values is None else values[i]
+                stream = "/".join((name, *row.path))
+                if values is not None and np.shape(values[i]) != row.shape:
+                    raise ValueError(f"RecordEpisodes: '{stream}' has the shape {np.shape(values[i])}, expected {row.shape} as in its space")
+                self._written[stream][world] = 0 if values is None else values[i]
         for name, image in images.items():
             if image.shape != self._written[name].shape[1:]:
                 raise ValueError(f"RecordEpisodes: the image of '{name}' was {self._written[name].shape[1:]} and is now {image.shape}")

@@ -231,7 +231,7 @@ def test_reload_follows_edits_of_the_model():
         attached.update()
     model.opt.timestep = 0.005
     model.tex_data[:] = 0
-    with pytest.raises(ValueError, match="tex_data has changed"):
+    with pytest.raises(ValueError, match=r"tex_data of the model of data\[0\] is different, which only a new attach\(\) follows"):
         attached.reload()
 
 
@@ -260,6 +260,8 @@ def test_errors():
         mjs.attach(model, [data, None])
     with pytest.raises(ValueError, match=r"data\[0\] is given twice"):
         mjs.attach(model, [data, data])
+    with pytest.raises(ValueError, match="got 2 models for 1 data"):
+        mjs.attach([model, model], data)
     with pytest.raises(ValueError, match="data is empty"):
         mjs.attach(model, [])
     other = mujoco.MjModel.from_xml_string("<mujoco/>")
@@ -310,8 +312,21 @@ def test_a_world_may_get_new_data_and_a_new_model():
     new = mujoco.MjData(heavy)
     attached.replace(1, new, heavy)
     assert attached.datas == (datas[0], new)
-    fresh = mjs.attach(heavy, [datas[0], new], sensors())
-    assert_equal({n: attached[n] for n in ("front", "touch", "height", "acc")}, fresh)
+    fresh = mjs.attach([model, heavy], [datas[0], new], sensors())
+    names = ("front", "touch", "height", "acc")
+    assert_equal({n: attached[n] for n in names}, fresh)
+    alone, own = mujoco.MjData(heavy), mujoco.MjModel.from_xml_string(MODEL)
+    light = mjs.attach([own, heavy], [mujoco.MjData(own), alone], sensors())
+    for _ in range(100):
+        for data, made in ((datas[0], model), (new, heavy), (light.datas[0], own), (alone, heavy)):
+            mujoco.mj_step(made, data)
+        attached.update()
+        light.update()
+    only = mjs.attach(heavy, alone, sensors())
+    for name in names[:1] + names[2:]:
+        for field, values in fields_of(only[name]).items():
+            assert np.array_equal(values[0], fields_of(attached[name])[field][1]) and np.array_equal(values[0], fields_of(light[name])[field][1])
+    assert not np.array_equal(attached["front"].data.rgb[0], attached["front"].data.rgb[1])
     with pytest.raises(ValueError, match=r"replace\(\): data\[1\] belongs to another model: its qpos has 0 numbers, and this model's has 9"):
         attached.replace(1, mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>")))
     with pytest.raises(ValueError, match=r"replace\(\): data\[1\] is given twice"):

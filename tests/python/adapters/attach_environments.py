@@ -46,7 +46,7 @@ def manipulation(name):
 def deviations(model, data):
     """The largest deviations of EXACT and DYNAMIC fields, relative to the larger of 1 and the largest value, and steps with other contacts."""
     attached = mjs.attach(model, data, (mjs.CameraSensorCfg(name="view", pos=(0, -2, 2), quat=(0.9, 0.4, 0, 0), width=16, height=12),), threads=1)
-    model, data = attached.model, attached.datas[0]
+    model, data = attached.models[0], attached.datas[0]
     own, worst, contacts = mujoco.MjData(model), {EXACT: 0.0, DYNAMIC: 0.0}, 0
     for _ in range(20):
         mujoco.mj_step(model, data)
