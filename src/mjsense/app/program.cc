@@ -311,7 +311,9 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     if (option == nullptr)
       throw ValueError(fmt::format("no option '{}'; see mjsense --help", word));
   } else if (word != "complete" && std::ranges::find(known, word) == known.end()) {
-    run_external(word, argv + 1, known);
+    run_external(
+        word, argv + 1, known,
+        others.empty() ? "; the Python package has more commands: python -m mjsense --help" : "");
   }
   // Writing beyond ulimit -f must fail instead of killing the process. Programs that run_external()
   // starts keep the default.
