@@ -160,7 +160,7 @@ def record_on_ray(
                 try:
                     results.done[shard.number] = ray.get(ref)
                 except ray.exceptions.RayTaskError as error:
-                    raise error.as_instanceof_cause() from None
+                    raise (error.cause if isinstance(error.cause, Exception) else error) from None
         final = report()
     finally:
         for ref in running:

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from mjsense.cluster.job import ShardResult
 from mjsense.cluster.storage import Storage
-
-INDEX = "index.parquet"
+from mjsense.dataset.files import INDEX
 
 
 def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int) -> None:

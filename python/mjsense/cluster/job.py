@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -76,11 +77,14 @@ class Job:
     def settings(self) -> dict[str, Any]:
         """Everything that decides which episodes the job contains, as JSON values."""
         if self.arguments is None:
-            return {"version": _core.__version__, "words": list(self.words)}  # pyright: ignore[reportAttributeAccessIssue]
+            return {"version": _core.__version__, "words": list(_without(self.words, ("--worlds", "--threads", "--ffmpeg")))}  # pyright: ignore[reportAttributeAccessIssue]
         from mjsense._parts import parts_of
+        from mjsense.record import record
 
-        options = {"resume": True, "append": False, **self.arguments}
-        code = parts_of(options, options.pop("sensors", ()))[4]
+        bound = inspect.signature(record).bind(**{**self.arguments, "out": self.out})
+        bound.apply_defaults()
+        options = {**bound.arguments, "resume": True}  # the code of all parts must be comparable
+        code = parts_of(options, options["sensors"])[4]
         decided = {name: value for name, value in options.items() if name not in _FREE}
         return json.loads(json.dumps({"version": _core.__version__, "options": decided, "code": code}, default=str))  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -93,14 +97,27 @@ class Job:
         if self.arguments is not None:
             from mjsense.record import record
 
-            summary = record(**{**self.arguments, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count})
+            summary = record(**{"threads": 1, "progress": False, **self.arguments, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count})
             return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
         command = [sys.executable, "-m", "mjsense", "record", *self.words, "--out", str(folder), "--no-sheet", "--json", "--quiet"]
         command += ["--first-attempt", str(shard.first), "--num-attempts", str(shard.count)]
+        command += [] if any(word.split("=")[0] == "--threads" for word in self.words) else ["--threads", "1"]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode not in (0, 1):
             raise RuntimeError(done.stderr.strip().removeprefix("mjsense: "))
         return json.loads(done.stdout)
+
+
+def _without(words: Iterable[str], options: Sequence[str]) -> Iterator[str]:
+    """The words without these options and their values."""
+    skip = False
+    for word in words:
+        if skip:
+            skip = False
+        elif word in options:
+            skip = True
+        elif word.split("=")[0] not in options:
+            yield word
 
 
 def _kept_episodes(folder: Path) -> Iterable[dict[str, Any]]:

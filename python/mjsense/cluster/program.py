@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import NoReturn
 
 from mjsense.cluster.driver import ClusterProgress, record_on_ray
 from mjsense.cluster.job import Job
@@ -12,15 +13,24 @@ from mjsense.cluster.job import Job
 
 def is_wanted(words: list[str]) -> bool:
     """Whether these arguments of the program ask for a recording on Ray."""
-    return words[:1] == ["record"] and any(word == "--ray" or word.startswith("--ray=") for word in words)
+    given = {word.split("=")[0] for word in words}
+    return words[:1] == ["record"] and "--ray" in given and not {"-h", "--help"} & given
+
+
+_REFUSED = ("--shard", "--append", "--overwrite", "--first-attempt", "--num-attempts", "--json", "--config")
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(f"{message}; see mjsense record --help")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="mjsense record", add_help=False, allow_abbrev=False)
+    parser = _Parser(prog="mjsense record", add_help=False, allow_abbrev=False)
     parser.add_argument("--ray", required=True)
     parser.add_argument("--shard-attempts", type=int, default=16)
     parser.add_argument("--ray-working-dir")
-    parser.add_argument("--ray-pip", nargs="+")
+    parser.add_argument("--ray-pip")
     parser.add_argument("--out", required=True)
     parser.add_argument("--episodes", type=int, default=1)
     parser.add_argument("--max-attempts", type=int, default=0)
@@ -55,7 +65,10 @@ def run(words: list[str]) -> int:
     """Runs the command. Returns 0 if all wanted episodes are recorded, 1 if some are not, 2 after an error."""
     try:
         given, others = _parser().parse_known_args(words[1:])
-        environment = {"working_dir": given.ray_working_dir, "pip": given.ray_pip}
+        for option in _REFUSED:
+            if any(word.split("=")[0] == option for word in others):
+                raise ValueError(f"{option} cannot be combined with --ray")
+        environment = {"working_dir": given.ray_working_dir, "pip": given.ray_pip and given.ray_pip.split(",")}
         line = _Line()
         summary = record_on_ray(
             Job(given.out, words=tuple(others)),

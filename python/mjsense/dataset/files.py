@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+INDEX = "index.parquet"
+"""Index of a recording on a cluster."""
 BATCH = re.compile(r"trajectories_batch_(\d+)_of_(\d+)\.h5")
 
 
@@ -43,11 +45,26 @@ class EpisodeEntry:
     """Position in the list of the recordings' descriptions."""
 
 
+def _indexed(root: Path) -> set[tuple[Path, str]] | None:
+    """Files and trajectories that the index of a recording on a cluster names; None without an index."""
+    index = root / INDEX
+    if not index.exists():
+        return None
+    try:
+        from pyarrow import parquet
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"Reading {index} needs pyarrow: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    rows = parquet.read_table(index, columns=["path", "trajectory"]).to_pylist()
+    return {(root / row["path"], row["trajectory"]) for row in rows}
+
+
 def _batches(root: Path) -> list[Path]:
     """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and batches."""
     if root.is_file():
         return [root]
     found = [path for folder in ("", "house_*/", "shard_*/house_*/") for path in root.glob(f"{folder}trajectories_batch_*.h5")]
+    if (root / "job.json").exists():  # recorded on a cluster: a shard without done.json may be incomplete
+        found = [path for path in found if (path.parents[1] / "done.json").exists()]
 
     def order(path: Path) -> tuple[str | int, ...]:
         house, batch = re.fullmatch(r"house_(\d+)", path.parent.name), BATCH.fullmatch(path.name)
@@ -65,11 +82,12 @@ def entries_of(root: Path) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:
     """All episodes of a recording, and the distinct descriptions of its files."""
     entries: list[EpisodeEntry] = []
     texts: dict[str, int] = {}
+    indexed = _indexed(root)
     for path in _batches(root):
         house = re.fullmatch(r"house_(\d+)", path.parent.name)
         with open_h5(path) as file:
             recording = texts.setdefault(text_of(file.attrs.get("recording", "{}")), len(texts))
-            for name in sorted((name for name in file if name.startswith("traj_")), key=lambda name: int(name[5:])):
+            for name in sorted((name for name in file if name.startswith("traj_") and (indexed is None or (path, name) in indexed)), key=lambda name: int(name[5:])):
                 trajectory = file[name]
                 flags = trajectory["success"]
                 outcome = trajectory.attrs.get("outcome")

@@ -41,7 +41,8 @@ std::vector<std::string> words_in_path() {
 
 }  // namespace
 
-void run_external(const std::string& word, char** arguments, std::span<const std::string> known) {
+void run_external(const std::string& word, char** arguments, std::span<const std::string> known,
+                  std::string_view hint) {
   const std::string program = std::string(kPrefix) + word;
   execvp(program.c_str(), arguments);
   if (errno != ENOENT && errno != EACCES) {
@@ -49,7 +50,8 @@ void run_external(const std::string& word, char** arguments, std::span<const std
   }
   std::vector<std::string> names(known.begin(), known.end());
   for (std::string& name : words_in_path()) names.push_back(std::move(name));
-  throw KeyError(fmt::format("no command '{}'{}", word, suggest(word, names)));
+  const std::string nearest = suggest(word, names);
+  throw KeyError(fmt::format("no command '{}'{}", word, nearest.empty() ? hint : nearest));
 }
 
 }  // namespace mjsense

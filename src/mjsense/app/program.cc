@@ -79,6 +79,23 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
       ->type_name("FILE");
   app.add_flag_callback(
       "--no-sheet", [&options] { options.sheet = false; }, "Do not write a contact sheet.");
+  // Options of the Python package (mjsense/cluster), which handles a command with --ray itself.
+  const auto add_ray = [&](const char* name, const char* type, const char* help) {
+    app.add_option_function<std::string>(
+           name,
+           [name](const std::string&) {
+             throw ValueError(fmt::format(
+                 "{} needs the Python package and --ray: run python -m mjsense record", name));
+           },
+           help)
+        ->type_name(type);
+  };
+  add_ray("--ray", "ADDRESS",
+          "Record on a Ray cluster: local (the CPUs of this machine), auto, or its address.");
+  add_ray("--shard-attempts", "N", "With --ray: attempts of one task of the cluster; default 16.");
+  add_ray("--ray-working-dir", "DIR", "With --ray: directory with your code, sent to the workers.");
+  add_ray("--ray-pip", "NAMES",
+          "With --ray: Python packages that workers install, separated by commas.");
   app.add_flag("--json", options.json, "Print the summary as JSON.");
   app.add_flag("-q,--quiet", options.quiet, "Do not show progress.");
   add_examples(app, {{"mjsense record pick --episodes 8 --worlds 4 --out data",
@@ -294,7 +311,9 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     if (option == nullptr)
       throw ValueError(fmt::format("no option '{}'; see mjsense --help", word));
   } else if (word != "complete" && std::ranges::find(known, word) == known.end()) {
-    run_external(word, argv + 1, known);
+    run_external(
+        word, argv + 1, known,
+        others.empty() ? "; the Python package has more commands: python -m mjsense --help" : "");
   }
   // Writing beyond ulimit -f must fail instead of killing the process. Programs that run_external()
   // starts keep the default.
