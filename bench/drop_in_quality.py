@@ -59,6 +59,7 @@ def parts(name: str, env: Any) -> tuple[Any, Any, Any]:
     from mjsense.compat.gymnasium import renderer_of
 
     renderer = renderer_of(env)
+    assert renderer.viewer is not None
     return renderer.model, renderer.data, renderer.viewer.cam
 
 

@@ -1,31 +1,64 @@
 #!/usr/bin/env bash
 # Installs a wheel with all its extras, and with each of the packages in packaging/resolve.py, into separate environments, and runs the
-# tests that need these packages. Slow; torch downloads CUDA, 6 GB. usage: packaging/matrix.sh WHEEL [NAME ...]
+# tests that need these packages, for each Python of MJSENSE_PYTHONS (by default that of .venv). Without arguments after WHEEL it is slow:
+# torch downloads CUDA, 6 GB. usage: packaging/matrix.sh WHEEL [NAME ...]
+#
+#   MJSENSE_PYTHONS="python3.11 python3.13" packaging/matrix.sh dist/*.whl "mujoco 3.3" "mujoco 3.8" "mujoco 3.11" "mujoco 3.17" mujoco
 set -euo pipefail
 wheel=$(realpath "$1")
 shift
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=$PWD/.venv/bin/python
+read -ra pythons <<< "${MJSENSE_PYTHONS:-$python}"
 if [ $# = 0 ]; then
   mapfile -t names < <(cd packaging && "$python" -c 'import resolve; print(*resolve.ENVIRONMENTS, sep="\n")')
   set -- "${names[@]}"
 fi
-failed=0
-for name in "$@"; do
-  echo "== $name"
-  venv=build/matrix/${name// /-}
+failures=()
+
+# check WHAT COMMAND...: runs a command and records its failure.
+check() {
+  local what=$1
+  shift
+  if "$@"; then echo "pass: $what"; else failures+=("$what") && echo "FAIL: $what"; fi
+}
+
+environment() { # PYTHON NAME
+  local version venv mujoco order others tests
+  version=$("$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+  local what="Python $version, $2"
+  echo "== $what"
+  venv=build/matrix/$version-${2// /-}
   rm -rf "$venv"
-  "$python" -m venv "$venv"
-  mapfile -t others < <(cd packaging && "$python" -c 'import resolve, sys; [print(r) for r in resolve.ENVIRONMENTS[sys.argv[1]]]' "$name")
-  "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py "${others[@]}" || { failed=1; continue; }
-  "$venv/bin/python" -m pip check || failed=1
+  "$1" -m venv "$venv"
+  mapfile -t others < <(cd packaging && "$python" -c 'import resolve, sys; [print(r) for r in resolve.ENVIRONMENTS[sys.argv[1]]]' "$2")
+  if ! "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py PyOpenGL "${others[@]}"; then
+    failures+=("$what: pip install")
+    return
+  fi
+  check "$what: pip check" "$venv/bin/python" -m pip check --disable-pip-version-check
   "$venv/bin/python" -m pip list --disable-pip-version-check --format freeze | grep -i -E '^(mujoco|torch|numpy|gymnasium|h5py|rsl|stable)' || true
   mujoco=$("$venv/bin/python" -c 'import mujoco; print(mujoco.__version__)' 2>/dev/null || true)
   for order in ${mujoco:+mujoco-first mjsense-first} alone; do
-    "$venv/bin/python" -W ignore tests/python/other_mujoco.py "$order" "$(mktemp -d)" || failed=1
+    check "$what: $order" "$venv/bin/python" -W ignore tests/python/other_mujoco.py "$order" "$(mktemp -d)"
   done
-  tests=(tests/python/test_load_order.py tests/python/test_rl.py)
-  case $mujoco in 4.0.*) tests+=(tests/python/test_libmujoco.py tests/python/test_mujoco_views.py tests/python/test_mjlab_compat.py) ;; esac
-  "$venv/bin/python" -m pytest -q -p no:cacheprovider "${tests[@]}" || failed=1
+  tests=(tests/python/test_load_order.py)
+  case $mujoco in
+    4.0.*) tests+=(tests/python/test_{rl,libmujoco,mujoco_views,mjlab_compat}.py) ;;
+    "") tests+=(tests/python/test_rl.py) ;;
+  esac
+  check "$what: tests" "$venv/bin/python" -m pytest -q -p no:cacheprovider "${tests[@]}"
+  # Images against this version's OpenGL renderer.
+  [ -z "$mujoco" ] || check "$what: images" "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_renderer.py -k look_as_in_opengl
+}
+
+for each in "${pythons[@]}"; do
+  for name in "$@"; do environment "$each" "$name"; done
 done
-exit $failed
+echo
+if [ ${#failures[@]} = 0 ]; then
+  echo "all passed"
+else
+  printf 'failed: %s\n' "${failures[@]}"
+  exit 1
+fi

@@ -158,7 +158,8 @@ class Renderer:
             "haze": float(model.vis.map.haze),
             "haze_rgb": tuple(float(x) for x in haze[:3]),
             "line_width": float(model.vis.global_.linewidth),
-            "projected_textures": int(self._mujoco.mj_versionString().split(".")[0]) < 4,
+            # 3.12 wraps 2D textures around spheres, cylinders and so on; earlier versions project them along z.
+            "projected_textures": tuple(int(x) for x in self._mujoco.mj_versionString().split(".")[:2]) < (3, 12),
         }
         # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.
         geoms = self._mujoco.MjvScene.geoms.fget(scene)

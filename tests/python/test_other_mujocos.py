@@ -42,7 +42,7 @@ def environment(version):
         return python
     first, _, over = version.partition("+")
     mujoco = [] if version == "none" else [f"mujoco=={first}"]
-    steps = [["gymnasium>=1.0", "nanobind-backend>=1.0", "numpy>=1.26", *mujoco]]
+    steps = [["gymnasium>=1.0", "nanobind-backend>=1.0", "numpy>=1.26", "pytest", "PyOpenGL", *mujoco]]
     steps += [["--no-deps", f"mujoco-core=={over}.*"]] if over else []
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     for step in steps:
@@ -72,3 +72,14 @@ def test_attached_sensors_measure_what_that_mujoco_computes(version):
     run = [environment(version), "-W", "ignore", Path(__file__).with_name("attach_other_mujoco.py")]
     done = subprocess.run(run, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 0, done.stdout + done.stderr[-3000:]
+
+
+@pytest.mark.parametrize("version", [version for version in VERSIONS if version != "none" and "+" not in version])
+def test_images_are_those_of_its_renderer(version):
+    python = environment(version)
+    path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    if subprocess.run([python, "-c", "import OpenGL, pytest"], capture_output=True).returncode:
+        pytest.skip(f"{python.parents[1]} is older than this test; delete it")
+    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "look_as_in_opengl", SCRIPT.with_name("test_renderer.py")]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+    assert done.returncode == 0, done.stdout[-3000:]

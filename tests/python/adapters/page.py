@@ -38,7 +38,9 @@ with tempfile.TemporaryDirectory() as folder:
         script = Path(f"{folder}/block_{i}.py")
         script.write_text(block + END if "__main__" not in block else block)
         environment = {**os.environ, "MUJOCO_GL": "disable" if i else "egl", "RESULT": result}
-        done = subprocess.run([sys.executable, "-W", "ignore", script], env=environment, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore", script], env=environment, capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, f"block {i} of {page.name}: {done.stdout[-1000:]}{done.stderr[-2000:]}"
         if i < 2:
             results.append(np.load(result))
