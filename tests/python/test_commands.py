@@ -34,7 +34,7 @@ def test_help_lists_the_commands():
 
 def test_errors_are_one_line(tmp_path):
     unknown = run("replai")
-    assert unknown.returncode == 2 and "did you mean 'replay'?" in unknown.stderr
+    assert unknown.returncode == 2 and "did you mean 'replay'" in unknown.stderr
     option = run("replay", "--epsodes", "1", "x")
     assert option.returncode == 2 and "see mjsense replay --help" in option.stderr
     missing = run("replay", str(tmp_path / "nothing"))
