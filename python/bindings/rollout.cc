@@ -354,6 +354,15 @@ nb::tuple outcomes(PyRollout& self) {
 void bind_rollout(nb::module_& m) {
   m.def("record", &record, nb::arg("options"), nb::arg("progress").none(), nb::arg("objects"),
         nb::arg("make_simulation"));
+  m.def(
+      "rollout_options",
+      [] {
+        std::vector<std::string> names;
+        for (const FieldDecl& field : struct_of<RolloutCfg>().fields)
+          names.emplace_back(field.name);
+        return names;
+      },
+      "Names of the options of a rollout, which are also those of a recording's settings.");
   m.def("task_names", &task_names, "Names of the tasks there are.");
   m.def("robot_names", &robot_names, "Names of the robots there are.");
   m.def("policy_names", &policy_names, "Names of the policies there are.");

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
 
+FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "house": 0, "batches": 0, "gzip": 4}
+"""Options that the C++ recorder needs, besides those of the videos, with their defaults."""
+
+
 @checked
 class Recorder(KnownAttributes):
     """Records sensors row by row to the same files as :func:`mjsense.record`::

@@ -5,6 +5,7 @@ A case is a function of the house's folder; `CASES` maps names to cases. With an
 excessive memory or access a file outside the folder, and `verify` must not report the recording as intact.
 """
 
+import json
 import os
 import struct
 import subprocess
@@ -150,6 +151,35 @@ def _(house, value):
         rows = np.array([value] * len(f["traj_0/success"]))
         words = h5py.enum_dtype({f"v{i}": i for i in range(256)}, basetype="u1")
         replace(f["traj_0"], "success", data=rows, dtype=words if np.all(rows == 7) else rows.dtype)
+
+
+@variants("model_archive_is", {"outside": f"../../{SECRET}/keep.txt", "other": "model_00000000.zip", "number": 3, "escapes": "\x1b]0;x\x07"})
+def _(house, value):
+    with change(house) as f:
+        f.attrs["recording"] = json.dumps(json.loads(f.attrs["recording"]) | {"model_archive": value})
+
+
+def archive_of(house):
+    return next(house.glob("model_*.zip"))
+
+
+@case
+def model_archive_is_missing(house):
+    archive_of(house).unlink()
+
+
+@case
+def model_archive_is_a_link(house):
+    archive = archive_of(house)
+    archive.rename(house.parent / "archive.zip")
+    archive.symlink_to(house.parent / "archive.zip")
+
+
+@case
+def model_archive_is_a_pipe(house):
+    archive = archive_of(house)
+    archive.unlink()
+    os.mkfifo(archive)
 
 
 @variants("recording_is", {"deep": "[" * 100_000, "words": "pick", "number": "3", "escapes": "\x1b]0;x\x07"})

@@ -89,13 +89,13 @@ std::vector<EpisodeArray> replay_arrays(std::int64_t episode) {
   std::vector<double> sizes(300, std::numeric_limits<double>::quiet_NaN());
   sizes[episode % 300] = 0.02;
   const auto bytes = std::as_bytes(std::span(sizes));
-  return {{"model/geom_size",
-           "Values of this episode's model; NaN: the value of the archived model.",
-           "m",
-           "",
-           DType::kFloat64,
-           {100, 3},
-           {bytes.begin(), bytes.end()}}};
+  EpisodeArray sizes_of_geoms;
+  sizes_of_geoms.path = "model/geom_size";
+  sizes_of_geoms.description =
+      "Values of this episode's model; NaN: the value of the archived model.";
+  sizes_of_geoms.shape = {100, 3};
+  sizes_of_geoms.values = {bytes.begin(), bytes.end()};
+  return {sizes_of_geoms};
 }
 
 struct Running {

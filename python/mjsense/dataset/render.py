@@ -24,7 +24,7 @@ from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.files import open_h5
 from mjsense.dataset.playback import archive_of, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
-from mjsense.recorder import recorded_sensors
+from mjsense.recorder import FILE_OPTIONS, recorded_sensors
 
 if TYPE_CHECKING:
     from mjsense.dataset.episode import Episode
@@ -127,7 +127,7 @@ class _House:
                 raise ValueError(f"sensor '{handle.name}' depends on the physics steps between observations (air time, history, delays); "
                                  "render computes sensors from the recorded states only")  # fmt: skip
         description = first._recording
-        files = {"episodes": len(episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
+        files = FILE_OPTIONS | {"episodes": len(episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
                  "gzip": description.get("gzip", 4)}  # fmt: skip
         video = {"encoder_threads" if key == "threads" else key: value for key, value in description.get("video", {}).items()}
         video |= {key: options[key] for key in ("crf", "preset") if options[key] is not None}

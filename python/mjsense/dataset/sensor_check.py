@@ -23,7 +23,7 @@ from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.files import open_h5, text_of
 from mjsense.dataset.playback import ReplayInputs, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
-from mjsense.recorder import recorded_sensors
+from mjsense.recorder import FILE_OPTIONS, recorded_sensors
 from mjsense.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -59,8 +59,7 @@ class _Rebuilt:
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
         settings = episode.settings
         cameras = settings["cameras"]
-        options = {key: settings[key] for key in ("task", "robot", "scene", "seed", "camera_system", "samples", "shadows", "meshes", "horizon",
-                                                  "action_noise", "perturb", "terminate_upon_success", "use_sensors")}  # fmt: skip
+        options = {key: settings[key] for key in _core.rollout_options() if key in settings}
         options |= {"policy": "", "replay_sensor": True, "num_worlds": num_worlds, "threads": threads, "cameras": [camera["name"] for camera in cameras]}
         for side in ("width", "height"):
             sizes = {camera[side] for camera in cameras}
@@ -151,7 +150,7 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     first = episodes[0]
     rate = Fraction(first.fps)
     video = {"encoder_threads" if key == "threads" else key: value for key, value in first._recording.get("video", {}).items()}
-    options = {"episodes": len(episodes), "batches": 1, "house": 0, "gzip": 0, "resume": False, **video}
+    options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
     recorder = _core.Recorder(worlds.sim._core, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options)
     for start in range(0, len(episodes), worlds.sim.num_worlds):
         playing = list(enumerate(episodes[start : start + worlds.sim.num_worlds]))

@@ -78,13 +78,7 @@ class FileVerifier {
     if (!sealed_ && H5Fget_eoa(file, &end) >= 0 && end < bytes_)
       error(recorded_.name, fmt::format("has {} bytes after its end", bytes_ - end));
     ours_ = h5::has_attribute(file, "recording");
-    if (ours_) {
-      const Json description = parse_description(h5::text_attribute(file, "recording"));
-      if (!description.is_object())
-        error(recorded_.name, "has a description of the recording that cannot be read");
-      else if (const auto archive = description.find("model_archive"); archive != description.end())
-        out_["archive"] = *archive;
-    }
+    if (ours_) check_description(h5::text_attribute(file, "recording"));
     const std::vector<std::string> names = trajectory_names(file);
     if (names.empty()) error(recorded_.name, "contains no trajectory");
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -108,6 +102,17 @@ class FileVerifier {
       note(recorded_.name,
            "was changed since it was recorded: it has no checksum of the whole file");
     }
+  }
+
+  void check_description(const std::string& text) {
+    const Json description = parse_description(text);
+    if (!description.is_object())
+      return error(recorded_.name, "has a description of the recording that cannot be read");
+    const auto archive = description.find("model_archive");
+    if (archive == description.end()) return;
+    if (!archive->is_string())
+      return error(recorded_.name, "has a description whose model_archive is not a file name");
+    out_["archive"] = *archive;
   }
 
   void check_trajectory(hid_t trajectory, const std::string& context) {
