@@ -226,6 +226,10 @@ def test_a_failed_export_leaves_nothing(root, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         mjs.export_lerobot(root, tmp_path / "out", progress=stop)
     assert not list(tmp_path.iterdir())
+    (tmp_path / "out.part").mkdir()  # of an export that was killed
+    (tmp_path / "out.part/old").touch()
+    mjs.export_lerobot(root, tmp_path / "out", episodes=[0])
+    assert [path.name for path in tmp_path.iterdir()] == ["out"] and not (tmp_path / "out/old").exists()
 
 
 def test_groups_without_an_action_hold_their_position():
