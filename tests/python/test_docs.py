@@ -92,7 +92,8 @@ def test_cpp_blocks_are_in_compiled_files(page):
 
 def run(arguments, cwd):
     program = [sys.executable, "-m", "mjsense"] if arguments[0] in commands.COMMANDS else [PROGRAM]
-    done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+    path = os.pathsep.join([str(Path(mjs.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
 
 
