@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export to LeRobot, and reading: mjs.Dataset compared with LeRobot's loader on the same episodes.
+"""Export to LeRobot; reading and writing: mjs.Dataset compared with LeRobot's loader, and the recorder's encoder with LeRobot's writer.
 
     python bench/export.py [--width 640 --height 368] [--episodes 8] [--keep FOLDER] [--lerobot PYTHON]
 
@@ -9,6 +9,7 @@ clock, and in parentheses per second of CPU time, which other programs of the ma
 """
 
 import argparse
+import resource
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from mjsense.export import Source
 
 import mjsense as mjs
 
@@ -51,6 +53,33 @@ def export(root: Path, out: Path, frames: int) -> None:
     print(f"export, statistics of {about:20} {images / wall:9.0f} ({images / cpu:.0f}) frames/s")
 
 
+def encode(root: Path, steps: int) -> float:
+    """Steps per second of CPU time of ffmpeg as the recorder starts it, once per camera."""
+    dataset = mjs.Dataset(root)
+    episode, cpu, length = dataset.episodes[0], 0.0, 0
+    for camera in Source(root).cameras:
+        images = episode.video(camera)[:steps]
+        length, height, width, _ = images.shape
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = ["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(dataset.fps), "-i", "-",
+                   "-c:v", "libx264", "-preset", "veryfast", "-crf", "24", "-threads", "1", "-pix_fmt", "yuv420p", "-f", "mp4",
+                   "-movflags", "frag_keyframe+empty_moov", "-y", "/dev/null"]  # fmt: skip
+        subprocess.run(command, input=images.tobytes(), check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu += after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return length / cpu
+
+
+def compare_writers(root: Path, exported: Path, folder: Path, python: str, steps: int) -> None:
+    print(f"write       recorder's ffmpeg      {encode(root, steps):7.1f} steps per CPU second")
+    for mode in ("png", "av1", "h264"):
+        out = folder / f"written_{mode}"
+        shutil.rmtree(out, ignore_errors=True)
+        words = [python, str(ROOT / "bench/peers/lerobot_writer.py"), str(exported), str(out), mode, str(steps)]
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
+        print(f"write       LeRobot, {mode:13} {float(done.stdout.split()[-1]):7.1f} steps per CPU second")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--width", type=int, default=640)
@@ -58,6 +87,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=8)
     parser.add_argument("--seconds", type=float, default=10, help="maximum time of one case")
     parser.add_argument("--cache-mb", type=float, default=512, help="cache of mjs.Dataset; LeRobot has none")
+    parser.add_argument("--steps", type=int, default=60, help="steps that are written")
     parser.add_argument("--keep", help="folder of the recording, which is used again if it exists")
     parser.add_argument("--lerobot", default=str(ROOT / "build/lerobot_0.4.4/bin/python"), help="Python of LeRobot's environment")
     parser.add_argument("--read", nargs=2, help=argparse.SUPPRESS)  # a process of one case
@@ -81,6 +111,7 @@ def main() -> None:
                 done = subprocess.run(words, capture_output=True, text=True, check=True)
                 wall, cpu = map(float, done.stdout.split()[-2:])
                 print(f"{order:11} {name:12} {wall:9.1f} ({cpu:.1f}) samples/s")
+        compare_writers(root, out, root.parent, args.lerobot, args.steps)
 
 
 if __name__ == "__main__":

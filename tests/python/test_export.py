@@ -14,7 +14,8 @@ pq = pytest.importorskip("pyarrow.parquet")
 import av
 from mjsense.dataset import statistics
 from mjsense.export import Mapping, Source, lerobot, lerobot_depth
-from mjsense.export.mapping import _held
+from mjsense.export.mapping import _filled
+from mjsense.export.remux import Concatenation
 
 import mjsense as mjs
 from mjsense import commands
@@ -225,10 +226,26 @@ def test_a_failed_export_leaves_nothing(root, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         mjs.export_lerobot(root, tmp_path / "out", progress=stop)
     assert not list(tmp_path.iterdir())
+    (tmp_path / "out.part").mkdir()  # of an export that was killed
+    (tmp_path / "out.part/old").touch()
+    mjs.export_lerobot(root, tmp_path / "out", episodes=[0])
+    assert [path.name for path in tmp_path.iterdir()] == ["out"] and not (tmp_path / "out/old").exists()
 
 
 def test_groups_without_an_action_hold_their_position():
     values, given = np.array([[0.0], [1], [0], [3], [0]]), np.array([False, True, False, True, False])
     measured = np.full((5, 1), 7.0)
-    assert _held(values, given, measured, 5, 1).ravel().tolist() == [7, 1, 1, 3, 3]
-    assert _held(None, None, np.zeros((5, 2)), 5, 1).ravel().tolist() == [0] * 5
+
+    def filled(stream, *arrays):
+        return _filled(stream, *arrays, 5, 1).ravel().tolist()
+
+    assert filled("actions/joint_pos/arm", values, given, measured) == [7, 1, 1, 3, 3]
+    assert filled("actions/joint_pos_rel/arm", values, given, None) == [0, 1, 0, 3, 0]
+    assert filled("actions/ee_pose/arm", values, given, None) == [0, 1, 1, 3, 3]
+    assert filled("actions/joint_pos/gripper", None, None, np.zeros((5, 2))) == [0] * 5
+
+
+def test_a_video_without_all_frames_is_an_error(root, tmp_path):
+    video = next(root.glob("house_0/*wrist*.mp4"))
+    with pytest.raises(ValueError, match=r"has 13 frames, but its episode has 14 observations; `mjsense verify`"):
+        Concatenation(tmp_path / "out.mp4", mjs.Dataset(root).fps).add(video, 14)

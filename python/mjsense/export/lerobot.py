@@ -214,19 +214,19 @@ class _Videos:
         self._video = self._new()
 
     def add(self, path: Path, length: int) -> tuple[dict[str, int], float]:
-        """Appends a video. Returns its file and the time of its first frame there. Its first ``length`` frames are used."""
+        """Appends a video of ``length + 1`` frames, the last of which is not used. Returns its file and the time of its first frame there."""
         first = self._video.frames
         full = first and self._video.bytes + path.stat().st_size > VIDEO_FILE_MB * 1e6
-        if full or not self._found_by_time(length) or not self._video.add(path):
+        if full or not self._found_by_time(length) or not self._video.add(path, length + 1):
             self.close()
             self._file += 1
             self._video = self._new()
             first = 0
-            self._video.add(path)
+            self._video.add(path, length + 1)
         return _place(self._file), float(times(1, self._fps, first)[0])
 
     def close(self) -> None:
-        self._video.__exit__(None, None, None)
+        self._video.close()
 
     def _new(self) -> Concatenation:
         return Concatenation(self._folder / (_PLACE.format(**_place(self._file)) + ".mp4"), self._fps)

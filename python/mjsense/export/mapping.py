@@ -19,6 +19,7 @@ from mjsense.errors import UnknownNameError
 
 _OF_STEPS = ("actions/", "rewards", "success", "fail", "terminated", "truncated")
 """Row t of these streams belongs to the step that led to observation t."""
+_JOINTS, _RELATIVE = "actions/joint_pos/", ("actions/joint_pos_rel/", "actions/ee_twist/")
 _FLAGS = {"reward": ("rewards",), "success": ("success",), "terminated": ("terminated",), "truncated": ("truncated",)}
 
 
@@ -151,11 +152,11 @@ class Source:
         """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
         that was taken at observation t.
 
-        A move group without an action keeps its last one; before its first action it has its measured position, or 0 if that has
-        another size.
+        A move group without an action keeps its last one. Before its first action, a joint target is the measured position if that has
+        the same size; otherwise, and in relative actions (``joint_pos_rel``, ``ee_twist``), it is 0.
         """
         names = {stream for feature in self.features.values() for stream in feature.streams}
-        names |= {mask for name in names if (mask := given_name(name))} | {_measured(name) for name in names}
+        names |= {mask for name in names if (mask := given_name(name))} | {_measured(name) for name in names} - {""}
         loaded = episode._load(sorted(names))
         return {feature.name: self._rows(episode, feature, loaded) for feature in self.features.values()}
 
@@ -194,7 +195,7 @@ class Source:
             if values is None and mask is None:
                 raise UnknownNameError(f"Episode {episode.index} ({episode.path.name}) has no stream '{stream}', which the feature '{feature.name}' needs")
             if mask is not None:
-                values = _held(values, loaded.get(mask), loaded.get(_measured(stream)), episode.length, size)
+                values = _filled(stream, values, loaded.get(mask), loaded.get(_measured(stream)), episode.length, size)
             assert values is not None
             columns.append(values.reshape(episode.length, size))
         rows = np.concatenate(columns, 1).astype(feature.dtype, copy=False)
@@ -202,22 +203,23 @@ class Source:
 
 
 def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:
-    joints, commands = "actions/joint_pos/", "actions/commanded_action/"
+    commands = "actions/commanded_action/"
     groups = [name[len(commands) :] for name in known if name.startswith(commands) and "/given/" not in name]
-    return "actions/joint_pos", *(commands + group for group in groups if joints + group not in known)
+    return "actions/joint_pos", *(commands + group for group in groups if _JOINTS + group not in known)
 
 
 def _measured(stream: str) -> str:
-    """The measured positions of the move group of an action."""
-    return f"obs/agent/qpos/{stream.rsplit('/', 1)[-1]}"
+    """The measured positions of the move group of a joint target; of other streams the empty name."""
+    return f"obs/agent/qpos/{stream.removeprefix(_JOINTS)}" if stream.startswith(_JOINTS) else ""
 
 
-def _held(values: np.ndarray | None, given: np.ndarray | None, measured: np.ndarray | None, length: int, size: int) -> np.ndarray:
-    """Actions in which rows without an action have the action before them."""
-    if measured is None or measured.size != length * size:
-        measured = np.zeros((length, size))
+def _filled(stream: str, values: np.ndarray | None, given: np.ndarray | None, measured: np.ndarray | None, length: int, size: int) -> np.ndarray:
+    """Actions ``[length, size]`` in which rows without an action have the action before them; relative ones have 0."""
+    before = np.zeros((length, size)) if measured is None or measured.size != length * size else measured
     if values is None or given is None:
-        return measured
+        return before
     values = values.reshape(length, size)
+    if stream.startswith(_RELATIVE):
+        return values  # 0 where there is no action
     last = np.maximum.accumulate(np.where(given, np.arange(length), -1))
-    return np.where((last >= 0)[:, None], values[last], measured)
+    return np.where((last >= 0)[:, None], values[last], before)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from mjsense.export.output import needs
@@ -24,21 +23,19 @@ class Concatenation:
         self._file: Any = None
         self._parameters: Any = None
 
-    def __enter__(self) -> Concatenation:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def close(self) -> None:
+        """Completes the file."""
         if self._file is not None:
             self._file.close()
 
-    def add(self, path: Path) -> bool:
-        """Appends all frames of the video ``path``."""
+    def add(self, path: Path, frames: int) -> bool:
+        """Appends the video ``path``, which must have this number of frames."""
         av = needs("av")
         with av.open(str(path)) as video:
             stream = video.streams.video[0]
             packets = [packet for packet in video.demux(stream) if packet.dts is not None]
-            if not packets:
-                raise ValueError(f"{path} has no frames")
+            if len(packets) != frames:
+                raise ValueError(f"{path} has {len(packets)} frames, but its episode has {frames} observations; `mjsense verify` checks the files")
             tick = 1 / (self._fps * stream.time_base)  # of one frame
             if tick.denominator != 1 or min(packet.pts for packet in packets) != 0:
                 raise ValueError(f"{path}: its times are not those of {self._fps} frames per second from 0; `mjsense verify` checks the files")
