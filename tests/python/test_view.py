@@ -163,6 +163,46 @@ def test_controls_shapes_and_curves(live):
 
 
 @needs_viser
+def test_an_environment_that_the_user_steps(port, monkeypatch, capsys):
+    """Opening a viewer changes nothing, and update() shows the new episode with its sizes and colours."""
+    env = mjs.make("pick", cameras=[])
+    env.reset(seed=0)
+    before = env.sim.state.copy()
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with mjs.view(env, port=port, block=False) as viewer:
+        assert f"There is no browser here: open {viewer.url} in one." in capsys.readouterr().out
+        assert np.array_equal(env.sim.state, before) and viewer._source.policy is None
+
+        def shown():
+            model = env.sim.model_of(0)
+            return [g for g, (_, key) in viewer._stage._geoms.items() if key and key != surfaces.key_of(model, g)]  # () is a hidden geom
+
+        assert shown() == []
+        env.reset(seed=1)
+        viewer.update()
+        assert shown() == [] and not np.array_equal(env.sim.state, before)
+        np.testing.assert_allclose(viewer._stage._sent[:, :3], env.sim.data.xpos[0], atol=2e-6)
+    env.close()
+
+
+@needs_viser
+def test_cost_of_a_frame(tmp_path, port):
+    """100 bodies that all move. 4 ms of CPU; the limit leaves room for slow machines."""
+    bodies = "".join(f"<body pos='{i % 10} {i // 10} 1'><freejoint/><geom size='.1'/></body>" for i in range(100))
+    (tmp_path / "model.xml").write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
+        positions, turns = (np.array(values) for values in viewer._source.poses(0))
+        costs = []
+        for _ in range(30):
+            positions += 0.01
+            began = time.thread_time()
+            assert viewer._stage.set_poses(positions, turns) == 100
+            costs.append(time.thread_time() - began)
+    assert np.median(costs) < 0.02
+
+
+@needs_viser
 def test_memory_stays_bounded(live):
     """The number of messages that a browser receives when it connects does not grow with time."""
 

@@ -14,7 +14,10 @@ from mjsense.scene import Scene
 from mjsense.simulation import Simulation
 from mjsense.task import task_names
 from mjsense.vector import TaskVectorEnv, make_vec
+from mjsense.view.live import LiveViewer
+from mjsense.view.recorded import RecordingViewer
 from mjsense.view.source import LiveSource, TaskSource
+from mjsense.view.viewer import Viewer
 
 _IMAGE = {"width": 320, "height": 240, "depth": True, "segmentation": True}
 _SUBSTEPS = 1 / 60  # s, about: period of a model that is viewed alone
@@ -69,3 +72,10 @@ def _model(path: Path, worlds: int, seed: int) -> LiveSource:
     source = LiveSource(Simulation(scene, worlds, decimation=max(1, round(_SUBSTEPS / timestep)), seed=seed), path.name)
     source.reset(seed)
     return source
+
+
+def viewer_of(source: Any, *, world: int, episode: int, seed: int, host: str, port: int) -> Viewer:
+    """The viewer of what ``source_of`` has found."""
+    if isinstance(source, Dataset):
+        return RecordingViewer(source, episode=episode, host=host, port=port)
+    return LiveViewer(source, world=world, host=host, port=port, seed=seed)

@@ -43,10 +43,9 @@ class LiveSource:
 
     # ---------------------------------------------------------------------------------------------------------- stepping
 
-    def step(self) -> bool:
-        """Advances all worlds by one control step. Returns whether the models of worlds may have changed."""
+    def step(self) -> None:
+        """Advances all worlds by one control step."""
         self.sim.step()
-        return False
 
     def reset(self, seed: int) -> None:
         """Starts a new episode in all worlds."""
@@ -60,6 +59,11 @@ class LiveSource:
         return float(self.sim.time[world])
 
     # ----------------------------------------------------------------------------------------------------------- reading
+
+    @property
+    def version(self) -> int:
+        """Differs from an earlier value if the models of worlds may have changed since."""
+        return self.sim._core.model_version()
 
     def model(self, world: int) -> Any:
         """The model with the values of one world."""
@@ -203,15 +207,12 @@ class TaskSource(LiveSource):
     def __init__(self, env: TaskVectorEnv, title: str = "") -> None:
         super().__init__(env.sim, title)
         self._env = env
-        env.reset(seed=env._seed)
+        self.policy = True if env._has_policy else None
+        if not env._started:
+            env.reset(seed=env._seed)
         self._action = self._held()
-        try:
-            env.expert_action()
-            self.policy = True
-        except ValueError:  # it has no policy
-            self.policy = None
 
-    def step(self) -> bool:
+    def step(self) -> None:
         env = self._env
         begins = bool(env._ended.any())
         done = None
@@ -221,7 +222,6 @@ class TaskSource(LiveSource):
         env.step(self._action, done)
         if begins:
             self._action = self._held()
-        return begins
 
     def reset(self, seed: int) -> None:
         self._env.reset(seed=seed)
