@@ -229,6 +229,8 @@ def test_wrong_things_are_named(live, tmp_path):
         mjs.view(live._source, world=2, block=False, open_browser=False)
     with pytest.raises(mjs.UnknownNameError, match="'pikc' is neither a file nor the name of a task"):
         mjs.view("pikc")
+    with pytest.raises(ValueError, match="'rby1' is a robot: name a task"):
+        mjs.view("rby1")
     with pytest.raises(FileNotFoundError, match=r"no\.xml does not exist"):
         mjs.view(tmp_path / "no.xml")
 
