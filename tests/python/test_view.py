@@ -392,6 +392,13 @@ def test_the_page_of_a_task(port):
         eventually(lambda: viewer._playing and viewer._source.time(0) > 0.5)
         page.click("button", "Pause")
         eventually(lambda: not viewer._playing)
+        # A chart that was made before there was a value has a time axis.
+        page.click("[role=tab]", "Curves")
+        viewer._events[2] = lambda: viewer._curves.choose("tcp_pose")
+        eventually(lambda: (page.run("document.querySelector('.uplot canvas')?.width") or 0) > 100)
+        for k in range(3):
+            viewer._events[3 + k] = viewer._step_once
+        eventually(lambda: page.run("Object.values(__viserTestpoints.uplots)[0].chart.scales.x.max") == pytest.approx(viewer._source.time(0)))
         assert not page.console
 
 
