@@ -140,6 +140,18 @@ def test_only_what_has_changed_is_sent(live):
 
 
 @needs_viser
+def test_hidden_groups(tmp_path, port):
+    """A geom that is shown later is where its body is."""
+    (tmp_path / "model.xml").write_text("<mujoco><worldbody><body name='b' pos='1 2 3'><geom name='g' size='.1' group='3'/></body></worldbody></mujoco>")
+    with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
+        assert not viewer._stage._frames
+        viewer._stage.show_groups({3})
+        assert np.array_equal(viewer._stage._frames[1].position, (1, 2, 3)) and viewer._stage._geoms[0][0] is not None
+        viewer._stage.show_groups({0})
+        assert viewer._stage._geoms[0][0] is None
+
+
+@needs_viser
 def test_a_taken_port_and_the_address(live, capsys):
     assert live.url == f"http://127.0.0.1:{live.port}"
     with mjs.view(live._source, port=live.port, block=False, open_browser=False) as other:
@@ -286,6 +298,34 @@ def test_export(recording, tmp_path):
     assert (tmp_path / "a.viser").stat().st_size > 20_000
     wrong = subprocess.run([*run, "pick", "--export", "a.mp4"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2 and "ends in neither .viser nor .rrd" in wrong.stderr
+
+
+@needs_viser
+def test_export_to_rerun(recording, tmp_path):
+    pytest.importorskip("rerun")
+    command = [sys.executable, "-m", "mjsense", "view", str(recording), "--episode", "1", "--export", "a.rrd"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "Wrote a.rrd.\n"), done.stderr
+    written = (tmp_path / "a.rrd").read_bytes()
+    assert written.startswith(b"RRF") and len(written) > 100_000
+
+
+@needs_viser
+def test_results_and_warnings_of_a_task(port):
+    with mjs.view("pick", port=port, block=False, open_browser=False, cameras=[]) as viewer:
+        source = viewer._source
+        assert {"reward", "success"} <= source.streams().keys() and source.notes(0) == []
+        while not source.value("success", 0)[0]:
+            source.step()
+            assert source.time(0) < 20
+        assert source.value("reward", 0)[0] > 0
+        viewer._policy.value = False
+        viewer._switch()
+        viewer._controls[0].value = 0.5
+        viewer._write(source.set_control, 0, viewer._controls[0])
+        for _ in range(30):
+            source.step()
+        assert abs(source.value("qpos/arm", 0)[0] - 0.5) < 0.05
 
 
 # -------------------------------------------------------------------------------------------------------------------- browser

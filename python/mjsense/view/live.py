@@ -143,7 +143,7 @@ class LiveViewer(Viewer):
         if now < self._panels_due and self._playing:
             return
         self._panels_due = now + _PANELS
-        self._clock.content = f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s"
+        self._clock.content = "\n\n".join([f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s", *source.notes(world)])
         self._pictures.refresh(lambda name: source.picture(name, world))
         self._curves.append(source.time(world), lambda name: source.value(name, world))
         self._curves.refresh()

@@ -58,6 +58,10 @@ class LiveSource:
         """Simulation time of a world, s."""
         return float(self.sim.time[world])
 
+    def notes(self, world: int) -> list[str]:
+        """MuJoCo's warnings in a world, and how often they were raised."""
+        return [f"{name}: {counts[world]}" for name, counts in self.sim.warning_counts.items() if counts[world]]
+
     # ----------------------------------------------------------------------------------------------------------- reading
 
     @property
@@ -76,7 +80,7 @@ class LiveSource:
 
     def streams(self) -> dict[str, StreamInfo]:
         """Streams that can be drawn as curves, by name."""
-        found = {name: StreamInfo(spec.unit, rows[0].size) for name, (spec, rows) in self._sensor_rows().items()}
+        found = {name: StreamInfo(unit, rows[0].size) for name, (unit, rows) in self._sensor_rows().items()}
         for name, unit in (("qpos", "m, rad"), ("qvel", "m/s, rad/s"), ("ctrl", "")):
             found.setdefault(name, StreamInfo(unit, getattr(self.sim, name).shape[1]))
         return {name: info for name, info in found.items() if 0 < info.width <= MAX_CURVES}
@@ -107,8 +111,8 @@ class LiveSource:
         sensor, _, field = name.rpartition("/")
         return sensors[sensor].fields[field] if sensor in sensors else None
 
-    def _sensor_rows(self) -> dict[str, tuple[Any, np.ndarray]]:
-        """Numeric fields of the scene's sensors: name -> (spec, rows). Reads no images."""
+    def _sensor_rows(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Numeric fields of the scene's sensors: name -> (unit, rows). Reads no images."""
         found = {}
         for name, sensor in self.sim.scene.sensors.items():
             specs = getattr(sensor, "specs", None)
@@ -116,7 +120,7 @@ class LiveSource:
                 continue
             for field, spec in specs.items():
                 if np.dtype(spec.dtype).kind in "fiub":
-                    found[f"{name}/{field}" if field else name] = spec, np.empty((1, *spec.shape), spec.dtype)
+                    found[f"{name}/{field}" if field else name] = spec.unit, np.empty((1, *spec.shape), spec.dtype)
         return found
 
     # ----------------------------------------------------------------------------------------------------------- drawing
@@ -208,6 +212,7 @@ class TaskSource(LiveSource):
         super().__init__(env.sim, title)
         self._env = env
         self.policy = True if env._has_policy else None
+        self._results = {name: np.zeros((env.num_envs, 1)) for name in ("reward", "success")}
         if not env._started:
             env.reset(seed=env._seed)
         self._action = self._held()
@@ -219,7 +224,8 @@ class TaskSource(LiveSource):
         if self.policy:
             self._action = env.expert_action().astype(np.float64)
             done = env.expert_done
-        env.step(self._action, done)
+        _, reward, _, _, info = env.step(self._action, done)
+        self._results["reward"][:, 0], self._results["success"][:, 0] = reward, info["success"]
         if begins:
             self._action = self._held()
 
@@ -240,12 +246,15 @@ class TaskSource(LiveSource):
                     break
         return action
 
-    def _sensor_rows(self) -> dict[str, tuple[Any, np.ndarray]]:
-        own = {name: (self._env.specs[name], rows) for name, rows in self._env.rows.items() if rows.dtype.kind in "fiub" and rows.ndim < 4}
-        return {**own, **super()._sensor_rows()}
+    def _sensor_rows(self) -> dict[str, tuple[str, np.ndarray]]:
+        own = {name: (self._env.specs[name].unit, rows) for name, rows in self._env.rows.items() if rows.dtype.kind in "fiub" and rows.ndim < 4}
+        return {**own, **{name: ("", rows) for name, rows in self._results.items()}, **super()._sensor_rows()}
 
     def _row(self, name: str) -> np.ndarray | None:
-        return self._env.rows[name] if name in self._env.rows else super()._row(name)
+        for rows in (self._env.rows, self._results):
+            if name in rows:
+                return rows[name]
+        return super()._row(name)
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()
