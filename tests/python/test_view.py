@@ -11,6 +11,7 @@ import threading
 import time
 
 import devtools
+import gymnasium
 import mujoco
 import numpy as np
 import pytest
@@ -212,6 +213,35 @@ def test_cost_of_a_frame(tmp_path, port):
             assert viewer._stage.set_poses(positions, turns) == 100
             costs.append(time.thread_time() - began)
     assert np.median(costs) < 0.02
+
+
+class Height(mjs.Sensor):
+    """Values, an image and shapes of a user-defined sensor."""
+
+    uuid, unit = "height", "m"
+    observation_space = gymnasium.spaces.Dict({"z": gymnasium.spaces.Box(-9, 9, (1,), np.float32), "image": gymnasium.spaces.Box(0, 255, (4, 6, 3), np.uint8)})
+
+    def compute(self, sim):
+        return {"z": sim.data.xpos[:, 1:2, 2].astype(np.float32), "image": np.full((sim.num_worlds, 4, 6, 3), 7, np.uint8)}
+
+    def debug_vis(self, visualizer):
+        visualizer.add_cylinder((0, 0, 0), (0, 0, 1), 0.01, (1, 0, 0, 1), "height")
+
+
+@needs_viser
+def test_user_defined_sensors_come_first(port):
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities={"ball": mjs.EntityCfg(model=BALL)}, terrain=mjs.TerrainCfg())))
+    sim.add(Height())
+    with mjs.view(sim, port=port, block=False, open_browser=False) as viewer:
+        source = viewer._source
+        assert next(iter(source.streams())) == "height/z" and source.streams()["height/z"] == ("m", 1)
+        assert source.pictures() == ["height/image"] and source.shape_names()[0] == "height"
+        sim.step()
+        viewer.update()
+        assert source.value("height/z", 0) == pytest.approx(sim.data.xpos[0, 1, 2]) and (source.picture("height/image", 0) == 7).all()
+        viewer._drawn["height"].value = True
+        viewer._draw()
+        assert [node.name for node in viewer._layer._nodes] == ["/shapes/cylinder"]
 
 
 @needs_viser

@@ -10,6 +10,7 @@ import numpy as np
 from mjsense import _mujoco
 from mjsense._show import is_image
 from mjsense.drawing import DebugShapes
+from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 from mjsense.vector import TaskVectorEnv
 from mjsense.view.camera import View, first_view
@@ -80,7 +81,8 @@ class LiveSource:
 
     def streams(self) -> dict[str, StreamInfo]:
         """Streams that can be drawn as curves, by name."""
-        found = {name: StreamInfo(unit, rows[0].size) for name, (unit, rows) in self._sensor_rows().items()}
+        own = {name: (sensor.unit, rows) for name, (sensor, rows) in self._user_rows().items() if rows.ndim < 4 and rows.dtype.kind in "fiub"}
+        found = {name: StreamInfo(unit, rows[0].size) for name, (unit, rows) in {**own, **self._sensor_rows()}.items()}
         for name, unit in (("qpos", "m, rad"), ("qvel", "m/s, rad/s"), ("ctrl", "")):
             found.setdefault(name, StreamInfo(unit, getattr(self.sim, name).shape[1]))
         return {name: info for name, info in found.items() if 0 < info.width <= MAX_CURVES}
@@ -91,8 +93,8 @@ class LiveSource:
         return np.asarray(getattr(self.sim, name) if rows is None else rows, np.float64)[world].reshape(-1)
 
     def pictures(self) -> list[str]:
-        """Names of images."""
-        found = []
+        """Names of images, those of user-defined sensors first."""
+        found = [name for name, (_, rows) in self._user_rows().items() if is_image(rows.shape[1:], rows.dtype)]
         for name, sensor in self.sim.scene.sensors.items():
             if getattr(sensor, "kind", "") == "camera":
                 found += [f"{name}/{field}" for field, spec in sensor.specs.items() if is_image(spec.shape, spec.dtype)]
@@ -100,10 +102,29 @@ class LiveSource:
 
     def picture(self, name: str, world: int) -> np.ndarray:
         """An image [H, W, C]. Only images that are shown are read, and with them computed."""
+        own = self._user_row(name)
+        if own is not None:
+            return own[world]
         sensor, _, field = name.rpartition("/")
         return self.sim.scene[sensor].fields[field][world]
 
+    def _user_rows(self) -> dict[str, tuple[Sensor, np.ndarray]]:
+        """Rows of the sensors that are written in Python, as they were last computed."""
+        return {f"{sensor.uuid}/{spec['name']}".removesuffix("/"): (sensor, rows) for sensor in self.sim._python if sensor._mjs_rows
+                for spec, rows in zip(sensor._mjs_row_specs(), sensor._mjs_rows)}  # fmt: skip
+
+    def _user_row(self, name: str) -> np.ndarray | None:
+        found = self._user_rows().get(name)
+        if found is None:
+            return None
+        sensor, rows = found
+        sensor.rows  # computes them
+        return rows
+
     def _row(self, name: str) -> np.ndarray | None:
+        own = self._user_row(name)
+        if own is not None:
+            return own
         sensors = self.sim.scene.sensors
         if name in sensors:
             data = sensors[name].data
@@ -127,8 +148,10 @@ class LiveSource:
 
     def shape_names(self) -> list[str]:
         """Names of everything that can be drawn: sensors with shapes, streams of poses, and contacts."""
-        found = []
-        for name in self.sim.scene.sensors:
+        found = [sensor.uuid for sensor in self.sim._python if type(sensor).debug_vis is not Sensor.debug_vis]
+        for name, sensor in self.sim.scene.sensors.items():
+            if isinstance(sensor, Sensor):
+                continue
             try:
                 self.sim.debug_shapes(0, [name])
             except (ValueError, TypeError, RuntimeError):
