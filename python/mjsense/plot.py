@@ -88,7 +88,7 @@ def plot(
     return figure
 
 
-def expand(names: Iterable[str], known: Iterable[str]) -> list[str]:
+def _expand(names: Iterable[str], known: Iterable[str]) -> list[str]:
     """The known streams that names, patterns and last parts of names stand for."""
     known, found = list(known), []
     for name in names:
@@ -106,7 +106,7 @@ def expand(names: Iterable[str], known: Iterable[str]) -> list[str]:
 def _recorded(dataset: Dataset, names: Sequence[str], episodes: Sequence[int]) -> _Tracks:
     streams = dataset.streams
     usable = [name for name, s in streams.items() if s.kind == "video" or (s.dtype.kind in "fiub" and np.prod(s.shape, dtype=int) <= MAX_CURVES)]
-    chosen = expand(names, usable)
+    chosen = _expand(names, usable)
     tracks = _Tracks({name: streams[name].unit for name in chosen}, {name for name in chosen if streams[name].kind == "video"})
     period = 1 / float(dataset.fps)
     for position in episodes:
@@ -131,7 +131,7 @@ def _live(source: LiveSource, names: Sequence[str], world: int, seconds: float) 
     if not 0 <= world < source.num_worlds:
         raise ValueError(f"world {world}: must be in [0, {source.num_worlds})")
     streams, pictures = source.streams(), source.pictures()
-    chosen = expand(names, [*streams, *pictures])
+    chosen = _expand(names, [*streams, *pictures])
     tracks = _Tracks({name: streams[name].unit if name in streams else "" for name in chosen}, {name for name in chosen if name in pictures})
     count = max(1, round(seconds / source.period))
     kept = set(np.linspace(0, count - 1, _FRAMES).round().astype(int).tolist())

@@ -63,6 +63,7 @@ class TaskVectorEnv(VectorEnv):
         self.num_envs = options["num_worlds"]
         self._closed = False
         self._seed = options["seed"]
+        self._has_policy = bool(options["policy"])
         if options["meshes"] == "real":
             use_installed_meshes()
         options["default_view"] = render_mode is not None

@@ -27,7 +27,7 @@ class Page:
                    "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", f"--window-size={width},{height}",
                    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "about:blank"]  # fmt: skip
         self._process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        address = next(line for line in self._process.stderr if "DevTools listening on" in line).split("ws://")[1].split("/")[0]
+        address = next(line for line in self._process.stderr or () if "DevTools listening on" in line).split("ws://")[1].split("/")[0]
         self._drain = threading.Thread(target=self._process.stderr.read, daemon=True)
         self._drain.start()
         pages = []

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from mjsense.plot import expand
+from mjsense.plot import _expand
 from scenes import ball_scene, feet_cfg
 
 import mjsense as mjs
@@ -26,14 +26,14 @@ def recording(tmp_path_factory):
 
 def test_names_of_streams():
     known = ["obs/extra/tcp_pose", "obs/agent/qpos/arm", "obs/agent/qpos/gripper", "actions/joint_pos/arm"]
-    assert expand(["tcp_pose"], known) == known[:1]
-    assert expand(["obs/agent/qpos", "tcp_pose"], known) == [known[1], known[2], known[0]]
-    assert expand(["*/arm"], known) == [known[1], known[3]]
-    assert expand(["arm"], known) == [known[1], known[3]]
+    assert _expand(["tcp_pose"], known) == known[:1]
+    assert _expand(["obs/agent/qpos", "tcp_pose"], known) == [known[1], known[2], known[0]]
+    assert _expand(["*/arm"], known) == [known[1], known[3]]
+    assert _expand(["arm"], known) == [known[1], known[3]]
     with pytest.raises(mjs.UnknownNameError, match="no stream 'tcp_pos'; did you mean 'obs/extra/tcp_pose'"):
-        expand(["tcp_pos"], known)
+        _expand(["tcp_pos"], known)
     with pytest.raises(mjs.UnknownNameError, match="there are obs/extra/tcp_pose, "):
-        expand(["zzz"], known)
+        _expand(["zzz"], known)
 
 
 def test_plot_of_a_recording(recording, tmp_path):

@@ -11,6 +11,7 @@ import threading
 import time
 
 import devtools
+import gymnasium
 import mujoco
 import numpy as np
 import pytest
@@ -140,6 +141,18 @@ def test_only_what_has_changed_is_sent(live):
 
 
 @needs_viser
+def test_hidden_groups(tmp_path, port):
+    """A geom that is shown later is where its body is."""
+    (tmp_path / "model.xml").write_text("<mujoco><worldbody><body name='b' pos='1 2 3'><geom name='g' size='.1' group='3'/></body></worldbody></mujoco>")
+    with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
+        assert not viewer._stage._frames
+        viewer._stage.show_groups({3})
+        assert np.array_equal(viewer._stage._frames[1].position, (1, 2, 3)) and viewer._stage._geoms[0][0] is not None
+        viewer._stage.show_groups({0})
+        assert viewer._stage._geoms[0][0] is None
+
+
+@needs_viser
 def test_a_taken_port_and_the_address(live, capsys):
     assert live.url == f"http://127.0.0.1:{live.port}"
     with mjs.view(live._source, port=live.port, block=False, open_browser=False) as other:
@@ -160,6 +173,75 @@ def test_controls_shapes_and_curves(live):
     names = {m.name for m in messages(live).values() if hasattr(m, "name")}
     assert {"/shapes/sphere", "/shapes/arrow"} <= names
     live._source.set_joint(0, 0, 0.1) if live._source.joints() else None
+
+
+@needs_viser
+def test_an_environment_that_the_user_steps(port, monkeypatch, capsys):
+    """Opening a viewer changes nothing, and update() shows the new episode with its sizes and colours."""
+    env = mjs.make("pick", cameras=[])
+    env.reset(seed=0)
+    before = env.sim.state.copy()
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with mjs.view(env, port=port, block=False) as viewer:
+        assert f"There is no browser here: open {viewer.url} in one." in capsys.readouterr().out
+        assert np.array_equal(env.sim.state, before) and viewer._source.policy is None
+
+        def shown():
+            model = env.sim.model_of(0)
+            return [g for g, (_, key) in viewer._stage._geoms.items() if key and key != surfaces.key_of(model, g)]  # () is a hidden geom
+
+        assert shown() == []
+        env.reset(seed=1)
+        viewer.update()
+        assert shown() == [] and not np.array_equal(env.sim.state, before)
+        np.testing.assert_allclose(viewer._stage._sent[:, :3], env.sim.data.xpos[0], atol=2e-6)
+    env.close()
+
+
+@needs_viser
+def test_cost_of_a_frame(tmp_path, port):
+    """100 bodies that all move. 4 ms of CPU; the limit leaves room for slow machines."""
+    bodies = "".join(f"<body pos='{i % 10} {i // 10} 1'><freejoint/><geom size='.1'/></body>" for i in range(100))
+    (tmp_path / "model.xml").write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
+        positions, turns = (np.array(values) for values in viewer._source.poses(0))
+        costs = []
+        for _ in range(30):
+            positions += 0.01
+            began = time.thread_time()
+            assert viewer._stage.set_poses(positions, turns) == 100
+            costs.append(time.thread_time() - began)
+    assert np.median(costs) < 0.02
+
+
+class Height(mjs.Sensor):
+    """Values, an image and shapes of a user-defined sensor."""
+
+    uuid, unit = "height", "m"
+    observation_space = gymnasium.spaces.Dict({"z": gymnasium.spaces.Box(-9, 9, (1,), np.float32), "image": gymnasium.spaces.Box(0, 255, (4, 6, 3), np.uint8)})
+
+    def compute(self, sim):
+        return {"z": sim.data.xpos[:, 1:2, 2].astype(np.float32), "image": np.full((sim.num_worlds, 4, 6, 3), 7, np.uint8)}
+
+    def debug_vis(self, visualizer):
+        visualizer.add_cylinder((0, 0, 0), (0, 0, 1), 0.01, (1, 0, 0, 1), "height")
+
+
+@needs_viser
+def test_user_defined_sensors_come_first(port):
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities={"ball": mjs.EntityCfg(model=BALL)}, terrain=mjs.TerrainCfg())))
+    sim.add(Height())
+    with mjs.view(sim, port=port, block=False, open_browser=False) as viewer:
+        source = viewer._source
+        assert next(iter(source.streams())) == "height/z" and source.streams()["height/z"] == ("m", 1)
+        assert source.pictures() == ["height/image"] and source.shape_names()[0] == "height"
+        sim.step()
+        viewer.update()
+        assert source.value("height/z", 0) == pytest.approx(sim.data.xpos[0, 1, 2]) and (source.picture("height/image", 0) == 7).all()
+        viewer._drawn["height"].value = True
+        viewer._draw()
+        assert [node.name for node in viewer._layer._nodes] == ["/shapes/cylinder"]
 
 
 @needs_viser
@@ -189,6 +271,8 @@ def test_wrong_things_are_named(live, tmp_path):
         mjs.view(live._source, world=2, block=False, open_browser=False)
     with pytest.raises(mjs.UnknownNameError, match="'pikc' is neither a file nor the name of a task"):
         mjs.view("pikc")
+    with pytest.raises(ValueError, match="'rby1' is a robot: name a task"):
+        mjs.view("rby1")
     with pytest.raises(FileNotFoundError, match=r"no\.xml does not exist"):
         mjs.view(tmp_path / "no.xml")
 
@@ -244,6 +328,34 @@ def test_export(recording, tmp_path):
     assert (tmp_path / "a.viser").stat().st_size > 20_000
     wrong = subprocess.run([*run, "pick", "--export", "a.mp4"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2 and "ends in neither .viser nor .rrd" in wrong.stderr
+
+
+@needs_viser
+def test_export_to_rerun(recording, tmp_path):
+    pytest.importorskip("rerun")
+    command = [sys.executable, "-m", "mjsense", "view", str(recording), "--episode", "1", "--export", "a.rrd"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "Wrote a.rrd.\n"), done.stderr
+    written = (tmp_path / "a.rrd").read_bytes()
+    assert written.startswith(b"RRF") and len(written) > 100_000
+
+
+@needs_viser
+def test_results_and_warnings_of_a_task(port):
+    with mjs.view("pick", port=port, block=False, open_browser=False, cameras=[]) as viewer:
+        source = viewer._source
+        assert {"reward", "success"} <= source.streams().keys() and source.notes(0) == []
+        while not source.value("success", 0)[0]:
+            source.step()
+            assert source.time(0) < 20
+        assert source.value("reward", 0)[0] > 0
+        viewer._policy.value = False
+        viewer._switch()
+        viewer._controls[0].value = 0.5
+        viewer._write(source.set_control, 0, viewer._controls[0])
+        for _ in range(30):
+            source.step()
+        assert abs(source.value("qpos/arm", 0)[0] - 0.5) < 0.05
 
 
 # -------------------------------------------------------------------------------------------------------------------- browser
@@ -350,6 +462,13 @@ def test_the_page_of_a_task(port):
         eventually(lambda: viewer._playing and viewer._source.time(0) > 0.5)
         page.click("button", "Pause")
         eventually(lambda: not viewer._playing)
+        # A chart that was made before there was a value has a time axis.
+        page.click("[role=tab]", "Curves")
+        viewer._events[2] = lambda: viewer._curves.choose("tcp_pose")
+        eventually(lambda: (page.run("document.querySelector('.uplot canvas')?.width") or 0) > 100)
+        for k in range(3):
+            viewer._events[3 + k] = viewer._step_once
+        eventually(lambda: page.run("Object.values(__viserTestpoints.uplots)[0].chart.scales.x.max") == pytest.approx(viewer._source.time(0)))
         assert not page.console
 
 

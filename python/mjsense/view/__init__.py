@@ -49,7 +49,7 @@ def view(
     Raises:
         ModuleNotFoundError: viser is not installed.
     """
-    from mjsense.view.open import source_of
+    from mjsense.view.open import source_of, viewer_of
 
     viewer = viewer_of(source_of(thing, worlds=worlds, seed=seed, **options), world=world, episode=episode, seed=seed, host=host, port=port)
     if block:
@@ -58,14 +58,3 @@ def view(
         print(f"Viewer: {viewer.url}", flush=True)
         viewer.open(open_browser)
     return viewer
-
-
-def viewer_of(source: Any, *, world: int, episode: int, seed: int, host: str, port: int) -> Viewer:
-    """The viewer of what ``source_of`` has found."""
-    from mjsense.dataset import Dataset
-    from mjsense.view.live import LiveViewer
-    from mjsense.view.recorded import RecordingViewer
-
-    if isinstance(source, Dataset):
-        return RecordingViewer(source, episode=episode, host=host, port=port)
-    return LiveViewer(source, world=world, host=host, port=port, seed=seed)

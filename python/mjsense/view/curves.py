@@ -101,4 +101,6 @@ class Curves:
             kept = self._history.get(name, [])
             times = np.array([t for t, _ in kept])
             values = np.array([row for _, row in kept]).reshape(-1, width)
+        if not len(times):  # a chart of no points cannot find its time axis later
+            times, values = np.zeros(1), np.full((1, width), np.nan)
         return (times, *np.ascontiguousarray(values.reshape(len(times), width).T, np.float64))

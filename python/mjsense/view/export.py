@@ -60,12 +60,13 @@ def export(source: LiveSource | Dataset, path: str | Path, *, world: int = 0, ep
 
 def _live(source: LiveSource, world: int, count: int, full: bool) -> Iterator[Moment]:
     streams, pictures = (list(source.streams()), source.pictures()) if full else ([], [])
-    changed = True
+    shown = None
     for step in range(count):
         values = {name: source.value(name, world) for name in streams}
         images = {name: source.picture(name, world) for name in pictures}
-        yield Moment(step * source.period, source.model(world) if changed else None, *source.poses(world), values, images)
-        changed = source.step()
+        yield Moment(step * source.period, source.model(world) if source.version != shown else None, *source.poses(world), values, images)
+        shown = source.version
+        source.step()
 
 
 def _recorded(dataset: Dataset, episode: Episode, full: bool) -> Iterator[Moment]:

@@ -27,12 +27,18 @@ class Triangles(NamedTuple):
     """float32 [V, 2]; (0, 0) is the first texel of the texture. None: the shape has no texture coordinates."""
 
 
-def of_geom(model: Any, geom: int, reach: float) -> Triangles | None:
+def of_geom(model: Any, geom: int, reach: float, mapped: bool = True) -> Triangles | None:
     """The triangles of a geom; None if it has none.
 
     Args:
         reach: Half side of planes without an end. [m]
+        mapped: With texture coordinates. Without them, vertices that agree in position and normal are one.
     """
+    shape = _of_geom(model, geom, reach, mapped)
+    return shape if mapped or shape is None or shape.uv is None else welded(shape)
+
+
+def _of_geom(model: Any, geom: int, reach: float, mapped: bool) -> Triangles | None:
     kind, size, data = int(model.geom_type[geom]), model.geom_size[geom], int(model.geom_dataid[geom])
     types = _mujoco.Geom
     if kind == types.PLANE:
@@ -40,7 +46,7 @@ def of_geom(model: Any, geom: int, reach: float) -> Triangles | None:
     if kind == types.HFIELD:
         return _height_field(model, data)
     if kind in (types.MESH, types.SDF):
-        return _mesh(model, data) if data >= 0 else None
+        return _mesh(model, data, mapped) if data >= 0 else None
     if kind == types.BOX:
         unit = _unit_box()
         return unit._replace(vertices=unit.vertices * size.astype(np.float32))
@@ -173,17 +179,22 @@ def _height_field(model: Any, field: int) -> Triangles:
     return Triangles(vertices.reshape(-1, 3).astype(np.float32), _grid_faces(*heights.shape), _unit(normals), uv.reshape(-1, 2).astype(np.float32))
 
 
-def _mesh(model: Any, mesh: int) -> Triangles | None:
+def _mesh(model: Any, mesh: int, mapped: bool) -> Triangles | None:
     first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     if not count:
         return None
     faces = slice(first, first + count)
     corners = [model.mesh_face[faces], model.mesh_facenormal[faces]]
-    textured = int(model.mesh_texcoordadr[mesh]) >= 0
+    textured = mapped and int(model.mesh_texcoordadr[mesh]) >= 0
     if textured:
         corners.append(model.mesh_facetexcoord[faces])
-    ids, where = np.unique(np.stack([c.reshape(-1) for c in corners], 1), axis=0, return_inverse=True)
-    vertices = model.mesh_vert[int(model.mesh_vertadr[mesh]) + ids[:, 0]]
-    normals = model.mesh_normal[int(model.mesh_normaladr[mesh]) + ids[:, 1]]
-    uv = model.mesh_texcoord[int(model.mesh_texcoordadr[mesh]) + ids[:, 2]].astype(np.float32) if textured else None
+    # Each combination of position, normal and texture coordinates is a vertex.
+    key = np.zeros(3 * count, np.int64)
+    for ids in corners:
+        key = key * (int(ids.max()) + 1) + ids.reshape(-1)
+    _, first, where = np.unique(key, return_index=True, return_inverse=True)
+    ids = [c.reshape(-1)[first] for c in corners]
+    vertices = model.mesh_vert[int(model.mesh_vertadr[mesh]) + ids[0]]
+    normals = model.mesh_normal[int(model.mesh_normaladr[mesh]) + ids[1]]
+    uv = model.mesh_texcoord[int(model.mesh_texcoordadr[mesh]) + ids[2]].astype(np.float32) if textured else None
     return Triangles(vertices.astype(np.float32), where.reshape(-1, 3).astype(np.uint32), normals.astype(np.float32), uv)

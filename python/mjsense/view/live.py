@@ -52,7 +52,7 @@ class LiveViewer(Viewer):
             self._curves = Curves(gui, source.streams(), self._later)
         with tabs.add_tab("Control"):
             self._sliders(gui)
-        self._stage.set_model(source.model(world))
+        self._model_changed()
         self._look(*source.camera(world))
         self._show()
 
@@ -94,7 +94,6 @@ class LiveViewer(Viewer):
     def _reset(self) -> None:
         self._source.reset(int(self._seed.value))
         self._curves.clear()
-        self._model_changed()
         self._show()
 
     def _switch(self) -> None:
@@ -104,11 +103,11 @@ class LiveViewer(Viewer):
     # ----------------------------------------------------------------------------------------------------------- showing
 
     def _model_changed(self) -> None:
+        self._version = self._source.version
         self._stage.set_model(self._source.model(self._world))
 
     def _step(self) -> None:
-        if self._source.step():
-            self._model_changed()
+        self._source.step()
         self._curves.append(self._source.time(self._world), lambda name: self._source.value(name, self._world))
 
     def _advance(self, now: float) -> bool:
@@ -135,6 +134,8 @@ class LiveViewer(Viewer):
 
     def _show(self) -> None:
         source, world = self._source, self._world
+        if source.version != self._version:
+            self._model_changed()
         self._stage.set_poses(*source.poses(world))
         if self._layer_used:
             self._draw()
@@ -142,7 +143,7 @@ class LiveViewer(Viewer):
         if now < self._panels_due and self._playing:
             return
         self._panels_due = now + _PANELS
-        self._clock.content = f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s"
+        self._clock.content = "\n\n".join([f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s", *source.notes(world)])
         self._pictures.refresh(lambda name: source.picture(name, world))
         self._curves.append(source.time(world), lambda name: source.value(name, world))
         self._curves.refresh()

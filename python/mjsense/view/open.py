@@ -6,7 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mjsense.configs import SceneCfg
+from mjsense._core import robot_names
+from mjsense.configs import SceneCfg, SceneFileCfg
 from mjsense.dataset import Dataset
 from mjsense.env import TaskEnv
 from mjsense.errors import UnknownNameError
@@ -14,10 +15,13 @@ from mjsense.scene import Scene
 from mjsense.simulation import Simulation
 from mjsense.task import task_names
 from mjsense.vector import TaskVectorEnv, make_vec
+from mjsense.view.live import LiveViewer
+from mjsense.view.recorded import RecordingViewer
 from mjsense.view.source import LiveSource, TaskSource
+from mjsense.view.viewer import Viewer
 
 _IMAGE = {"width": 320, "height": 240, "depth": True, "segmentation": True}
-_SUBSTEPS = 1 / 60  # s, about: period of a model that is viewed alone
+_PERIOD = 1 / 60  # s, about: control step of a model that is viewed alone
 
 
 def is_recording(path: str | Path) -> bool:
@@ -35,7 +39,8 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
     """What a viewer can show.
 
     Args:
-        thing: A simulation, an environment, a data set, the path of a recording or an MJCF, or the name or file of a scene or a task.
+        thing: A simulation, an environment, a data set, the path of a recording or an MJCF, or the name, file or object
+            of a scene or a task.
         options: Options of :func:`mjsense.make_vec`, for tasks and scenes.
     """
     if isinstance(thing, (LiveSource, Dataset)):
@@ -53,10 +58,15 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
         if path.suffix in (".xml", ".mjcf"):
             return _model(path, worlds, seed)
     options = {"policy": "planner", "render_mode": "rgb_array", "num_envs": worlds, "seed": seed, **_IMAGE, **options}
-    if not isinstance(thing, Path) and (not isinstance(thing, str) or thing in task_names()):
-        return TaskSource(make_vec(thing, **options), str(thing))
+    if not isinstance(thing, (str, Path, SceneFileCfg)):
+        return TaskSource(make_vec(thing, **options), type(thing).__name__)
+    if isinstance(thing, str) and thing in task_names():
+        return TaskSource(make_vec(thing, **options), thing)
+    if thing in robot_names():
+        raise ValueError(f"'{thing}' is a robot: name a task, and the robot as an option (--robot {thing}, robot='{thing}')")
+    title = thing.name if isinstance(thing, SceneFileCfg) else str(thing)
     try:
-        return TaskSource(make_vec(options.pop("task", "pick"), scene=thing, **options), str(thing))
+        return TaskSource(make_vec(options.pop("task", "pick"), scene=thing, **options), title)
     except UnknownNameError as error:
         raise UnknownNameError(f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}") from None
 
@@ -66,6 +76,13 @@ def _model(path: Path, worlds: int, seed: int) -> LiveSource:
         raise FileNotFoundError(f"{path} does not exist")
     scene = Scene(SceneCfg(base=path))
     timestep = float(scene.model.opt.timestep)
-    source = LiveSource(Simulation(scene, worlds, decimation=max(1, round(_SUBSTEPS / timestep)), seed=seed), path.name)
+    source = LiveSource(Simulation(scene, worlds, decimation=max(1, round(_PERIOD / timestep)), seed=seed), path.name)
     source.reset(seed)
     return source
+
+
+def viewer_of(source: Any, *, world: int, episode: int, seed: int, host: str, port: int) -> Viewer:
+    """The viewer of what ``source_of`` has found."""
+    if isinstance(source, Dataset):
+        return RecordingViewer(source, episode=episode, host=host, port=port)
+    return LiveViewer(source, world=world, host=host, port=port, seed=seed)

@@ -11,6 +11,7 @@ from mjsense.drawing import DebugShapes
 
 POSE = "m, wxyz"
 """Unit of streams that are poses: position and quaternion."""
+_MIN_LENGTH = 0.12  # m, of the arrows of a frame
 _BODY = "body "  # frame of poses relative to a body
 
 
@@ -35,7 +36,8 @@ class PoseStream(NamedTuple):
                 body = model.body(self.frame.removeprefix(_BODY)).id
                 turn = xmat[body].reshape(3, 3)
                 position, rotation = xpos[body] + turn @ position, turn @ rotation
-            shapes.add_frame(position, rotation, 1.5 * shapes.meansize, self.name, 0.04 * shapes.meansize)
+            length = max(_MIN_LENGTH, 1.5 * shapes.meansize)
+            shapes.add_frame(position, rotation, length, self.name, 0.04 * length)
 
 
 def rotation_of(quaternion: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from mjsense import _mujoco
 from mjsense._show import is_image
 from mjsense.drawing import DebugShapes
+from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 from mjsense.vector import TaskVectorEnv
 from mjsense.view.camera import View, first_view
@@ -43,10 +44,9 @@ class LiveSource:
 
     # ---------------------------------------------------------------------------------------------------------- stepping
 
-    def step(self) -> bool:
-        """Advances all worlds by one control step. Returns whether the models of worlds may have changed."""
+    def step(self) -> None:
+        """Advances all worlds by one control step."""
         self.sim.step()
-        return False
 
     def reset(self, seed: int) -> None:
         """Starts a new episode in all worlds."""
@@ -59,7 +59,16 @@ class LiveSource:
         """Simulation time of a world, s."""
         return float(self.sim.time[world])
 
+    def notes(self, world: int) -> list[str]:
+        """MuJoCo's warnings in a world, and how often they were raised."""
+        return [f"{name}: {counts[world]}" for name, counts in self.sim.warning_counts.items() if counts[world]]
+
     # ----------------------------------------------------------------------------------------------------------- reading
+
+    @property
+    def version(self) -> int:
+        """Differs from an earlier value if the models of worlds may have changed since."""
+        return self.sim._core.model_version()
 
     def model(self, world: int) -> Any:
         """The model with the values of one world."""
@@ -72,7 +81,8 @@ class LiveSource:
 
     def streams(self) -> dict[str, StreamInfo]:
         """Streams that can be drawn as curves, by name."""
-        found = {name: StreamInfo(spec.unit, rows[0].size) for name, (spec, rows) in self._sensor_rows().items()}
+        own = {name: (sensor.unit, rows) for name, (sensor, rows) in self._user_rows().items() if rows.ndim < 4 and rows.dtype.kind in "fiub"}
+        found = {name: StreamInfo(unit, rows[0].size) for name, (unit, rows) in {**own, **self._sensor_rows()}.items()}
         for name, unit in (("qpos", "m, rad"), ("qvel", "m/s, rad/s"), ("ctrl", "")):
             found.setdefault(name, StreamInfo(unit, getattr(self.sim, name).shape[1]))
         return {name: info for name, info in found.items() if 0 < info.width <= MAX_CURVES}
@@ -83,8 +93,8 @@ class LiveSource:
         return np.asarray(getattr(self.sim, name) if rows is None else rows, np.float64)[world].reshape(-1)
 
     def pictures(self) -> list[str]:
-        """Names of images."""
-        found = []
+        """Names of images, those of user-defined sensors first."""
+        found = [name for name, (_, rows) in self._user_rows().items() if is_image(rows.shape[1:], rows.dtype)]
         for name, sensor in self.sim.scene.sensors.items():
             if getattr(sensor, "kind", "") == "camera":
                 found += [f"{name}/{field}" for field, spec in sensor.specs.items() if is_image(spec.shape, spec.dtype)]
@@ -92,10 +102,29 @@ class LiveSource:
 
     def picture(self, name: str, world: int) -> np.ndarray:
         """An image [H, W, C]. Only images that are shown are read, and with them computed."""
+        own = self._user_row(name)
+        if own is not None:
+            return own[world]
         sensor, _, field = name.rpartition("/")
         return self.sim.scene[sensor].fields[field][world]
 
+    def _user_rows(self) -> dict[str, tuple[Sensor, np.ndarray]]:
+        """Rows of the sensors that are written in Python, as they were last computed."""
+        return {f"{sensor.uuid}/{spec['name']}".removesuffix("/"): (sensor, rows) for sensor in self.sim._python if sensor._mjs_rows
+                for spec, rows in zip(sensor._mjs_row_specs(), sensor._mjs_rows)}  # fmt: skip
+
+    def _user_row(self, name: str) -> np.ndarray | None:
+        found = self._user_rows().get(name)
+        if found is None:
+            return None
+        sensor, rows = found
+        sensor.rows  # computes them
+        return rows
+
     def _row(self, name: str) -> np.ndarray | None:
+        own = self._user_row(name)
+        if own is not None:
+            return own
         sensors = self.sim.scene.sensors
         if name in sensors:
             data = sensors[name].data
@@ -103,8 +132,8 @@ class LiveSource:
         sensor, _, field = name.rpartition("/")
         return sensors[sensor].fields[field] if sensor in sensors else None
 
-    def _sensor_rows(self) -> dict[str, tuple[Any, np.ndarray]]:
-        """Numeric fields of the scene's sensors: name -> (spec, rows). Reads no images."""
+    def _sensor_rows(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Numeric fields of the scene's sensors: name -> (unit, rows). Reads no images."""
         found = {}
         for name, sensor in self.sim.scene.sensors.items():
             specs = getattr(sensor, "specs", None)
@@ -112,15 +141,17 @@ class LiveSource:
                 continue
             for field, spec in specs.items():
                 if np.dtype(spec.dtype).kind in "fiub":
-                    found[f"{name}/{field}" if field else name] = spec, np.empty((1, *spec.shape), spec.dtype)
+                    found[f"{name}/{field}" if field else name] = spec.unit, np.empty((1, *spec.shape), spec.dtype)
         return found
 
     # ----------------------------------------------------------------------------------------------------------- drawing
 
     def shape_names(self) -> list[str]:
         """Names of everything that can be drawn: sensors with shapes, streams of poses, and contacts."""
-        found = []
-        for name in self.sim.scene.sensors:
+        found = [sensor.uuid for sensor in self.sim._python if type(sensor).debug_vis is not Sensor.debug_vis]
+        for name, sensor in self.sim.scene.sensors.items():
+            if isinstance(sensor, Sensor):
+                continue
             try:
                 self.sim.debug_shapes(0, [name])
             except (ValueError, TypeError, RuntimeError):
@@ -203,25 +234,23 @@ class TaskSource(LiveSource):
     def __init__(self, env: TaskVectorEnv, title: str = "") -> None:
         super().__init__(env.sim, title)
         self._env = env
-        env.reset(seed=env._seed)
+        self.policy = True if env._has_policy else None
+        self._results = {name: np.zeros((env.num_envs, 1)) for name in ("reward", "success")}
+        if not env._started:
+            env.reset(seed=env._seed)
         self._action = self._held()
-        try:
-            env.expert_action()
-            self.policy = True
-        except ValueError:  # it has no policy
-            self.policy = None
 
-    def step(self) -> bool:
+    def step(self) -> None:
         env = self._env
         begins = bool(env._ended.any())
         done = None
         if self.policy:
             self._action = env.expert_action().astype(np.float64)
             done = env.expert_done
-        env.step(self._action, done)
+        _, reward, _, _, info = env.step(self._action, done)
+        self._results["reward"][:, 0], self._results["success"][:, 0] = reward, info["success"]
         if begins:
             self._action = self._held()
-        return begins
 
     def reset(self, seed: int) -> None:
         self._env.reset(seed=seed)
@@ -240,12 +269,15 @@ class TaskSource(LiveSource):
                     break
         return action
 
-    def _sensor_rows(self) -> dict[str, tuple[Any, np.ndarray]]:
-        own = {name: (self._env.specs[name], rows) for name, rows in self._env.rows.items() if rows.dtype.kind in "fiub" and rows.ndim < 4}
-        return {**own, **super()._sensor_rows()}
+    def _sensor_rows(self) -> dict[str, tuple[str, np.ndarray]]:
+        own = {name: (self._env.specs[name].unit, rows) for name, rows in self._env.rows.items() if rows.dtype.kind in "fiub" and rows.ndim < 4}
+        return {**own, **{name: ("", rows) for name, rows in self._results.items()}, **super()._sensor_rows()}
 
     def _row(self, name: str) -> np.ndarray | None:
-        return self._env.rows[name] if name in self._env.rows else super()._row(name)
+        for rows in (self._env.rows, self._results):
+            if name in rows:
+                return rows[name]
+        return super()._row(name)
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()

@@ -14,6 +14,7 @@ VISIBLE_GROUPS = (0, 1, 2)
 MIN_REACH = 10.0
 """Half side of planes without an end, at least. [m]"""
 _DIRECTIONAL = 1  # mjtLightType
+_MAX_SHADOW_MAPS = 6  # a browser binds 16 textures at a time
 _MIN_CHANGE = 1e-6  # m, or of a quaternion's components: smaller changes of a pose are not sent
 
 
@@ -78,16 +79,16 @@ class Stage:
         return model.nbody, model.ngeom, model.nlight, model.geom_bodyid.tobytes(), bytes(model.names)
 
     def _clear(self) -> None:
-        for frame in self._frames.values():
-            frame.remove()
-        for light in self._lights:
-            light.remove()
+        for handle in (*self._lights, *self._frames.values()):  # lights may be below frames
+            handle.remove()
         self._frames, self._geoms, self._lights, self._light_key = {}, {}, [], b""
 
     def _frame(self, model: Any, body: int) -> str:
         name = f"/bodies/{node(model, 'body', body)}"
         if body not in self._frames:
-            self._frames[body] = self._server.scene.add_frame(name, show_axes=False)
+            pose = self._sent[body]  # NaN before the first poses
+            at = {"position": pose[:3], "wxyz": pose[3:]} if np.isfinite(pose).all() else {}
+            self._frames[body] = self._server.scene.add_frame(name, show_axes=False, **at)
         return name
 
     def _set_geom(self, model: Any, geom: int, reach: float) -> None:
@@ -116,16 +117,16 @@ class Stage:
         self._geoms[geom] = handle, key
 
     def _set_lights(self, model: Any) -> None:
-        names = ("active", "type", "pos", "dir", "diffuse", "castshadow", "bodyid")
-        key = b"".join(getattr(model, f"light_{name}").tobytes() for name in names) + model.vis.headlight.diffuse.tobytes()
+        names = ("active", "type", "pos", "dir", "ambient", "diffuse", "castshadow", "bodyid")
+        head = model.vis.headlight
+        key = b"".join(getattr(model, f"light_{name}").tobytes() for name in names) + head.ambient.tobytes() + head.diffuse.tobytes()
         if key == self._light_key:
             return
         self._light_key = key
         for light in self._lights:
             light.remove()
         self._lights = []
-        scene, head = self._server.scene, model.vis.headlight
-        ambient = np.zeros(3)
+        scene, ambient, maps = self._server.scene, np.zeros(3), _MAX_SHADOW_MAPS
         if int(head.active):
             ambient += np.array(head.ambient)
             # The light at the camera becomes one from all sides that is brighter from above.
@@ -134,9 +135,11 @@ class Stage:
             self._lights.append(scene.add_light_hemisphere("/lights/head", sky_color=bright["color"], ground_color=ground, intensity=bright["intensity"]))
         for light in np.flatnonzero(model.light_active).tolist():
             ambient += model.light_ambient[light]
-            direction, shadow = model.light_dir[light], bool(model.light_castshadow[light])
+            direction, directional = model.light_dir[light], int(model.light_type[light]) == _DIRECTIONAL
+            shadow = bool(model.light_castshadow[light]) and maps > 0
+            maps -= shadow * (3 if directional else 1)
             name, bright = f"/lights/{node(model, 'light', light)}", _light(model.light_diffuse[light])
-            if int(model.light_type[light]) == _DIRECTIONAL:
+            if directional:
                 made = scene.add_light_directional(name, **bright, cast_shadow=shadow, position=tuple(-10 * direction))
             else:
                 parent = self._frame(model, int(model.light_bodyid[light]))

@@ -51,16 +51,16 @@ def rgba_of(model: Any, geom: int) -> np.ndarray:
 def of_geom(model: Any, geom: int, reach: float) -> Surface | None:
     """None if nothing is to be seen. ``reach``: half side of planes without an end. [m]"""
     rgba = rgba_of(model, geom)
-    shape = geometry.of_geom(model, geom, reach) if rgba[3] > 0 else None
+    texture = _texture_of(model, int(model.geom_matid[geom]))
+    shape = geometry.of_geom(model, geom, reach, mapped=texture >= 0) if rgba[3] > 0 else None
     if shape is None:
         return None
-    texture = _texture_of(model, int(model.geom_matid[geom]))
     if texture < 0:
-        return Surface(geometry.welded(shape), rgba, None, None)
+        return Surface(shape, rgba, None, None)
     pixels, cube = _pixels(model, texture), int(model.tex_type[texture]) == _TEXTURE_CUBE
     shape = _cube_mapped(model, geom, shape) if cube else _mapped(model, geom, shape)
-    if shape.uv is None or pixels.reshape(-1, 3).std(0).max() < _PLAIN:
-        mean = pixels.reshape(-1, 3).mean(0) / 255
+    if shape.uv is None or pixels[::4, ::4].reshape(-1, 3).std(0).max() < _PLAIN:
+        mean = pixels[::4, ::4].reshape(-1, 3).mean(0) / 255
         return Surface(geometry.welded(shape), np.array([*(rgba[:3] * mean), rgba[3]]), None, None)
     material = int(model.geom_matid[geom])
     return Surface(shape, rgba, glb(shape, *_encoded(pixels), rgba, float(1 - 0.5 * model.mat_shininess[material])), pixels)
@@ -106,11 +106,9 @@ def _encode(digest: bytes, hidden: _Hidden) -> bytes:
     from PIL import Image  # pyright: ignore[reportMissingImports]  # a dependency of viser
 
     height, width = hidden.pixels.shape[:2]
-    limit = _MAX_SIDE if height <= 2 * width else 6 * _MAX_SIDE // 2
-    image = Image.fromarray(np.ascontiguousarray(hidden.pixels))
-    if max(height, width) > limit:
-        scale = limit / max(height, width)
-        image = image.resize((max(1, round(width * scale)), max(1, round(height * scale))), Image.Resampling.LANCZOS)
+    faces = 6 if height == 6 * width else 1
+    factor = -(-max(height // faces, width) // _MAX_SIDE)
+    image = Image.fromarray(np.ascontiguousarray(hidden.pixels)).reduce(factor)
     file = io.BytesIO()
     image.save(file, "JPEG", quality=85)
     return file.getvalue()

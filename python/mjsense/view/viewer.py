@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import sys
 import threading
 import time
 import warnings
@@ -139,8 +141,11 @@ class Viewer:
 
     def open(self, open_browser: bool = True) -> None:
         """Opens the page in the default browser. Without one, the address is to be opened by hand."""
-        if open_browser and not webbrowser.open(self.url):
-            print(f"There is no browser: open {self.url} yourself.", flush=True)
+        if not open_browser:
+            return
+        display = sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+        if not display or not webbrowser.open(self.url):  # without a display, a browser for terminals would be started
+            print(f"There is no browser here: open {self.url} in one.", flush=True)
 
     def run(self, open_browser: bool = True) -> None:
         """Shows the worlds until Ctrl-C or :meth:`close`."""
