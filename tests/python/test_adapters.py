@@ -2,10 +2,11 @@
 """mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
 The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
-another robosuite. MJSENSE_TEST_ADAPTERS=adapters,libero makes them.
+another robosuite, and build/warp. MJSENSE_TEST_ADAPTERS=adapters,libero,warp makes them.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -38,6 +39,7 @@ PACKAGES = {
         "nanobind-backend>=1.0",
         "PyOpenGL",
     ),
+    "warp": ("mujoco==4.0.0", "mujoco-warp==4.0.0", "gymnasium==1.4.0", "nanobind-backend>=1.0"),
 }
 """Name -> packages of the environments."""
 
@@ -105,5 +107,17 @@ def test_code_of_the_pages(environment, page):
     run(environment("libero" if page == "libero" else "adapters"), script, ROOT / f"docs/drop_in/{page}.md", str(PAGES[page]))
 
 
+def test_code_of_the_page_on_mujoco_warp(environment):
+    (block,) = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/drop_in/mujoco_warp.md").read_text(), re.MULTILINE | re.DOTALL)
+    check = """
+import numpy as np
+for data, qpos, image in zip(datas, worlds.qpos.numpy(), images, strict=True):
+    assert 0.2 < qpos[2] < 0.3 and (data.geom_xpos[1] == data.qpos[:3]).all()
+    assert image[..., 0].max() > 100 and image.std() > 20
+assert worlds.qpos.numpy().ctypes.data == worlds.qpos.ptr
+"""
+    run(environment("warp"), "-c", block + check)
+
+
 def test_every_page_is_tested():
-    assert {page.stem for page in ROOT.glob("docs/drop_in/*.md")} == set(PAGES)
+    assert {page.stem for page in ROOT.glob("docs/drop_in/*.md")} == {*PAGES, "mujoco_warp"}
