@@ -89,6 +89,7 @@ def test_height_fields_and_meshes_are_those_of_the_model():
     assert len(shape.faces) == 4 and set(map(tuple, shape.vertices)) == set(map(tuple, model.mesh_vert))
 
 
+@needs_viser
 def test_textures_of_boxes():
     """A cube texture with one colour for each face: every triangle of a box reads the texels of its face."""
     faces = {"right": (1, 0, 0), "left": (-1, 0, 0), "up": (0, 1, 0), "down": (0, -1, 0), "front": (0, 0, 1), "back": (0, 0, -1)}
