@@ -18,7 +18,7 @@ _LOG_PERIOD = 10.0  # s between two lines of a file
 
 def interactive() -> bool:
     """Whether stderr is a terminal, or the output of a notebook, so that a line can be overwritten."""
-    return sys.stderr.isatty() or type(sys.stderr).__module__.startswith("ipykernel.")
+    return sys.stderr is not None and (sys.stderr.isatty() or type(sys.stderr).__module__.startswith("ipykernel."))
 
 
 class ProgressLine:

@@ -89,6 +89,7 @@ def test_height_fields_and_meshes_are_those_of_the_model():
     assert len(shape.faces) == 4 and set(map(tuple, shape.vertices)) == set(map(tuple, model.mesh_vert))
 
 
+@needs_viser
 def test_textures_of_boxes():
     """A cube texture with one colour for each face: every triangle of a box reads the texels of its face."""
     faces = {"right": (1, 0, 0), "left": (-1, 0, 0), "up": (0, 1, 0), "down": (0, -1, 0), "front": (0, 0, 1), "back": (0, 0, -1)}
@@ -311,6 +312,17 @@ def test_a_recording_without_replay_data(tmp_path, port, capsys):
 
 
 @needs_viser
+def test_a_missing_video(tmp_path, port):
+    """It is named in the page; everything else can be seen."""
+    mjs.record("pick", out=tmp_path, horizon=5, keep_failures=True, width=32, height=24)
+    next(tmp_path.glob("house_0/*exo_camera_1*.mp4")).unlink()
+    with mjs.view(tmp_path, port=port, block=False, open_browser=False) as viewer:
+        viewer.update()
+        assert list(viewer._pictures._panels) == ["wrist_camera"] and not viewer._pictures._boxes["exo_camera_1"].value
+        assert any("exo_camera_1: " in getattr(getattr(m, "props", None), "_markdown", "") for m in messages(viewer).values())
+
+
+@needs_viser
 def test_ctrl_c_ends_the_program(port):
     command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
@@ -470,6 +482,20 @@ def test_the_page_of_a_task(port):
             viewer._events[3 + k] = viewer._step_once
         eventually(lambda: page.run("Object.values(__viserTestpoints.uplots)[0].chart.scales.x.max") == pytest.approx(viewer._source.time(0)))
         assert not page.console
+
+
+@needs_viser
+@needs_browser
+def test_ctrl_c_while_a_page_plays(port):
+    command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open", "--world", "1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
+        process.stdout.readline()
+        with devtools.Page(f"http://127.0.0.1:{port}") as page:
+            page.click("button", "Play")
+            eventually(lambda: "World 1 of 2, t = 0.5" in page.run("document.body.textContent"))
+            process.send_signal(signal.SIGINT)
+            out, errors = process.communicate(timeout=30)
+    assert (process.returncode, out, errors) == (0, "", "")
 
 
 @needs_viser

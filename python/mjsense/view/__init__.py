@@ -51,7 +51,7 @@ def view(
     """
     from mjsense.view.open import source_of, viewer_of
 
-    viewer = viewer_of(source_of(thing, worlds=worlds, seed=seed, **options), world=world, episode=episode, seed=seed, host=host, port=port)
+    viewer = viewer_of(source_of(thing, worlds=max(worlds, world + 1), seed=seed, **options), world=world, episode=episode, seed=seed, host=host, port=port)
     if block:
         viewer.run(open_browser)
     else:

@@ -44,7 +44,14 @@ class Pictures:
         for name, box in self._boxes.items():
             if not box.value:
                 continue
-            image = read(name)
+            try:
+                image = read(name)
+            except (OSError, RuntimeError) as error:  # a video that is missing or damaged
+                box.value = False
+                if self._folder is not None:
+                    with self._folder:
+                        self._gui.add_markdown(f"{name}: {error}")
+                continue
             step = -(-image.shape[1] // _MAX_WIDTH)
             pixels = coloured((image[..., None] if image.ndim == 2 else image)[::step, ::step])
             if pixels is None:

@@ -85,7 +85,7 @@ class Viewer:
         self._server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         self._stage, self._layer = Stage(self._server), ShapeLayer(self._server)
         self._events: dict[int, Callable[[], None]] = {}
-        self._lock = threading.Lock()
+        self._lock, self._wake = threading.Lock(), threading.Event()
         self._closed = self._playing = False
         self._start()
 
@@ -96,6 +96,7 @@ class Viewer:
             if event.client is not None:  # None: the program has set the value
                 with self._lock:
                     self._events[id(handle)] = action
+                self._wake.set()
 
         (handle.on_click if hasattr(handle, "on_click") else handle.on_update)(note)
 
@@ -123,6 +124,7 @@ class Viewer:
         camera.position, camera.look_at, camera.fov = position, target, fov
 
     def _handle_events(self) -> bool:
+        self._wake.clear()
         with self._lock:
             events, self._events = self._events, {}
         for action in events.values():
@@ -149,34 +151,26 @@ class Viewer:
 
     def run(self, open_browser: bool = True) -> None:
         """Shows the worlds until Ctrl-C or :meth:`close`."""
-        print(f"Viewer: {self.url} (Ctrl-C ends it)", flush=True)
-        self.open(open_browser)
         try:
+            print(f"Viewer: {self.url} (Ctrl-C ends it)", flush=True)
+            self.open(open_browser)
             while not self._closed:
                 began = time.perf_counter()
                 busy = self._handle_events()
                 if self._closed:
                     break
                 busy |= self._advance(began) if self.watched else False
-                rest = (_FRAME if busy else _IDLE) - (time.perf_counter() - began)
-                if not busy:
-                    self._wait(began + _IDLE)
-                elif rest > 0:
-                    time.sleep(rest)
+                self._wake.wait(max(0.0, began + (_FRAME if busy else _IDLE) - time.perf_counter()))
         except KeyboardInterrupt:
             pass
         finally:
             self.close()
 
-    def _wait(self, until: float) -> None:
-        """Returns at the next event, or at this time."""
-        while time.perf_counter() < until and not self._events and not self._closed:
-            time.sleep(0.005)
-
     def close(self) -> None:
         """Stops the server."""
         if not self._closed:
             self._closed = True
+            self._wake.set()
             stop(self._server)
 
     def __enter__(self) -> Viewer:
