@@ -799,6 +799,8 @@ class SceneObjectCfg(_config_methods.Config):
     """Objects are placed in or on it; it is not picked up."""
     color: str | None = None
     """Colour of a receptacle, which distinguishes it from others of its kind."""
+    material: str | None = None
+    """Material as an adjective in instructions: ``wooden``, ``metal``. By default it is not mentioned."""
     sizes: Sequence[float] | None = None
     """Minimum and maximum scale of this object, instead of the scene's."""
 
@@ -815,6 +817,8 @@ class SceneRegionCfg(_config_methods.Config):
     """Area for the origins of objects: min x, max x, min y, max y in the world; all 0: the whole surface. [m]"""
     target_area: Sequence[float] | None = None
     """The same for the object that the task is about. [m]"""
+    text: str | None = None
+    """What the surface is called in instructions, such as ``desk in the study``; by default it is not mentioned."""
 
 
 @dataclass

@@ -62,6 +62,7 @@ struct SceneObjectCfg {
   std::vector<std::string> rests{"upright"};
   bool receptacle = false;
   std::string color;
+  std::string material;
   std::optional<std::array<double, 2>> sizes;
 };
 template <class V>
@@ -75,6 +76,10 @@ void visit_fields(V& v, SceneObjectCfg& c) {
   v("receptacle", c.receptacle, "Objects are placed in or on it; it is not picked up.");
   v("color", c.color, "Colour of a receptacle, which distinguishes it from others of its kind.")
       .or_none();
+  v("material", c.material,
+    "Material as an adjective in instructions: ``wooden``, ``metal``. By default it is not "
+    "mentioned.")
+      .or_none();
   v("sizes", c.sizes, "Minimum and maximum scale of this object, instead of the scene's.")
       .within(0.1, 10);
 }
@@ -84,6 +89,7 @@ struct SceneRegionCfg {
   std::string on;
   std::array<double, 4> area{};
   std::optional<std::array<double, 4>> target_area;
+  std::string text;
 };
 template <class V>
 void visit_fields(V& v, SceneRegionCfg& c) {
@@ -97,6 +103,10 @@ void visit_fields(V& v, SceneRegionCfg& c) {
     "surface.")
       .unit("m");
   v("target_area", c.target_area, "The same for the object that the task is about.").unit("m");
+  v("text", c.text,
+    "What the surface is called in instructions, such as ``desk in the study``; by default it is "
+    "not mentioned.")
+      .or_none();
 }
 
 struct SceneRobotCfg {
