@@ -14,6 +14,7 @@ import sys
 from types import ModuleType
 
 COMMANDS = {
+    "assets": "Install the packages with further objects for scenes.",
     "replay": "Replay recorded episodes and compare them with the recording.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""

@@ -27,6 +27,8 @@ struct SceneEntityCfg {
   std::vector<std::string> without;
   std::optional<std::array<int, 2>> inertia_groups;
   int hidden_group = -1;
+  std::optional<double> mass;
+  std::optional<std::array<double, 3>> friction;
 };
 template <class V>
 void visit_fields(V& v, SceneEntityCfg& c) {
@@ -49,6 +51,9 @@ void visit_fields(V& v, SceneEntityCfg& c) {
   v("hidden_group", c.hidden_group,
     "Group of geoms that take part in contacts but are invisible; -1: groups 3 and up.")
       .within(-1, 5);
+  v("mass", c.mass, "Mass of the whole model, instead of that of its file.").unit("kg").positive();
+  v("friction", c.friction,
+    "Sliding, torsional and rolling friction of its geoms, instead of those of its file.");
 }
 
 // Resting orientations of an object: as in its model, on its side (rotated about y), on its end
@@ -193,6 +198,8 @@ struct SceneFileCfg {
   int house = 0;
   std::vector<std::pair<std::string, double>> parameters;
   std::vector<SceneEntityCfg> entities;
+  std::vector<std::string> catalogue;
+  int catalogue_count = -1;
   std::vector<SceneObjectCfg> objects;
   std::vector<SceneRegionCfg> regions;
   SceneRobotCfg robot;
@@ -228,6 +235,14 @@ void visit_fields(V& v, SceneFileCfg& c) {
       .at_least(0);
   v("parameters", c.parameters, "Parameters of the generator, by name.");
   v("entities", c.entities, "The models, in this order.");
+  v("catalogue", c.catalogue,
+    "Objects of ``mjsense objects`` that the scene contains, by name or as regular expressions; "
+    "each "
+    "adds an entity and an object.");
+  v("catalogue_count", c.catalogue_count,
+    "Number of objects taken from ``catalogue``, in addition to its receptacles; each house number "
+    "takes other ones. -1: all.")
+      .at_least(-1);
   v("objects", c.objects,
     "Bodies that a task may use; empty: all graspable bodies with a free joint.");
   v("regions", c.regions,
