@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "mjsense/app/list_command.h"
 #include "python/bindings/bindings.h"
 
 namespace mjsense::python {
@@ -20,6 +21,8 @@ namespace mjsense::python {
 namespace nb = nanobind;
 
 void bind_program(nb::module_& m) {
+  m.def(
+      "objects_json", [] { return list_objects(true); }, "What `mjsense objects --json` prints.");
   m.def(
       "run_program",
       [](const std::vector<nb::bytes>& given,

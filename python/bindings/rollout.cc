@@ -395,7 +395,10 @@ void bind_rollout(nb::module_& m) {
           "(handle, owner) of every sensor; valid while the rollout exists")
       .def("outcomes", &outcomes, "(reward, success, terminal, truncated, {world: fault})")
       .def(
-          "description", [](PyRollout& s, int w) { return s.rollout().task().description(w); },
+          "obs_scene", [](PyRollout& s, int w) { return s.rollout().obs_scene(w); },
+          nb::arg("world"))
+      .def(
+          "instruction", [](PyRollout& s, int w) { return s.rollout().task().instruction(w); },
           nb::arg("world"))
       .def_prop_ro("fps", [](PyRollout& s) { return s.rollout().task().fps(); })
       .def_prop_ro("horizon", [](PyRollout& s) { return s.rollout().task().cfg().horizon; })

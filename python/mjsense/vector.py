@@ -259,6 +259,12 @@ class TaskVectorEnv(VectorEnv):
             self.sim.randomize(field, values)
 
     @property
+    def instructions(self) -> list[str]:
+        """The instruction of each world's episode, such as "Pick up the mug to the left of the plate"."""
+        self._check_open()
+        return [self._rollout.instruction(world) for world in range(self.num_envs)]
+
+    @property
     def scene(self) -> Scene:
         """The scene: ``env.scene["name"]`` is a sensor or an entity."""
         return self.sim.scene
@@ -327,6 +333,7 @@ def make_vec(
     policy_dt_ms: int | None = None,
     action_noise: bool = False,
     perturb: float = 0.0,
+    instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
     # end of options
     use_sensors: bool = True,
@@ -367,6 +374,8 @@ def make_vec(
             robot's or the task's. 50 ms gives 20 observations per second. [ms]
         action_noise: Add noise to the commands of the arm.
         perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        instructions: Instruction of each episode. ``varied``: paraphrases that describe the objects by what
+            distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
         Others:
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.

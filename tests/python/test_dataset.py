@@ -58,7 +58,7 @@ def test_rows_are_those_of_the_files(root, dataset):
     for k, (path, trajectory) in enumerate(trajectories(root)):
         episode = dataset.episodes[k]
         assert episode.path == path and episode.outcome == trajectory.attrs["outcome"] and episode.seed == trajectory.attrs["seed"]
-        assert episode.obs_scene == json.loads(trajectory["obs_scene"][()]) and episode.task == episode.obs_scene["text"]
+        assert episode.obs_scene == json.loads(trajectory["obs_scene"][()]) and episode.task == episode.obs_scene["instruction"]
         samples = [dataset[21 * k + t] for t in range(21)]
         assert [s["frame_index"] for s in samples] == list(range(21)) and {s["episode_index"] for s in samples} == {k}
         assert samples[3]["timestamp"] == pytest.approx(3 * 0.066) and samples[3]["task"] == episode.task

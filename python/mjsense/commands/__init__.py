@@ -22,6 +22,7 @@ COMMANDS = {
     "render": "Render recorded episodes with other cameras and sensors.",
     "export": "Write a recording in the format of another program.",
     "import": "Write a data set of another program as a recording.",
+    "assets": "Install the packages with further objects for scenes.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
 

@@ -156,7 +156,7 @@ class Episode:
     def task(self) -> str:
         """The instruction."""
         scene = self.obs_scene
-        return str(scene.get("text") or scene.get("task_description") or "")
+        return str(scene.get("instruction") or scene.get("text") or scene.get("task_description") or "")
 
     @property
     def fps(self) -> Fraction:

@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "mjsense/app/terminal.h"
+#include "mjsense/app/text_table.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/scenes/load_scene.h"
+#include "mjsense/scenes/object_catalogue.h"
 
 namespace mjsense {
 namespace {
@@ -112,11 +114,37 @@ std::string list_scenes(bool json) {
   std::vector<Line> lines;
   for (const std::string& name : scene_names()) {
     const SceneFileCfg scene = load_scene(name);
-    const char* houses =
-        scene.generator.empty() ? "" : " Each house number gives a different house.";
+    const char* houses = !scene.generator.empty() ? " Each house number gives a different house."
+                         : scene.catalogue_count >= 0 ? " Each house number gives other objects."
+                                                      : "";
     lines.push_back({name, scene.description + houses, packages_of(scene)});
   }
   return text_of(lines, json);
+}
+
+std::string list_objects(bool json) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  Table table{{"name", "kind", "source", "licence", "installed", ""}, "", {}};
+  for (const CatalogueObjectCfg& object : object_catalogue().objects) {
+    const ObjectSourceCfg& source = source_of(object);
+    const bool installed = is_installed(object);
+    std::string note = object.receptacle ? "receptacle" : "";
+    if (!object.excluded.empty()) note = "not used: " + object.excluded;
+    table.rows.push_back(
+        {object.name, object.kind, source.name, source.license, installed ? "yes" : "no", note});
+    out.push_back({{"name", object.name},
+                   {"description", object.text},
+                   {"kind", object.kind},
+                   {"receptacle", object.receptacle},
+                   {"source", source.name},
+                   {"license", source.license},
+                   {"url", source.url},
+                   {"packages", source.packages},
+                   {"model", object.model},
+                   {"installed", installed},
+                   {"excluded", object.excluded}});
+  }
+  return json ? out.dump(2) : table.text();
 }
 
 }  // namespace mjsense

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `mjsense tasks | robots | scenes`: lists the available names, one per line, with their
-// requirements.
+// `mjsense tasks | robots | scenes | objects`: lists the available names with their requirements.
 
 #include <string>
 
@@ -10,5 +9,6 @@ namespace mjsense {
 std::string list_tasks(bool json);
 std::string list_robots(bool json);
 std::string list_scenes(bool json);
+std::string list_objects(bool json);
 
 }  // namespace mjsense

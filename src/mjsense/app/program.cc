@@ -269,6 +269,8 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
   CLI::App& tasks = add_list("tasks", "List the tasks and what they need.");
   CLI::App& robots = add_list("robots", "List the robots.");
   CLI::App& scenes = add_list("scenes", "List the scenes and what they need.");
+  CLI::App& objects =
+      add_list("objects", "List the objects for scenes, their source and their licence.");
 
   CLI::App& schema =
       *program.add_subcommand("schema", "Print all configurations and their fields as JSON.");
@@ -334,10 +336,11 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     return run_sensors(sensors_options);
   }
   if (scan.parsed()) return run_scan(scan_options);
-  if (tasks.parsed() || robots.parsed() || scenes.parsed()) {
+  if (tasks.parsed() || robots.parsed() || scenes.parsed() || objects.parsed()) {
     print(tasks.parsed()    ? list_tasks(list_json)
           : robots.parsed() ? list_robots(list_json)
-                            : list_scenes(list_json));
+          : scenes.parsed() ? list_scenes(list_json)
+                            : list_objects(list_json));
     return 0;
   }
   if (completion.parsed()) {

@@ -111,6 +111,12 @@ void Task::begin(const World& world) {
   episode.step = 0;
   episode.done = false;
   episode.perturbation.begin(cfg_.perturb, cfg_.seed, episode.number);
+  episode.paraphrase.clear();
+  if (cfg_.instructions == Instructions::kVaried) {
+    Rng rng(cfg_.seed, 0, stream_of("task/instruction"),
+            static_cast<std::uint64_t>(episode.number));
+    episode.paraphrase = paraphrase(world, rng);
+  }
   robot_->reset(world);
 }
 
@@ -132,6 +138,11 @@ void Task::apply(const World& world, const Action& action, const StateRow& state
   episode.action = action;
   episode.done = episode.done || action.done;
   ++episode.step;
+}
+
+std::string Task::instruction(int world) const {
+  const std::string& sentence = now(world).paraphrase;
+  return sentence.empty() ? description(world) : sentence;
 }
 
 void Task::begin_all(ActiveWorlds& worlds) {
@@ -161,6 +172,7 @@ std::string Task::obs_scene(int world) const {
   nlohmann::ordered_json scene;
   scene["task_type"] = type();
   scene["task_description"] = description(world);
+  if (cfg_.instructions == Instructions::kVaried) scene["instruction"] = instruction(world);
   scene["policy_dt_ms"] = cfg_.policy_dt_ms;
   auto& expressions = scene["referral_expressions"] = nlohmann::ordered_json::object();
   for (const auto& [role, referrals] : referrals(world)) {

@@ -18,6 +18,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -27,7 +28,9 @@
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/pose.h"
+#include "mjsense/core/rng.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/core/text/json.h"
 #include "mjsense/episode/active_worlds.h"
@@ -44,6 +47,11 @@ class SensorSuite;
 class Simulation;
 struct SceneFileCfg;
 
+// Sentences of an episode's instruction: paraphrases that differ between episodes, or description().
+enum class Instructions { kVaried, kCanonical };
+template <>
+inline constexpr std::array<std::string_view, 2> kEnumNames<Instructions>{"varied", "canonical"};
+
 struct TaskCfg {
   RobotCfg robot;     // without a name: the robot in the task's scene, if any
   std::string scene;  // name or file; "": the task's own scene
@@ -58,6 +66,7 @@ struct TaskCfg {
   bool terminate_upon_success = false;
   // Share of episodes that are perturbed on purpose (perturbation.h).
   double perturb = 0;
+  NamedEnum<Instructions> instructions;
 };
 
 // An object with a role in an episode, such as "pickup_obj".
@@ -175,6 +184,9 @@ class Task {
   // may change.
   virtual std::span<const TaskObject> objects(int world) const = 0;
   virtual std::string description(int world) const = 0;  // "Pick up the mug"
+  // The instruction of the episode: one of the task's paraphrases, or the description. A function of
+  // (cfg.seed, episode).
+  std::string instruction(int world) const;
   // Bodies with a free joint that are absent from some episodes, and whether one of them is present
   // in this world's episode. Absent bodies are held far away.
   virtual std::vector<int> absentees() const { return {}; }
@@ -210,6 +222,9 @@ class Task {
   // samples_robot() is true. Returns the pose of the robot's base, or nothing to use the model's.
   virtual std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) = 0;
   virtual bool samples_robot() const { return false; }
+  // Draws a sentence that describes the episode, whose start state is that of `world`; "": there is
+  // only description().
+  virtual std::string paraphrase(const World& /*world*/, Rng& /*rng*/) const { return ""; }
   // In a state that another task has sampled: chooses the goal of the episode without moving
   // anything. Throws ValueError if the task does not support it.
   virtual void choose_goal(int world, Rng& rng, const StateRow& state);
@@ -232,6 +247,7 @@ class Task {
     bool done = false;
     Action action;
     Perturbation perturbation;
+    std::string paraphrase;
   };
   const Episode& now(int world) const { return whole_ ? whole_->now(world) : episodes_[world]; }
 

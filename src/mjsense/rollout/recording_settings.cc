@@ -151,11 +151,8 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
     }
   }
   if (!cfg.robot.empty()) settings["robot_file"] = checksums_of(task.robot);
-  if (cfg.make_scene) {
-    settings["scene_file"] = checksums_of(cfg.make_scene());
-  } else if (!cfg.scene.empty()) {
-    settings["scene_file"] = checksums_of(load_scene(cfg.scene));
-  }
+  if (cfg.make_scene || !cfg.scene.empty())
+    settings["scene_file"] = checksums_of(task_scene(task, ""));
   if (cfg.camera_system.ends_with(".toml") || cfg.camera_system.ends_with(".json")) {
     const std::string text = read_text_file(cfg.camera_system);
     Checksum sum;

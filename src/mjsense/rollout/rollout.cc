@@ -58,6 +58,7 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   out.seed = cfg.seed;
   out.action_noise = cfg.action_noise;
   out.perturb = cfg.perturb;
+  out.instructions = cfg.instructions;
   out.terminate_upon_success = cfg.terminate_upon_success;
   if (!cfg.make_task) set_task_defaults(cfg.task, out);
   if (cfg.horizon) out.horizon = *cfg.horizon;
@@ -110,6 +111,7 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
   cfg_.policy_dt_ms = own.policy_dt_ms;
   cfg_.action_noise = own.action_noise;
   cfg_.perturb = own.perturb;
+  cfg_.instructions = own.instructions;
   cfg_.terminate_upon_success = own.terminate_upon_success;
   check_fields(cfg_, "");
   make();

@@ -72,6 +72,7 @@ struct RolloutCfg {
   bool action_noise = true;
   bool terminate_upon_success = false;
   double perturb = 0;
+  NamedEnum<Instructions> instructions;
   bool use_sensors = true;
   // User-defined factories, used instead of a named task, policy or scene. `task`, `policy` and
   // `scene` above are then only display names.
@@ -162,6 +163,10 @@ void visit_fields(V& v, RolloutCfg& c) {
     "Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the "
     "gripper.")
       .within(0, 1)
+      .decides_data();
+  v("instructions", c.instructions,
+    "Instruction of each episode. ``varied``: paraphrases that describe the objects by what "
+    "distinguishes them in that episode; ``canonical``: one sentence per task and object.")
       .decides_data();
   v("terminate_upon_success", c.terminate_upon_success, "End an episode at its first success.")
       .decides_data();

@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_parts.h"
 
@@ -80,6 +82,21 @@ void set_free(mjSpec* spec, const SceneEntityCfg& entity, const std::string& who
   mjs_addFreeJoint(body);
 }
 
+// Scales the masses of all geoms.
+void set_mass(mjSpec* spec, double mass, const std::string& who) {
+  const std::unique_ptr<mjSpec, decltype(&mj_deleteSpec)> copy(call_mujoco(mj_copySpec, spec),
+                                                               mj_deleteSpec);
+  const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(
+      call_mujoco(mj_compile, copy.get(), nullptr), mj_deleteModel);
+  if (!model) throw ValueError(fmt::format("{}: {}", who, one_line(mjs_getError(copy.get()))));
+  const double factor = mass / model->body_subtreemass[0];
+  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
+    mjsGeom* geom = mjs_asGeom(element);
+    geom->density *= factor;
+    geom->mass *= factor;  // NaN if the density counts
+  }
+}
+
 }  // namespace
 
 std::string model_path(const std::string& name, std::string_view context) {
@@ -100,7 +117,8 @@ std::string model_path(const std::string& name, std::string_view context) {
 }
 
 std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view context) {
-  if (!entity.free && entity.without.empty() && !entity.inertia_groups && entity.hidden_group < 0)
+  if (!entity.free && entity.without.empty() && !entity.inertia_groups && entity.hidden_group < 0 &&
+      !entity.mass && !entity.friction)
     return nullptr;
   const std::string who = fmt::format("{}, entity '{}'", context, entity.name);
   std::shared_ptr<mjSpec> spec = compose_model({.path = model_path(entity.model, who)}, {}, who);
@@ -117,6 +135,11 @@ std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_v
       if (geom->group == entity.hidden_group && solid) geom->group = kTouched;
     }
   }
+  if (entity.friction) {
+    for (mjsElement* element : spec_elements(spec.get(), mjOBJ_GEOM))
+      std::ranges::copy(*entity.friction, mjs_asGeom(element)->friction);
+  }
+  if (entity.mass) set_mass(spec.get(), *entity.mass, who);
   if (entity.free) set_free(spec.get(), entity, who);
   return spec;
 }

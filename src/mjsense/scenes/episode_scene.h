@@ -32,6 +32,7 @@ struct SceneObject {
   ObjectShape shape;        // in the size of its model
   bool receptacle = false;  // objects can be put in or on it
   std::string color;
+  std::string material;             // adjective in instructions; "": unknown
   std::vector<double> sizes;        // possible scale factors
   std::vector<ObjectShape> shapes;  // for each of `sizes`
 };
@@ -56,6 +57,8 @@ class EpisodeScene {
 
   std::span<const SceneObject> objects() const { return objects_; }
   std::span<const Region> regions() const { return regions_; }
+  // Regions at the current positions of the furniture in this world.
+  std::vector<Region> regions_of(int world) const;
   // Limits targets to some regions: one flag per region, at least one of them true.
   void set_target_regions(std::span<const char> flags);
   // Whether an object is present in this world's episode. Absent objects are held at rest far away:
@@ -118,7 +121,6 @@ class EpisodeScene {
   void find_regions();
   void put(int object, const Pose& pose, const StateRow& state) const;
   void find_furniture();
-  std::vector<Region> regions_of(int world) const;
   void make_meshes();
   void make_sizes();
   void draw_sizes(int world, std::uint64_t seed, std::uint64_t episode);

@@ -147,6 +147,7 @@ void EpisodeScene::collect_objects(std::string_view robot_prefix) {
     if (object.text.empty()) object.text = object.kind;
     object.receptacle = one.receptacle;
     object.color = one.color;
+    object.material = one.material;
     for (const std::string& rest : one.rests) object.rests.push_back(rest_of(rest));
     objects_.push_back(std::move(object));
   }

@@ -96,7 +96,6 @@ void EpisodeScene::set_target_regions(std::span<const char> flags) {
   for (std::size_t i = 0; i < regions_.size(); ++i) regions_[i].for_targets = flags[i] != 0;
 }
 
-// Regions at the current positions of the furniture in this world.
 std::vector<Region> EpisodeScene::regions_of(int world) const {
   std::vector<Region> regions = regions_;
   const double* here = variation_ ? variation_->body_pos(world) : model_->body_pos;

@@ -11,6 +11,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/toml_fields.h"
 #include "mjsense/core/files/data_file.h"
+#include "mjsense/scenes/object_catalogue.h"
 
 namespace mjsense {
 namespace {
@@ -65,15 +66,17 @@ SceneFileCfg load_scene(std::string_view name) {
     read(kScenes.find(name), cfg, 0);
   }
   if (house) cfg.house = *house;
-  if (cfg.generator.empty() && (house || cfg.house > 0 || !cfg.parameters.empty()))
+  const bool has_houses = !cfg.generator.empty() || cfg.catalogue_count >= 0;
+  if ((!has_houses && (house || cfg.house > 0)) ||
+      (cfg.generator.empty() && !cfg.parameters.empty()))
     throw ValueError(fmt::format("scene '{}' has no generator, so {} have no effect", name,
                                  cfg.parameters.empty() ? "houses" : "parameters"));
   check_fields(cfg, fmt::format("scene '{}'", name));
-  return cfg;
+  return with_catalogue_objects(std::move(cfg));
 }
 
 SceneFileCfg task_scene(const TaskCfg& cfg, std::string_view own) {
-  if (cfg.make_scene) return cfg.make_scene();
+  if (cfg.make_scene) return with_catalogue_objects(cfg.make_scene());
   return load_scene(cfg.scene.empty() ? own : std::string_view(cfg.scene));
 }
 

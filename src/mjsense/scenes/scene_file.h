@@ -27,6 +27,8 @@ struct SceneEntityCfg {
   std::vector<std::string> without;
   std::optional<std::array<int, 2>> inertia_groups;
   int hidden_group = -1;
+  std::optional<double> mass;
+  std::optional<std::array<double, 3>> friction;
 };
 template <class V>
 void visit_fields(V& v, SceneEntityCfg& c) {
@@ -49,6 +51,9 @@ void visit_fields(V& v, SceneEntityCfg& c) {
   v("hidden_group", c.hidden_group,
     "Group of geoms that take part in contacts but are invisible; -1: groups 3 and up.")
       .within(-1, 5);
+  v("mass", c.mass, "Mass of the whole model, instead of that of its file.").unit("kg").positive();
+  v("friction", c.friction,
+    "Sliding, torsional and rolling friction of its geoms, instead of those of its file.");
 }
 
 // Resting orientations of an object: as in its model, on its side (rotated about y), on its end
@@ -62,6 +67,7 @@ struct SceneObjectCfg {
   std::vector<std::string> rests{"upright"};
   bool receptacle = false;
   std::string color;
+  std::string material;
   std::optional<std::array<double, 2>> sizes;
 };
 template <class V>
@@ -75,6 +81,10 @@ void visit_fields(V& v, SceneObjectCfg& c) {
   v("receptacle", c.receptacle, "Objects are placed in or on it; it is not picked up.");
   v("color", c.color, "Colour of a receptacle, which distinguishes it from others of its kind.")
       .or_none();
+  v("material", c.material,
+    "Material as an adjective in instructions: ``wooden``, ``metal``. By default it is not "
+    "mentioned.")
+      .or_none();
   v("sizes", c.sizes, "Minimum and maximum scale of this object, instead of the scene's.")
       .within(0.1, 10);
 }
@@ -84,6 +94,7 @@ struct SceneRegionCfg {
   std::string on;
   std::array<double, 4> area{};
   std::optional<std::array<double, 4>> target_area;
+  std::string text;
 };
 template <class V>
 void visit_fields(V& v, SceneRegionCfg& c) {
@@ -97,6 +108,10 @@ void visit_fields(V& v, SceneRegionCfg& c) {
     "surface.")
       .unit("m");
   v("target_area", c.target_area, "The same for the object that the task is about.").unit("m");
+  v("text", c.text,
+    "What the surface is called in instructions, such as ``desk in the study``; by default it is "
+    "not mentioned.")
+      .or_none();
 }
 
 struct SceneRobotCfg {
@@ -183,6 +198,8 @@ struct SceneFileCfg {
   int house = 0;
   std::vector<std::pair<std::string, double>> parameters;
   std::vector<SceneEntityCfg> entities;
+  std::vector<std::string> catalogue;
+  int catalogue_count = -1;
   std::vector<SceneObjectCfg> objects;
   std::vector<SceneRegionCfg> regions;
   SceneRobotCfg robot;
@@ -218,6 +235,14 @@ void visit_fields(V& v, SceneFileCfg& c) {
       .at_least(0);
   v("parameters", c.parameters, "Parameters of the generator, by name.");
   v("entities", c.entities, "The models, in this order.");
+  v("catalogue", c.catalogue,
+    "Objects of ``mjsense objects`` that the scene contains, by name or as regular expressions; "
+    "each "
+    "adds an entity and an object.");
+  v("catalogue_count", c.catalogue_count,
+    "Number of objects taken from ``catalogue``, in addition to its receptacles; each house number "
+    "takes other ones. -1: all.")
+      .at_least(-1);
   v("objects", c.objects,
     "Bodies that a task may use; empty: all graspable bodies with a free joint.");
   v("regions", c.regions,

@@ -29,6 +29,9 @@ constexpr double kTableMove =
 enum class RoomKind { kLiving, kBedroom, kDining, kStudy, kSecondBedroom, kReading };
 constexpr std::array<const char*, 6> kRoomNames{"living", "bedroom", "dining",
                                                 "study",  "guest",   "reading"};
+// The same in instructions.
+constexpr std::array<const char*, 6> kRoomTexts{"living room", "bedroom",    "dining room",
+                                                "study",       "guest room", "reading room"};
 
 std::vector<Furniture> pieces_of(RoomKind kind) {
   using enum Furniture;
@@ -114,6 +117,7 @@ class Furnisher {
   void furnish(int room, RoomKind kind) {
     const Rect& r = plan_.rooms()[room];
     const std::string where = kRoomNames[static_cast<int>(kind)];
+    room_text_ = kRoomTexts[static_cast<int>(kind)];
     if (kind == RoomKind::kDining) table(room, where);
     for (const Furniture piece : pieces_of(kind)) {
       const FloorSpace size = floor_space(piece);
@@ -135,6 +139,10 @@ class Furnisher {
   }
 
  private:
+  // Names the latest region in instructions.
+  void label_region(const std::string& piece) {
+    cfg_.regions.back().text = fmt::format("{} in the {}", piece, room_text_);
+  }
   std::string unique(const std::string& name) {
     const int n = count_[name]++;
     return n == 0 ? name : fmt::format("{}_{}", name, n);
@@ -143,7 +151,10 @@ class Furnisher {
     const std::string name = unique(fmt::format("{}_{}", where, name_of(piece)));
     pieces_.push_back({name, room, stand.space});
     BuildingWriter::Local local(out_, name, stand.at, stand.yaw);
+    const std::size_t before = cfg_.regions.size();
     write_furniture(out_, piece, name, rng_, cfg_.regions);
+    if (cfg_.regions.size() > before)
+      label_region(piece == Furniture::kTelevision ? "television stand" : name_of(piece));
   }
   void table(int room, const std::string& where) {
     const Rect& r = plan_.rooms()[room];
@@ -160,6 +171,7 @@ class Furnisher {
       pieces_.push_back({name, room, space, true, true});
       BuildingWriter::Local local(out_, name, {x, y, 0}, along_x ? 0 : 0.5 * pi);
       write_dining_table(out_, name, 4, rng_, cfg_.regions);
+      label_region("dining table");
       return;
     }
   }
@@ -176,6 +188,7 @@ class Furnisher {
     BuildingWriter::Local local(out_, name, middle, sofa.yaw);
     write_rug(out_, "cloth_3", 1.15, 0.70);
     write_coffee_table(out_, name, rng_, cfg_.regions);
+    label_region("coffee table");
   }
 
   struct Piece {
@@ -190,6 +203,7 @@ class Furnisher {
   Rng& rng_;
   SceneFileCfg& cfg_;
   std::map<std::string, int> count_;
+  std::string room_text_;
   std::vector<Piece> pieces_;
 };
 

@@ -11,6 +11,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/robots/finger_grasp.h"
 #include "mjsense/scene/resolve.h"
+#include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/robot_floor.h"
 
 namespace mjsense {
@@ -24,6 +25,23 @@ constexpr double kNear = 1.15, kFar = 1.9;  // m, distance of the start from the
 constexpr double kAside = 0.5;              // m, lateral half range of the start
 constexpr double kTurned = 0.35;            // rad, half range of the start's heading
 constexpr int kStarts = 200;                // maximum number of sampled base placements
+// {0}: the door, {1}: push or pull, {2}: pushing or pulling, {3}: away from or towards.
+constexpr std::array<const char*, 14> kSentences{
+    "Open {0} by {2} it",
+    "{1} open {0}",
+    "{1} {0} open",
+    "{1} {0} until it is open",
+    "Please open {0}. It opens {3} you",
+    "Can you open {0} by {2} it?",
+    "Could you open {0}? It opens {3} you",
+    "Take the handle of {0} and open it {3} you",
+    "Open {0} by moving it {3} you",
+    "Unlatch {0} and open it by {2}",
+    "Use the handle to unlatch {0} and open it {3} you",
+    "Move to {0} and open it by {2}",
+    "I would like {0} to be open. It opens {3} you",
+    "Go up to {0}, press its handle and open it {3} you",
+};
 
 }  // namespace
 
@@ -93,9 +111,12 @@ void DoorOpeningTask::choose_goal(int world, Rng& rng, const StateRow& state) {
 
 void DoorOpeningTask::begin(const World& world) {
   ObjectTask::begin(world);
-  Episode& episode = episodes_[world.id];
-  const Side& side = sides_[episode.door];
-  episode.push = dot(robot().base_pose(world).p - side.middle, side.direction) < 0;
+  episodes_[world.id].push = pushes(world);
+}
+
+bool DoorOpeningTask::pushes(const World& world) const {
+  const Side& side = sides_[episodes_[world.id].door];
+  return dot(robot().base_pose(world).p - side.middle, side.direction) < 0;
 }
 
 Evaluation DoorOpeningTask::evaluate(const World& world) const {
@@ -106,6 +127,24 @@ Evaluation DoorOpeningTask::evaluate(const World& world) const {
 
 std::string DoorOpeningTask::description(int world) const {
   return push(world) ? "Push the door open" : "Pull the door open";
+}
+
+std::string DoorOpeningTask::paraphrase(const World& world, Rng& rng) const {
+  std::vector<std::string> doors{"the door in front of the robot", "the door in front of you"};
+  // The start faces the middle of the leaf, and the handle is near one of its edges.
+  if (doors_.size() == 1) {
+    const Pose to_robot = inverse(robot().base_pose(world));
+    const Side& side = sides_[episodes_[world.id].door];
+    const double left = (to_robot * vec3(world.data->xpos + 3 * door(world.id).handle)).y -
+                        (to_robot * side.middle).y;
+    doors.emplace_back("the door");
+    doors.emplace_back(left > 0 ? "the door with the handle on the left"
+                                : "the door with the handle on the right");
+  }
+  const bool push = pushes(world);
+  return one_of(kSentences, rng, doors[rng.below(static_cast<std::uint32_t>(doors.size()))],
+                push ? "Push" : "Pull", push ? "pushing" : "pulling",
+                push ? "away from" : "towards");
 }
 
 Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {

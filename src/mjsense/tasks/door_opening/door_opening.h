@@ -49,6 +49,7 @@ class DoorOpeningTask final : public ObjectTask {
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::string paraphrase(const World& world, Rng& rng) const override;
   void choose_goal(int world, Rng& rng, const StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
@@ -56,6 +57,8 @@ class DoorOpeningTask final : public ObjectTask {
   struct Side {
     Vec3 middle, direction;  // middle of the shut leaf; direction in which it starts to open
   };
+  // Whether the door opens away from the robot.
+  bool pushes(const World& world) const;
   struct Episode {
     int door = 0;
     bool push = true;

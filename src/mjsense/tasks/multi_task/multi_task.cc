@@ -4,10 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "mjsense/core/error.h"
 
 namespace mjsense {
+namespace {
+
+constexpr std::array<const char*, 4> kIntroductions{"", "Do one of these. ", "Choose one. ",
+                                                    "One of these will do. "};
+constexpr std::array<const char*, 3> kJoints{"Or: ", "Alternatively: ", "Otherwise: "};
+
+}  // namespace
 
 MultiTask::MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<Task>> children)
     : Task(std::move(cfg)), name_(std::move(name)), children_(std::move(children)) {
@@ -114,6 +122,19 @@ std::string MultiTask::description(int world) const {
   std::string text;
   for (const auto& child : children_)
     text += (text.empty() ? "" : " OR ") + child->description(world);
+  return text;
+}
+
+// The children's sentences, such as "Either of the two will do. Drive to the mug. Or: Lift the pear".
+std::string MultiTask::paraphrase(const World& world, Rng& rng) const {
+  std::string text = kIntroductions[rng.below(kIntroductions.size())];
+  const char* joint = kJoints[rng.below(kJoints.size())];
+  for (int i = 0; i < size(); ++i) {
+    std::string part = children_[i]->paraphrase(world, rng);
+    if (part.empty()) part = children_[i]->description(world.id);
+    if (i > 0) text += text.ends_with('?') ? " " : ". ";
+    text += i > 0 ? joint + part : part;
+  }
   return text;
 }
 

@@ -63,6 +63,7 @@ class MultiTask final : public Task {
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::string paraphrase(const World& world, Rng& rng) const override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:

@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/scene/resolve.h"
+#include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/referring_expressions.h"
 #include "mjsense/scenes/robot_floor.h"
 
@@ -24,6 +25,11 @@ constexpr int kPoints = 16;
 constexpr double kFarStart = 2.0;  // m, preferred minimum distance of the start from the target
 constexpr double kArrived = 1.35;  // m, a start is playable if a path ends this close to the target
 constexpr int kStarts = 30;        // maximum number of sampled base placements
+constexpr std::array<const char*, 13> kSentences{
+    "Navigate to {}",     "Drive to {}",        "Go to {}",          "Move to {}",
+    "Drive up to {}",     "Go near {}",         "Approach {}",       "Find {} and go to it",
+    "Head over to {}",    "Please drive to {}", "Can you go to {}?", "Could you find {}?",
+    "Find your way to {}"};
 
 }  // namespace
 
@@ -192,6 +198,13 @@ Evaluation NavToObjTask::evaluate(const World& world) const {
 
 std::string NavToObjTask::description(int world) const {
   return "Navigate to the " + object(world).name;
+}
+
+std::string NavToObjTask::paraphrase(const World& world, Rng& rng) const {
+  const std::string object = draw_reference(
+      object_references(world, scene(), targets_[world.id], robot().base_pose(world), {}, true),
+      rng);
+  return object.empty() ? "" : one_of(kSentences, rng, object);
 }
 
 Task::Referrals NavToObjTask::referrals(int world) const {

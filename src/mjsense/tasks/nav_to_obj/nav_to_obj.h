@@ -47,6 +47,7 @@ class NavToObjTask final : public ObjectTask {
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::string paraphrase(const World& world, Rng& rng) const override;
   void choose_goal(int world, Rng& rng, const StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 

@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/scenes/object_references.h"
 
 namespace mjsense {
 namespace {
@@ -22,6 +23,31 @@ constexpr double kBeyond =
 // The base placement varies slightly between episodes.
 constexpr double kSpread = 0.02, kTurn = 0.05;  // m, rad
 constexpr int kTries = 12;                      // maximum number of grasps tried from a placement
+constexpr double kApart = 0.08;  // m, minimum distance along a direction that an instruction names
+constexpr std::array<const char*, 12> kOpenSentences{"Open {}",
+                                                     "Open up {}",
+                                                     "Pull {} open",
+                                                     "Please open {}",
+                                                     "Can you open {}?",
+                                                     "Could you open {} for me?",
+                                                     "Open {} by its handle",
+                                                     "Take the handle of {} and open it",
+                                                     "Grasp the handle of {} and pull it open",
+                                                     "Make sure that {} is open",
+                                                     "I would like {} to be open",
+                                                     "Try to open {}"};
+constexpr std::array<const char*, 12> kCloseSentences{"Close {}",
+                                                      "Shut {}",
+                                                      "Push {} shut",
+                                                      "Push {} closed",
+                                                      "Please close {}",
+                                                      "Please shut {}",
+                                                      "Can you close {}?",
+                                                      "Could you shut {} for me?",
+                                                      "Make sure that {} is closed",
+                                                      "I would like {} to be closed",
+                                                      "Try to close {}",
+                                                      "Close {} again"};
 
 }  // namespace
 
@@ -171,6 +197,48 @@ Evaluation OpeningTask::evaluate(const World& world) const {
 std::string OpeningTask::description(int world) const {
   return fmt::format("{} the {}", kind_ == OpeningKind::kOpen ? "Open" : "Close",
                      object(world).name);
+}
+
+// Phrases for the target that fit no other articulation with its name. Left and right are the
+// robot's.
+std::vector<std::string> OpeningTask::references(const World& world) const {
+  const Articulation& target = articulations_[targets_[world.id].index];
+  const Pose to_robot = inverse(robot().base_pose(world));
+  const auto handle = [&](const Articulation& one) {
+    const Pose body{vec3(world.data->xpos + 3 * one.body), quat(world.data->xquat + 4 * one.body)};
+    return to_robot * (body * one.handle.middle);
+  };
+  std::vector<Vec3> others;
+  for (const Articulation& one : articulations_) {
+    if (one.joint != target.joint && one.text == target.text) others.push_back(handle(one));
+  }
+  if (others.empty()) return {"the " + target.text};
+  std::vector<std::string> found;
+  // Any of them may be opened. Of those to be closed, one is open.
+  if (kind_ == OpeningKind::kOpen) {
+    found.push_back((target.text[0] == 'o' ? "an " : "a ") + target.text);
+    found.push_back(fmt::format("one of the {}s", target.text));
+  } else {
+    found.push_back("the open " + target.text);
+  }
+  const bool two = others.size() == 1;
+  const Vec3 at = handle(target);
+  const auto add = [&](const char* of_two, const char* of_many, double Vec3::*axis, double sign) {
+    if (std::ranges::all_of(others, [&](Vec3 p) { return sign * (at.*axis - p.*axis) > kApart; }))
+      found.push_back(fmt::format("the {} {}", two ? of_two : of_many, target.text));
+  };
+  add("left", "leftmost", &Vec3::y, 1);
+  add("right", "rightmost", &Vec3::y, -1);
+  add("upper", "highest", &Vec3::z, 1);
+  add("lower", "lowest", &Vec3::z, -1);
+  return found;
+}
+
+std::string OpeningTask::paraphrase(const World& world, Rng& rng) const {
+  const std::vector<std::string> all = references(world);
+  const std::string& object = all[rng.below(static_cast<std::uint32_t>(all.size()))];
+  return kind_ == OpeningKind::kOpen ? one_of(kOpenSentences, rng, object)
+                                     : one_of(kCloseSentences, rng, object);
 }
 
 Task::Referrals OpeningTask::referrals(int world) const {

@@ -60,6 +60,7 @@ class OpeningTask final : public ObjectTask {
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::string paraphrase(const World& world, Rng& rng) const override;
 
  private:
   struct Target {
@@ -68,6 +69,7 @@ class OpeningTask final : public ObjectTask {
     bool driving = false;  // the arm alone cannot complete the motion
     Pose goal;
   };
+  std::vector<std::string> references(const World& world) const;
   double reward(const World& world) const;
   bool succeeded(double reward) const;
   struct Found {

@@ -10,6 +10,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <regex>
 #include <set>
 
 #include "mjsense/core/error.h"
@@ -421,6 +422,51 @@ TEST(Opening, ErrorsNameWhatIsMissing) {
     FAIL() << "a table has nothing to open";
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(), HasSubstr("task 'open': scene 'table' has nothing to open"));
+  }
+}
+
+// The phrase of an instruction fits the target, and no other articulation of the scene unless any
+// of them will do.
+TEST(Opening, InstructionsDescribeTheTarget) {
+  const std::regex phrase(
+      "(the|an?|one of the) (?:(left|right|upper|lower|leftmost|rightmost|highest|lowest|open) )?"
+      "(drawer|cabinet|microwave|fridge|freezer|oven|dishwasher|door)s?");
+  for (OpeningKind kind : {OpeningKind::kOpen, OpeningKind::kClose}) {
+    Stage stage(franka(), kind, 1);
+    std::set<std::string> sentences;
+    for (int episode = 0; episode < 40; ++episode) {
+      const World w = stage.start(0, episode);
+      const std::string sentence = stage.task.instruction(0);
+      sentences.insert(sentence);
+      std::smatch found;
+      ASSERT_TRUE(std::regex_search(sentence, found, phrase)) << sentence;
+      const Articulation& target = stage.task.target(0);
+      EXPECT_EQ(found[3].str(), target.category) << sentence;
+      const Pose base = stage.task.robot().base_pose(w);
+      const auto handle = [&](const Articulation& one) {
+        return inverse(base) *
+               (Pose{vec3(w.data->xpos + 3 * one.body), quat(w.data->xquat + 4 * one.body)} *
+                one.handle.middle);
+      };
+      const auto fits = [&](const Articulation& one) {
+        if (one.category != target.category) return false;
+        const std::string word = found[2];
+        if (word == "open") return one.fraction(w.data->qpos[one.qpos]) > 0.2;
+        const Vec3 d = handle(one) - handle(target);
+        if (word.starts_with("left")) return d.y > -0.05;
+        if (word.starts_with("right")) return d.y < 0.05;
+        if (word == "upper" || word == "highest") return d.z > -0.05;
+        if (word == "lower" || word == "lowest") return d.z < 0.05;
+        return true;
+      };
+      const auto count = std::ranges::count_if(stage.task.articulations(), fits);
+      if (found[1] == "the")
+        EXPECT_EQ(count, 1) << sentence;
+      else
+        EXPECT_GT(count, 1) << sentence;
+      EXPECT_EQ(found[1] == "the" || kind == OpeningKind::kOpen, true) << sentence;
+    }
+    EXPECT_GT(sentences.size(), 20u);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/referring_expressions.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
 
@@ -19,6 +20,21 @@ using std::numbers::pi;
 constexpr std::string_view kScene = "varied_table";
 constexpr double kLift = 0.01;  // m, lift at which the task succeeds
 constexpr double kGoal = 0.05;  // m, goal above the start
+constexpr std::array<const char*, 15> kSentences{"Pick up {}",
+                                                 "Pick up {} for me",
+                                                 "Lift {}",
+                                                 "Lift up {}",
+                                                 "Grasp {} and lift it",
+                                                 "Grab {}",
+                                                 "Take {}",
+                                                 "Take hold of {} and raise it",
+                                                 "Get {}",
+                                                 "Please pick up {}",
+                                                 "Can you pick up {}?",
+                                                 "Could you lift {} for me?",
+                                                 "I need {}. Please pick it up",
+                                                 "Reach for {} and pick it up",
+                                                 "Raise {}"};
 
 }  // namespace
 
@@ -110,6 +126,12 @@ Evaluation PickTask::evaluate(const World& world) const {
 }
 
 std::string PickTask::description(int world) const { return "Pick up the " + object(world).name; }
+
+std::string PickTask::paraphrase(const World& world, Rng& rng) const {
+  const std::string object = draw_reference(
+      object_references(world, scene(), targets_[world.id], robot().base_pose(world)), rng);
+  return object.empty() ? "" : one_of(kSentences, rng, object);
+}
 
 Task::Referrals PickTask::referrals(int world) const {
   return {{"pickup_obj_name", referring_expressions(scene().objects()[targets_[world]])}};

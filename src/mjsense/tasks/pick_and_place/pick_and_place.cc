@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scenes/object_references.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
 
 namespace mjsense {
@@ -26,6 +27,29 @@ constexpr double kSamePlace = 0.005,
 constexpr double kSameHeight = 0.01;  // m, tolerance of underside heights without contact forces
 constexpr double kBesideGap = 0.03;   // m, gap that a planner aims at
 constexpr double kAround = 0.012;     // m, radius of surface points considered for a placement
+
+// {0}: the object, {1}: where it is put ("next to the plate"), {2}: where it is moved to ("into the
+// box").
+constexpr std::array<const char*, 14> kSentences{
+    "Pick up {0} and place it {1}",
+    "Put {0} {1}",
+    "Place {0} {1}",
+    "Move {0} {2}",
+    "Take {0} and put it {1}",
+    "Grab {0} and set it down {1}",
+    "Lift {0} and put it {1}",
+    "Bring {0} over and set it down {1}",
+    "Please put {0} {1}",
+    "Can you put {0} {1}?",
+    "Could you place {0} {1}, please?",
+    "I want {0} to be {1}",
+    "Pick up {0}, then put it {1}",
+    "Please move {0} {2}",
+};
+// Receptacles by the last word of their names: things are put in them or on them.
+constexpr std::array<std::string_view, 10> kInside{"bowl", "box", "basket", "pan", "pot",
+                                                   "cup",  "mug", "bin",    "jar", "crate"};
+constexpr std::array<std::string_view, 5> kOnTop{"plate", "tray", "board", "coaster", "book"};
 
 Pose pose_of(const World& world, int body) {
   return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
@@ -287,6 +311,37 @@ std::string PickAndPlaceTask::description(int world) const {
     default:
       return fmt::format("Pick up the {} and place it in or on the {}", name, where);
   }
+}
+
+std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
+  const Episode& episode = episodes_[world.id];
+  const Pose base = robot().base_pose(world);
+  const std::array<int, 2> both{episode.target, episode.receptacle};
+  const auto drawn = [&](int index) {
+    References all = object_references(world, scene(), index, base, both);
+    // In "put the mug next to the plate" it must not be the mug that is next to the plate.
+    if (kind_ == PlaceKind::kNextTo) {
+      for (auto& texts : all)
+        std::erase_if(texts, [](const auto& text) { return text.find(" next to ") != text.npos; });
+    }
+    return draw_reference(all, rng);
+  };
+  const std::string object = drawn(both[0]);
+  const std::string where =
+      kind_ == PlaceKind::kColor ? "the " + place_description(world.id) : drawn(both[1]);
+  if (object.empty() || where.empty()) return "";
+  const auto is_any = [name = std::string_view(scene().objects()[both[1]].text)](const auto& of) {
+    return std::ranges::any_of(of, [&](auto word) { return may_be_called(name, word); });
+  };
+  std::string at = "in or on ", to = "in or on ";
+  if (kind_ == PlaceKind::kNextTo) {
+    at = to = "next to ";
+  } else if (kind_ == PlaceKind::kPacking || is_any(kInside)) {
+    at = "in ", to = "into ";
+  } else if (is_any(kOnTop)) {
+    at = "on ", to = "onto ";
+  }
+  return one_of(kSentences, rng, object, at + where, to + where);
 }
 
 Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {

@@ -63,6 +63,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::string paraphrase(const World& world, Rng& rng) const override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
