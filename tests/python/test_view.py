@@ -3,6 +3,7 @@
 
 import importlib.util
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -337,9 +338,12 @@ def test_a_missing_video(tmp_path, port):
 def test_ctrl_c_ends_the_program(port):
     command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
-        assert process.stdout.readline() == f"Viewer: http://127.0.0.1:{port} (Ctrl-C ends it)\n"
-        process.send_signal(signal.SIGINT)
-        out, errors = process.communicate(timeout=20)
+        try:
+            assert process.stdout.readline() == f"Viewer: http://127.0.0.1:{port} (Ctrl-C ends it)\n"
+            process.send_signal(signal.SIGINT)
+            out, errors = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert (process.returncode, out, errors) == (0, "", "")
 
 
@@ -500,12 +504,15 @@ def test_the_page_of_a_task(port):
 def test_ctrl_c_while_a_page_plays(port):
     command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open", "--world", "1"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
-        process.stdout.readline()
-        with devtools.Page(f"http://127.0.0.1:{port}") as page:
-            page.click("button", "Play")
-            eventually(lambda: "World 1 of 2, t = 0.5" in page.run("document.body.textContent"))
-            process.send_signal(signal.SIGINT)
-            out, errors = process.communicate(timeout=30)
+        try:
+            process.stdout.readline()
+            with devtools.Page(f"http://127.0.0.1:{port}") as page:
+                page.click("button", "Play")
+                eventually(lambda: re.search(r"World 1 of 2, t = (0\.[1-9]|[1-9])", page.run("document.body.textContent")))
+                process.send_signal(signal.SIGINT)
+                out, errors = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert (process.returncode, out, errors) == (0, "", "")
 
 
