@@ -3,6 +3,7 @@
 
 import importlib.util
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -15,7 +16,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
-from mjsense.view import geometry, surfaces
+from mjsense.view import curves, geometry, surfaces
 from mjsense.view.poses import PoseStream
 from scenes import BALL
 
@@ -245,6 +246,12 @@ def test_user_defined_sensors_come_first(port):
         assert [node.name for node in viewer._layer._nodes] == ["/shapes/cylinder"]
 
 
+def test_numbers_that_are_missing_in_curves():
+    values = np.array([[np.nan, 1, 2], [3, np.nan, np.inf], [np.nan, 5, np.nan]])
+    np.testing.assert_array_equal(curves._filled(values), [[0, 1, 2], [3, 1, 2], [3, 5, 2]])
+    assert curves._range(values.T) == (pytest.approx(0.8), pytest.approx(5.2)) and curves._range([np.full(3, np.nan)]) == (-1, 1)
+
+
 @needs_viser
 def test_memory_stays_bounded(live):
     """The number of messages that a browser receives when it connects does not grow with time."""
@@ -295,6 +302,11 @@ def test_recordings(recording, port):
         viewer._choice.value = viewer._choice.options[1]
         viewer._choose()
         assert viewer._episode.index == 1
+        viewer._curves.choose("obs/extra/tcp_pose")
+        viewer.seek(9)
+        viewer.update()
+        times, *values, now = viewer._curves._charts[0][1].data
+        assert len(values) == 7 and times[9] == pytest.approx(9 * 0.066) and np.flatnonzero(np.isfinite(now)).tolist() == [9] and now[9] == values[0][9]
         viewer._text.value = "no such instruction"
         viewer._filter()
         assert viewer._choice.options == ("no episode matches",)
@@ -326,9 +338,12 @@ def test_a_missing_video(tmp_path, port):
 def test_ctrl_c_ends_the_program(port):
     command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
-        assert process.stdout.readline() == f"Viewer: http://127.0.0.1:{port} (Ctrl-C ends it)\n"
-        process.send_signal(signal.SIGINT)
-        out, errors = process.communicate(timeout=20)
+        try:
+            assert process.stdout.readline() == f"Viewer: http://127.0.0.1:{port} (Ctrl-C ends it)\n"
+            process.send_signal(signal.SIGINT)
+            out, errors = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert (process.returncode, out, errors) == (0, "", "")
 
 
@@ -489,12 +504,15 @@ def test_the_page_of_a_task(port):
 def test_ctrl_c_while_a_page_plays(port):
     command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open", "--world", "1"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
-        process.stdout.readline()
-        with devtools.Page(f"http://127.0.0.1:{port}") as page:
-            page.click("button", "Play")
-            eventually(lambda: "World 1 of 2, t = 0.5" in page.run("document.body.textContent"))
-            process.send_signal(signal.SIGINT)
-            out, errors = process.communicate(timeout=30)
+        try:
+            process.stdout.readline()
+            with devtools.Page(f"http://127.0.0.1:{port}") as page:
+                page.click("button", "Play")
+                eventually(lambda: re.search(r"World 1 of 2, t = (0\.[1-9]|[1-9])", page.run("document.body.textContent")))
+                process.send_signal(signal.SIGINT)
+                out, errors = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert (process.returncode, out, errors) == (0, "", "")
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,11 +30,12 @@ class Curves:
 
     Args:
         rows: Returns the time [n] in s and the values [n, width] of a stream. None: values are added by :meth:`append`.
+        now: Returns the row that the scene shows, which gets a dot; used with ``rows``.
     """
 
     def __init__(self, gui: Any, streams: dict[str, StreamInfo], later: Callable[[Any, Callable[[], None]], None],
-                 rows: Callable[[str], tuple[np.ndarray, np.ndarray]] | None = None) -> None:  # fmt: skip
-        self._gui, self._streams, self._rows = gui, streams, rows
+                 rows: Callable[[str], tuple[np.ndarray, np.ndarray]] | None = None, now: Callable[[], int] | None = None) -> None:  # fmt: skip
+        self._gui, self._streams, self._rows, self._now = gui, streams, rows, now
         self._charts: list[tuple[str, Any] | None] = [None] * _CHARTS
         self._history: dict[str, list[tuple[float, np.ndarray]]] = {}
         self._choices = []
@@ -70,6 +71,11 @@ class Curves:
         """Forgets the values of live streams."""
         self._history.clear()
 
+    def reload(self) -> None:
+        """Makes the charts again, for other rows."""
+        for slot in range(_CHARTS):
+            self._choose(slot)
+
     def refresh(self) -> None:
         """Sends the values to the browser."""
         for chart in self._charts:
@@ -86,11 +92,15 @@ class Curves:
         if name == _NONE:
             return
         info = self._streams[name]
-        series = [{"label": "s"}] + [{"label": f"{i}" if info.width > 1 else name.rsplit("/", 1)[-1], "stroke": COLOURS[i % len(COLOURS)], "width": 1.5}
+        series: list[dict[str, Any]] = [{"label": "s"}] + [{"label": f"{i}" if info.width > 1 else name.rsplit("/", 1)[-1], "stroke": COLOURS[i % len(COLOURS)], "width": 1.5}
                                      for i in range(info.width)]  # fmt: skip
+        if self._now is not None:
+            series.append({"label": "now", "stroke": "#000000", "width": 0, "points": {"show": True, "size": 8, "fill": "#000000"}})
         self._folders[slot].label = f"{name} [{info.unit}]" if info.unit else name
         with self._folders[slot]:
-            chart = self._gui.add_uplot(self._data(name), tuple(series), scales={"x": {"time": False, "auto": True}, "y": {"auto": True}}, height=180)
+            data = self._data(name)
+            scales = {"x": {"time": False, "auto": True}, "y": {"auto": True} if self._rows is None else {"range": _range(data[1:])}}
+            chart = self._gui.add_uplot(data, tuple(series), scales=scales, height=180)
         self._charts[slot] = name, chart
 
     def _data(self, name: str) -> tuple[np.ndarray, ...]:
@@ -100,7 +110,27 @@ class Curves:
         else:
             kept = self._history.get(name, [])
             times = np.array([t for t, _ in kept])
-            values = np.array([row for _, row in kept]).reshape(-1, width)
+            values = _filled(np.array([row for _, row in kept]).reshape(-1, width))
         if not len(times):  # a chart of no points cannot find its time axis later
             times, values = np.zeros(1), np.full((1, width), np.nan)
-        return (times, *np.ascontiguousarray(values.reshape(len(times), width).T, np.float64))
+        values = values.reshape(len(times), width)
+        if self._now is not None:
+            dot, at = np.full((len(times), 1), np.nan), min(self._now(), len(times) - 1)
+            dot[at] = values[at, 0]
+            values = np.concatenate([values, dot], axis=1)
+        return (times, *np.ascontiguousarray(values.T, np.float64))
+
+
+def _range(columns: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Limits of an axis for values some of which may be NaN, which the browser's own limits cannot be."""
+    finite = np.concatenate([column[np.isfinite(column)] for column in columns])
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _filled(values: np.ndarray) -> np.ndarray:
+    """Live values without NaN, for the same reason: the last number before, or 0."""
+    known = np.isfinite(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values))[:, None], 0), axis=0)
+    return np.nan_to_num(np.take_along_axis(values, last, 0), posinf=0.0, neginf=0.0)

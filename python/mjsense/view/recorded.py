@@ -70,7 +70,7 @@ class RecordingViewer(Viewer):
         with tabs.add_tab("Videos"):
             self._pictures = Pictures(gui, [stream.name.removeprefix(VIDEOS) for stream in videos], self._later, self._show, shown=2)
         with tabs.add_tab("Curves"):
-            self._curves = Curves(gui, curve_streams(dataset), self._later, self._rows)
+            self._curves = Curves(gui, curve_streams(dataset), self._later, self._rows, lambda: max(self._shown, 0))
         self._filter(episode)
 
     # ---------------------------------------------------------------------------------------------------------- episodes
@@ -122,7 +122,7 @@ class RecordingViewer(Viewer):
         self._about.content = f"**{episode.task}**\n\n{episode.outcome}, {episode.length} observations, seed {episode.seed}{missing}"
         self._time.max = max(episode.length - 1, 1)
         self._time.value = 0
-        self._curves.refresh()
+        self._curves.reload()
         self._show()
 
     def seek(self, t: int) -> None:
@@ -168,6 +168,7 @@ class RecordingViewer(Viewer):
     def _show_pictures(self) -> None:
         if self._stale:
             self._stale = False
+            self._curves.refresh()
             self._pictures.refresh(lambda name: self._episode.video(name)[self._shown])
 
     def update(self) -> None:
