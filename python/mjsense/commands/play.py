@@ -18,9 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", default="", help="Name or file of the scene; by default the task's.")
     parser.add_argument("--out", default="demonstrations", help="Output directory; by default demonstrations.")
     parser.add_argument("--episodes", type=int, default=1, metavar="N", help="Number of successful episodes to keep.")
+    parser.add_argument("--keep-failures", action="store_true", help="Keep failed episodes too.")
     parser.add_argument("--append", action="store_true", help="Add episodes to a completed recording.")
     parser.add_argument("--resume", action="store_true", help="Continue an interrupted recording.")
-    parser.add_argument("--device", choices=("keyboard", "spacemouse"), default="keyboard", help="What drives the tool beside the page's handle.")
+    parser.add_argument("--device", choices=("keyboard", "spacemouse"), default="keyboard", help="Input device, in addition to the handle on the page.")
     parser.add_argument("--arm", default="arm", help="Move group that is driven; by default arm.")
     parser.add_argument("--gripper", default="gripper", help="Move group that is opened and closed; by default gripper.")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="Random seed of the starts.")
@@ -33,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.commands import FAILED
     from mjsense.teleoperation import play
 
-    given = {name: getattr(arguments, name) for name in ("out", "scene", "episodes", "append", "resume", "device", "arm", "gripper", "seed", "host", "port")}
+    given = {name: getattr(arguments, name) for name in ("out", "scene", "episodes", "keep_failures", "append", "resume", "device", "arm", "gripper", "seed", "host", "port")}
     summary = play(arguments.task, arguments.robot, open_browser=not arguments.no_open, **given)
     print(f"{summary.kept} of {summary.wanted} episodes are in {summary.path}.")
     return 0 if summary.enough else FAILED

@@ -51,7 +51,7 @@ class DrivePage(Viewer):
         with gui.add_folder("Drive"):
             self._text = gui.add_markdown("")
             self._closed_box = gui.add_checkbox("Close gripper", initial_value=False, hint="Key: space")
-            self._paused = gui.add_checkbox("Pause", initial_value=False, hint="The worlds stop.")
+            self._paused = gui.add_checkbox("Pause", initial_value=False, hint="The world waits. Moving the target ends the pause.")
             self._later(gui.add_button("End episode", hint="It counts as failed unless the task has succeeded. Key: enter"), self._finish)
         gui.add_markdown("Drag the handle at the tool, or press keys: " + ", ".join(f"**{key}** {what.lower()}" for key, (what, _) in MOVES.items())
                          + ", **space** gripper, **enter** end of the episode.")  # fmt: skip
@@ -78,6 +78,7 @@ class DrivePage(Viewer):
         self.finished = True
 
     def _dragged(self) -> None:
+        self._paused.value = False
         self.target = Pose(self._handle.position, self._handle.wxyz).seen_from(self.base)
 
     @property
@@ -95,11 +96,13 @@ class DrivePage(Viewer):
     def move(self, translation: np.ndarray, rotation: np.ndarray) -> None:
         """Displaces the target, and the handle with it."""
         if translation.any() or rotation.any():
+            self._paused.value = False
             self.target = self.target.moved(translation, rotation)
             self._place_handle()
 
     def begin_episode(self, base: Pose, target: Pose, text: str) -> None:
-        """Shows the world of a new episode, with the target at the tool."""
+        """Shows the world of a new episode, with the target at the tool. It waits until the user moves the target or ends the pause."""
+        self._paused.value = True
         self.base, self.target, self.finished = base, target, False
         self._closed_box.value = False
         self._text.content = text

@@ -149,8 +149,9 @@ def play(
         ValueError: The robot has no such move groups, or the arm has no controller ``ee_pose``.
         ModuleNotFoundError: viser, or the package of the device, is not installed.
     """
+    title = task if isinstance(task, str) else getattr(task, "__name__", type(task).__name__)
     policy = Teleoperation(
-        f"{task}", arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser
+        title, arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser
     )
     defaults = {"worlds": 1, "arm_controller": "ee_pose", "terminate_upon_success": True, "action_noise": False, "horizon": 6000, "max_attempts": 100 * episodes}
     try:

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A person drives a robot in the browser: here a script that presses keys in headless Chromium."""
+
+import json
+import socket
+import subprocess
+import sys
+import time
+import types
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="viser is not installed")
+
+from mjsense.teleoperation.devices import SpaceMouse, device_of
+from mjsense.teleoperation.page import STEP, TURN
+from mjsense.teleoperation.rotations import Pose
+
+import mjsense as mjs
+
+KEYS = {(0, 1): "I", (0, -1): "K", (1, 1): "J", (1, -1): "L", (2, 1): "U", (2, -1): "M"}
+SEED = 3
+
+
+def test_poses_and_displacements():
+    generator = np.random.default_rng(1)
+    for _ in range(20):
+        base, pose = (Pose(generator.normal(size=3), (q := generator.normal(size=4)) / np.linalg.norm(q)) for _ in range(2))
+        back = pose.seen_from(base).carried_by(base)
+        np.testing.assert_allclose(back.position, pose.position, atol=1e-12)
+        assert abs(back.quaternion @ pose.quaternion) == pytest.approx(1)
+    turned = Pose(np.zeros(3), np.array([1.0, 0, 0, 0])).moved(np.zeros(3), np.array([0, 0, np.pi / 2]))
+    np.testing.assert_allclose(turned.quaternion, [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+
+
+def test_spacemouse(monkeypatch):
+    """A simulated device. Axes: forward is +x of the base, left is +y."""
+    state = types.SimpleNamespace(x=0.0, y=1.0, z=0.0, roll=0.0, pitch=0.0, yaw=0.02, buttons=[0, 0])
+    monkeypatch.setitem(sys.modules, "pyspacemouse", types.SimpleNamespace(open=lambda: True, read=lambda: state))
+    device = device_of("spacemouse")
+    motion = device.read(0.1)
+    np.testing.assert_allclose(motion.translation, [SpaceMouse.SPEED * 0.1, 0, 0])
+    assert not motion.rotation.any() and not motion.toggle_gripper, "0.02 is in the dead zone"
+    state.buttons = [1, 0]
+    assert device.read(0.1).toggle_gripper and not device.read(0.1).toggle_gripper, "once per press"
+    monkeypatch.setitem(sys.modules, "pyspacemouse", types.SimpleNamespace(open=lambda: False))
+    with pytest.raises(RuntimeError, match="finds no SpaceMouse"):
+        device_of("spacemouse")
+    with pytest.raises(ValueError, match="must be keyboard or spacemouse"):
+        device_of("gamepad")
+
+
+def test_errors(tmp_path):
+    with pytest.raises(ValueError, match="no move group 'left'; there are arm, gripper"):
+        mjs.play("pick", out=tmp_path / "a", arm="left", open_browser=False, cameras=[])
+    with pytest.raises(ValueError, match="must be ee_pose"):
+        mjs.play("pick", out=tmp_path / "b", arm_controller="ee_delta_pose", open_browser=False, cameras=[])
+
+
+def free_port():
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        return server.getsockname()[1]
+
+
+def presses(page, key, count):
+    for _ in range(count):
+        name, code, number = {"space": (" ", "Space", 32)}.get(key) or (key.lower(), f"Key{key}", ord(key))
+        for kind in ("keyDown", "keyUp"):
+            page.call("Input.dispatchKeyEvent", type=kind, key=name, code=code, windowsVirtualKeyCode=number)
+        time.sleep(0.02)
+
+
+def test_a_block_is_picked_with_keys(tmp_path):
+    """The recording verifies and replays."""
+    from devtools import Page
+
+    options = {"scene": "table", "cameras": []}
+    env = mjs.make_vec("pick", seed=SEED, arm_controller="ee_pose", **options)
+    env.reset(seed=SEED)
+    target = Pose.of_row(env.rows["actions/ee_pose/arm"][0])
+    base = Pose.of_row(env.rows["robot_base_pose"][0])
+    name = next(name for name in env.rows if name.startswith("env_states/actors/"))
+    block = Pose.of_row(env.rows[name][0]).seen_from(base)
+    env.close()
+    away = np.round((block.position - target.position) / STEP).astype(int)
+
+    port = free_port()
+    words = ["play", "pick", "--scene", options["scene"], "--seed", str(SEED), "--out", str(tmp_path / "out"), "--port", str(port), "--no-open"]
+    player = subprocess.Popen([sys.executable, "-m", "mjsense", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert "Drive the robot at" in player.stdout.readline()
+        page = Page(f"http://127.0.0.1:{port}")
+        time.sleep(6)
+        for axis in (0, 1, 2):
+            presses(page, KEYS[axis, 1 if away[axis] > 0 else -1], abs(int(away[axis])))
+            time.sleep(1)
+        time.sleep(2)
+        presses(page, "space", 1)
+        time.sleep(1.5)
+        presses(page, KEYS[2, 1], 15)
+        assert player.wait(timeout=60) == 0, player.stderr.read()
+        assert page.console == []
+        page.close()
+    finally:
+        player.kill()
+    verified = subprocess.run([sys.executable, "-m", "mjsense", "verify", "--json", tmp_path / "out"], capture_output=True, text=True)
+    assert verified.returncode == 0, verified.stdout
+    episode = mjs.Dataset(tmp_path / "out").episodes[0]
+    assert episode.success and json.loads(verified.stdout)
+    assert TURN > 0 and mjs.check_replay(tmp_path / "out").ok
