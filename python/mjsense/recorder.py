@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
 
-FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "house": 0, "batches": 0, "gzip": 4}
+FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "append": False, "overwrite": False, "house": 0, "batches": 0, "gzip": 4}
 """Options that the C++ recorder needs, besides those of the videos, with their defaults."""
 
 

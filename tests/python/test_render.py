@@ -12,6 +12,7 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
+import tasks
 
 import mjsense as mjs
 
@@ -321,6 +322,22 @@ def test_program(recorded, tmp_path):
     (tmp_path / "s.toml").write_text('[[sensors]]\nkind = "contct"\nname = "x"\n')
     wrong = run("render", recorded, tmp_path / "out2", "--sensors", tmp_path / "s.toml")
     assert wrong.returncode == 2 and "unknown kind 'contct'; did you mean 'contact'?" in wrong.stderr
+
+
+def test_a_task_in_python(tmp_path):
+    """Its cameras are rendered and compared; its other sensors need the task."""
+    task = tasks.Cart()
+    about = dict(episodes=2, keep_failures=True, horizon=5, worlds=2, width=32, height=24, depth=True)
+    mjs.record(task, policy=tasks.Driver(task), out=tmp_path / "data", **about)
+    mjs.render(tmp_path / "data", tmp_path / "out", copy=False, add_cameras={"top": {"pos": (0, 0, 2), "lookat": (0, 0, 0)}})
+    verified(tmp_path / "out")
+    made = videos(tmp_path / "out")
+    assert {name: data for name, data in made.items() if "top" not in name} == videos(tmp_path / "data") and len(made) == 6
+    for root, reason in (("data", "belongs to the task 'cart', which is written in Python"), ("out", "carried over from the recording that was rendered")):
+        report = mjs.check_replay(tmp_path / root, states=True)
+        check = report.episodes[1].sensors
+        assert report and {"obs/sensor_data/side", "obs/sensor_data/side_depth", "obs/sensor_param/side/intrinsic_cv"} <= set(check.equal), report
+        assert check.not_computed["rewards"] == check.not_computed["obs/agent/qpos"] == reason
 
 
 def test_sensors_from_states(recorded, tmp_path):
