@@ -125,6 +125,7 @@ struct BoundRenderer {
     out.shadows = nb::cast<bool>(from["shadows"]);
     out.shadow_clip = nb::cast<float>(from["shadow_clip"]);
     out.shadow_scale = nb::cast<float>(from["shadow_scale"]);
+    out.shadow_near = nb::cast<float>(from["shadow_near"]);
     out.haze_width = nb::cast<float>(from["haze"]);
     const auto rgb = nb::cast<nb::tuple>(from["haze_rgb"]);
     for (int i = 0; i < 3; ++i) out.haze_rgb[i] = nb::cast<float>(rgb[i]);

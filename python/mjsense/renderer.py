@@ -155,6 +155,7 @@ class Renderer:
             "shadows": bool(quality.shadowsize > 0),
             "shadow_clip": float(model.stat.extent * model.vis.map.shadowclip),
             "shadow_scale": float(model.vis.map.shadowscale),
+            "shadow_near": float(model.stat.extent * model.vis.map.znear),
             "haze": float(model.vis.map.haze),
             "haze_rgb": tuple(float(x) for x in haze[:3]),
             "line_width": float(model.vis.global_.linewidth),

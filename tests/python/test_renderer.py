@@ -457,6 +457,17 @@ def test_shadows_end_where_they_end_in_opengl(opengl, light, region):
     compare(both(model, data, 0), 30)
 
 
+@pytest.mark.parametrize("light", ['type="directional"', 'type="spot" cutoff="60"'], ids=["directional", "spot"])
+@pytest.mark.parametrize("distance", [0.05, 0.15, -0.05])
+def test_geoms_near_a_light_cast_shadows_as_in_opengl(opengl, light, distance):
+    # light (o) above a box (=), above the floor; the near plane of the light's shadow map is 0.1 m below it
+    model, data = load(f"""<mujoco><visual><map znear=".05"/><headlight diffuse=".1 .1 .1"/></visual><statistic extent="2" center="0 0 0"/>
+        <worldbody><light pos="0 0 1" dir="0 0 -1" {light}/><camera pos="0 -1 1" xyaxes="1 0 0 0 .7 .7"/>
+        <geom type="plane" size="2 2 .1"/><geom type="box" size=".2 .2 .005" pos="0 0 {1 - distance}"/></worldbody></mujoco>""")
+    theirs, ours = both(model, data, 0)[0]
+    assert 10 * np.log10(255**2 / np.mean((theirs.astype(float) - ours) ** 2)) > 30
+
+
 @pytest.mark.parametrize("skin", [0, 1])
 def test_flexes_look_as_in_opengl(opengl, skin):
     option = mujoco.MjvOption()

@@ -463,6 +463,7 @@ static void limit_shadows(const SceneSettings& settings, float cutoff, ViewLight
     light.square[1][k] = d[i] * light.square[0][j] - d[j] * light.square[0][i];
   }
   light.square_limit = settings.shadow_clip;
+  light.shadow_near = settings.shadow_near;
   if (light.kind != LightKind::kDirectional) {
     const double fovy = std::min(2.0 * cutoff * settings.shadow_scale, 160.0);
     light.square_limit = static_cast<float>(std::tan(fovy * std::numbers::pi / 360));

@@ -21,6 +21,7 @@ struct SceneSettings {
   int samples = 1;  // per pixel of rgb
   bool shadows = true;
   float shadow_clip = 0, shadow_scale = 0;  // m; relative to a spot light's cutoff
+  float shadow_near = 0;                    // m
   float haze_width = 0, haze_rgb[3] = {};
   float line_width = 1;             // pixels
   bool projected_textures = false;  // DrawnScene::projected_textures

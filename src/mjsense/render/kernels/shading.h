@@ -158,14 +158,14 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
     store(rays.d[1] + k, term.to_light.y);
     store(rays.d[2] + k, term.to_light.z);
     // MuJoCo's directional lights have a position: geoms behind it cast no shadow.
-    const Float end = directional ? dot(p - splat(light.pos), splat(light.dir)) : splat(1.0f);
+    Float end = directional ? dot(p - splat(light.pos), splat(light.dir)) : splat(1.0f);
     Mask shadowed = splat(0.0f) < end;
     if (light.square_limit > 0) {
       const Vec3f from = p - splat(light.pos);
       const Float u = dot(from, splat(light.square[0])), v = dot(from, splat(light.square[1]));
-      const Float limit =
-          splat(light.square_limit) * (directional ? splat(1.0f) : dot(from, splat(light.dir)));
-      shadowed = shadowed & (max(abs(u), abs(v)) < limit);
+      const Float depth = directional ? splat(1.0f) : dot(from, splat(light.dir));
+      end = end - splat(light.shadow_near) / depth;
+      shadowed = (splat(0.0f) < end) & (max(abs(u), abs(v)) < splat(light.square_limit) * depth);
     }
     reachable |= bits(shadowed) << k;
     store(rays.end + k, end);

@@ -77,6 +77,8 @@ struct ViewLight {
   // its axes (unit, camera frame), and half its side in m, or for spot lights relative to the
   // distance along the axis. Not positive: no limit.
   float square[2][3], square_limit;
+  // With a limit: geoms cast no shadow where they are nearer to the light, along its axis, m.
+  float shadow_near;
 };
 
 // Windows of boxes in a light's image: u and v are within [u0, u1] and [v0, v1], and w is at least
