@@ -123,7 +123,7 @@ def record_on_ray(
         ModuleNotFoundError: Ray, fsspec or pyarrow is not installed.
     """
     try:
-        import ray
+        import ray  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(f"Recording on a cluster needs Ray: pip install 'mjsense[ray]' ({error})", name=error.name) from error
     if episodes < 1 or shard_attempts < 1:
@@ -177,7 +177,7 @@ def record_on_ray(
 
 def _check_pickle(job: Job) -> None:
     """Raises TypeError that names the argument which cannot be sent to workers."""
-    from ray import cloudpickle
+    from ray import cloudpickle  # pyright: ignore[reportMissingImports]
 
     for name, value in (job.arguments or {}).items():
         try:

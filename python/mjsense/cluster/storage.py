@@ -11,7 +11,7 @@ class Storage:
 
     def __init__(self, root: str) -> None:
         try:
-            from fsspec.core import url_to_fs
+            from fsspec.core import url_to_fs  # pyright: ignore[reportMissingImports]
         except ModuleNotFoundError as error:
             raise ModuleNotFoundError(f"Recording with Ray needs fsspec: pip install 'mjsense[ray]' ({error})", name=error.name) from error
         self._fs, self._root = url_to_fs(root)

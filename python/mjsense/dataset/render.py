@@ -57,8 +57,8 @@ class _Progress:
     """Reports at most ten times per second."""
 
     def __init__(self, wanted: int, report: bool | Callable[[RenderProgress], None] | None) -> None:
-        self._line = ProgressLine() if report is True or (report is None and interactive()) else None
-        self._report = report if callable(report) else None if self._line is None else lambda now: self._line.show(_text(now))
+        line = self._line = ProgressLine() if report is True or (report is None and interactive()) else None
+        self._report = report if callable(report) else None if line is None else lambda now: line.show(_text(now))
         self._begun, self._reported = time.monotonic(), -1.0
         self.now = RenderProgress(0, wanted, 0, 0.0)
 
@@ -139,7 +139,7 @@ class _House:
         text = json.dumps(settings | changed, sort_keys=True, separators=(",", ":"))
         rate = Fraction(first.fps)
         use_installed_ffmpeg()
-        self._recorder = _core.Recorder(sim._core, handles, str(out), rate.numerator, rate.denominator, text, files | video)
+        self._recorder = _core.Recorder(sim._core, sim.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, files | video)
         self.path = Path(self._recorder.path)
         self._skip = [
             f"obs/{place}{end}" for camera in recorded if camera not in copied

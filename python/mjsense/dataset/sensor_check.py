@@ -151,7 +151,7 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     rate = Fraction(first.fps)
     video = {"encoder_threads" if key == "threads" else key: value for key, value in first._recording.get("video", {}).items()}
     options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
-    recorder = _core.Recorder(worlds.sim._core, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options)
+    recorder = _core.Recorder(worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options)
     for start in range(0, len(episodes), worlds.sim.num_worlds):
         playing = list(enumerate(episodes[start : start + worlds.sim.num_worlds]))
         for w, episode in playing:

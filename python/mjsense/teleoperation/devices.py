@@ -38,7 +38,7 @@ class SpaceMouse:
 
     def __init__(self) -> None:
         try:
-            import pyspacemouse
+            import pyspacemouse  # pyright: ignore[reportMissingImports]
         except ImportError as error:
             raise ModuleNotFoundError(f"The device 'spacemouse' needs pyspacemouse: pip install pyspacemouse ({error})") from None
         self._library: Any = pyspacemouse

@@ -28,7 +28,7 @@ class Teleoperation(Policy):
     """
 
     name = "teleoperation"
-    observation: Sequence[str] = ("actions/ee_pose", "actions/joint_pos", "robot_base_pose")
+    observation: Sequence[str] | None = ("actions/ee_pose", "actions/joint_pos", "robot_base_pose")
 
     def __init__(
         self, title: str, *, arm: str = "arm", gripper: str = "gripper", device: str = "keyboard", host: str = "127.0.0.1", port: int = 8080,
