@@ -16,6 +16,7 @@ pytest.importorskip("viser", reason="viser is not installed")
 from mjsense.teleoperation.devices import SpaceMouse, device_of
 from mjsense.teleoperation.page import STEP, TURN
 from mjsense.teleoperation.rotations import Pose
+from mjsense.view.poses import rotation_of
 
 import mjsense as mjs
 
@@ -81,18 +82,25 @@ def test_a_block_is_picked_with_keys(tmp_path):
     env.reset(seed=SEED)
     target = Pose.of_row(env.rows["actions/ee_pose/arm"][0])
     base = Pose.of_row(env.rows["robot_base_pose"][0])
-    name = next(name for name in env.rows if name.startswith("env_states/actors/"))
-    block = Pose.of_row(env.rows[name][0]).seen_from(base)
+    block = Pose.of_row(env.rows["obj_start"][0]).seen_from(base)
     env.close()
     away = np.round((block.position - target.position) / STEP).astype(int)
+    yaws = [np.arctan2(*rotation_of(pose.quaternion)[1::-1, 0]) for pose in (block, target)]
+    turn = round(((yaws[0] - yaws[1] + np.pi / 4) % (np.pi / 2) - np.pi / 4) / TURN)  # of a cube
 
     port = free_port()
     words = ["play", "pick", "--scene", options["scene"], "--seed", str(SEED), "--out", str(tmp_path / "out"), "--port", str(port), "--no-open"]
-    player = subprocess.Popen([sys.executable, "-m", "mjsense", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    said = tmp_path / "stdout"
+    with said.open("w") as stdout:
+        player = subprocess.Popen([sys.executable, "-m", "mjsense", *words], stdout=stdout, stderr=stdout)
+    page = None
     try:
-        assert "Drive the robot at" in player.stdout.readline()
+        while "Drive the robot at" not in said.read_text():
+            assert player.poll() is None, said.read_text()
+            time.sleep(0.1)
         page = Page(f"http://127.0.0.1:{port}")
         time.sleep(6)
+        presses(page, "O" if turn > 0 else "P", abs(turn))
         for axis in (0, 1, 2):
             presses(page, KEYS[axis, 1 if away[axis] > 0 else -1], abs(int(away[axis])))
             time.sleep(1)
@@ -100,13 +108,15 @@ def test_a_block_is_picked_with_keys(tmp_path):
         presses(page, "space", 1)
         time.sleep(1.5)
         presses(page, KEYS[2, 1], 15)
-        assert player.wait(timeout=60) == 0, player.stderr.read()
+        assert player.wait(timeout=60) == 0, said.read_text()
         assert page.console == []
-        page.close()
     finally:
+        if page is not None:
+            page.close()
         player.kill()
+        player.wait()
     verified = subprocess.run([sys.executable, "-m", "mjsense", "verify", "--json", tmp_path / "out"], capture_output=True, text=True)
     assert verified.returncode == 0, verified.stdout
     episode = mjs.Dataset(tmp_path / "out").episodes[0]
     assert episode.success and json.loads(verified.stdout)
-    assert TURN > 0 and mjs.check_replay(tmp_path / "out").ok
+    assert mjs.check_replay(tmp_path / "out").ok
