@@ -11,6 +11,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("ray", reason="Ray is not installed")
@@ -31,7 +32,7 @@ def content(root, count=EPISODES):
     for episode in mjs.Dataset(root).episodes[:count]:
         with h5py.File(episode.path) as file:
             group, sums = file[episode.trajectory], {}
-            group.visititems(lambda name, item, sums=sums: sums.update({name: hashlib.sha256(item[()].tobytes()).hexdigest()}) if isinstance(item, h5py.Dataset) else None)
+            group.visititems(lambda name, item, sums=sums: sums.update({name: hashlib.sha256(np.asarray(item[()]).tobytes()).hexdigest()}) if isinstance(item, h5py.Dataset) else None)
             for name in group["obs/sensor_data"]:
                 video = bytes(group["obs/sensor_data"][name][()]).split(b"\0")[0].decode()
                 sums["video " + name] = hashlib.sha256((episode.path.parent / video).read_bytes()).hexdigest()

@@ -43,7 +43,7 @@ class _Line:
     """The progress on stderr: one line that is rewritten on a terminal, otherwise a line for each shard that is done."""
 
     def __init__(self) -> None:
-        self._shards = -1
+        self._shards = 0
         self._terminal = sys.stderr.isatty()
 
     def __call__(self, now: ClusterProgress) -> None:
