@@ -20,10 +20,11 @@ from mjsense import _core
 from mjsense._arguments import checked
 from mjsense._rows import Row, leaves, rows_of_space
 from mjsense.attach import Attached
+from mjsense.recorder import FILE_OPTIONS
 from mjsense.renderer import Renderer
 from mjsense.sensor import Sensor, encode_json
 
-_OPTIONS = {"house": 0, "batches": 0, "gzip": 4, "ffmpeg": "", "crf": 24, "preset": "veryfast", "molmospaces_depth": False}
+_OPTIONS = {"house": 0, "batches": 0, "gzip": 4, "ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
 """Options of the files, which are those of :class:`mjsense.Recorder`."""
 
 _OWNERS = ("", "robot_env", "point_env", "ant_env", "sim", "env.sim", "physics", "_env.physics")
@@ -157,7 +158,7 @@ class _Recording:
         self._cameras = dict(cameras) if isinstance(cameras, Mapping) else {str(name): name for name in cameras}
         self._size = [int(n) for n in camera_size]
         self._keep_partial, self._info_bytes = keep_partial, info_bytes
-        self._options = {**_OPTIONS, **options, "episodes": episodes, "resume": resume}
+        self._options = {**FILE_OPTIONS, **_OPTIONS, **options, "episodes": episodes, "resume": resume}
         self._episodes = episodes
         self.path = Path(out) / f"house_{self._options['house']}"
         """Folder of the episodes."""

