@@ -16,13 +16,13 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
     what all worlds share        Scene, SceneCfg, EntityCfg, TerrainCfg
     many worlds                  Simulation: step, reset, qpos, ctrl, randomize, draw
-    your own MuJoCo program      attach: sensors over your MjModel and MjData; Renderer
+    a program of your own        attach: sensors over your data; Renderer
     sensors of a scene           BuiltinSensorCfg, ContactSensorCfg, RayCastSensorCfg, TerrainHeightSensorCfg, LidarSensorCfg,
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
     user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv)
-    making recordings            record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: any gymnasium.Env;
-                                 Recorder: your own loop; mjsense.cluster: on many machines with Ray
+    making recordings            record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: of any
+                                 environment; Recorder: your own loop; mjsense.cluster: on many machines
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
                                  export_zarr; import_robomimic

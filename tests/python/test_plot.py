@@ -2,10 +2,8 @@
 """Plots of streams, progress on stderr, and what notebooks show."""
 
 import io
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,8 +65,7 @@ def test_plot_of_a_live_task():
 def test_program(recording, tmp_path):
     pytest.importorskip("matplotlib")
     command = [sys.executable, "-m", "mjsense", "plot", str(recording), "--stream"]
-    path = os.pathsep.join([str(Path(mjs.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    run = {"cwd": tmp_path, "capture_output": True, "text": True, "env": {**os.environ, "PYTHONPATH": path}}
+    run = {"cwd": tmp_path, "capture_output": True, "text": True}
     done = subprocess.run([*command, "tcp_pose", "--out", "a.svg"], **run)
     assert (done.returncode, done.stdout, done.stderr) == (0, "Wrote a.svg.\n", "") and (tmp_path / "a.svg").exists()
     wrong = subprocess.run([*command, "tcp_pose", "--episode", "2"], **run)
