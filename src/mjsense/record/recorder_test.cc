@@ -144,11 +144,14 @@ TEST(Recorder, RangesOfAttemptsHaveTheEpisodesOfTheWhole) {
   TempDir whole, parts;
   record(whole.path, 6, {.worlds = 2}, true);
   std::map<std::int64_t, std::string> together;
-  for (const auto& [first, count] : {std::pair{0, 4}, {4, 2}}) {
-    const fs::path out = parts.path / fmt::format("{}", first);
-    record(out, count, {.worlds = 1}, true, [&](RecordingCfg& c) {
-      c.first_attempt = first;
-      c.num_attempts = count;
+  struct Range {
+    int first, count;
+  };
+  for (const Range range : {Range{0, 4}, Range{4, 2}}) {
+    const fs::path out = parts.path / fmt::format("{}", range.first);
+    record(out, range.count, {.worlds = 1}, true, [&](RecordingCfg& c) {
+      c.first_attempt = range.first;
+      c.num_attempts = range.count;
     });
     together.merge(episodes_of(out / "house_0"));
     EXPECT_TRUE(verify(out).ok()) << verify(out).text();
