@@ -99,14 +99,18 @@ def test_a_block_is_picked_with_keys(tmp_path):
             assert player.poll() is None, said.read_text()
             time.sleep(0.1)
         page = Page(f"http://127.0.0.1:{port}")
-        time.sleep(6)
+        limit = time.monotonic() + 60
+        while not page.run("document.body.innerText.includes('Close gripper')"):
+            assert time.monotonic() < limit, "the page shows no controls"
+            time.sleep(0.2)
+        time.sleep(3)  # the scene is sent
         presses(page, "O" if turn > 0 else "P", abs(turn))
         for axis in (0, 1, 2):
             presses(page, KEYS[axis, 1 if away[axis] > 0 else -1], abs(int(away[axis])))
             time.sleep(1)
-        time.sleep(2)
+        time.sleep(4)  # until the arm is there
         presses(page, "space", 1)
-        time.sleep(1.5)
+        time.sleep(3)
         presses(page, KEYS[2, 1], 15)
         assert player.wait(timeout=60) == 0, said.read_text()
         assert page.console == []
