@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import base64
 import inspect
-import struct
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from mjsense._png import png_of
 
 _THUMBNAIL = 160
 """Maximum side length, pixels."""
@@ -118,7 +118,7 @@ def thumbnail(image: np.ndarray) -> str | None:
         return None
     step = -(-max(image.shape[:2]) // _THUMBNAIL)
     pixels = coloured(image[::step, ::step])
-    return None if pixels is None else "data:image/png;base64," + base64.b64encode(_png(pixels)).decode("ascii")
+    return None if pixels is None else "data:image/png;base64," + base64.b64encode(png_of(pixels)).decode("ascii")
 
 
 _VIRIDIS = np.array([(68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121), (110, 206, 88),
@@ -155,14 +155,3 @@ def coloured(image: np.ndarray) -> np.ndarray | None:
     if image.dtype.kind == "f" and channels == 3:
         return np.clip(127.5 * (np.nan_to_num(image) + 1), 0, 255).astype(np.uint8)
     return None
-
-
-def _png(pixels: np.ndarray) -> bytes:
-    height, width = pixels.shape[:2]
-    lines = np.concatenate([np.zeros((height, 1), np.uint8), np.ascontiguousarray(pixels).reshape(height, -1)], axis=1)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines.tobytes())) + chunk(b"IEND", b"")

@@ -13,11 +13,13 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from mjsense._png import png_of
+from mjsense._rotations import quaternions_of
 from mjsense.dataset.model_xml import model_xml
 from mjsense.dataset.playback import Stepper
 from mjsense.export import FORMATS, Source
-from mjsense.export.images import depth_unit, png, to_uint16
-from mjsense.export.scene import bodies, quats_of
+from mjsense.export.images import depth_unit, to_uint16
+from mjsense.export.scene import bodies
 
 import mjsense as mjs
 
@@ -146,7 +148,7 @@ def test_png_is_lossless():
     rng = np.random.default_rng(0)
     for image, form in ((rng.integers(0, 256, (5, 7, 3), np.uint8), "rgb24"), (rng.integers(0, 65536, (5, 7), np.uint16), "gray16be")):
         decoder = av.CodecContext.create("png", "r")
-        frame = (decoder.decode(av.Packet(png(image))) + decoder.decode(None))[0]
+        frame = (decoder.decode(av.Packet(png_of(image))) + decoder.decode(None))[0]
         assert frame.format.name == form and np.array_equal(frame.to_ndarray(), image)
 
 
@@ -167,7 +169,7 @@ def test_rlds_files(root, source, tmp_path):
     assert len(records) == 2 and sum(map(len, records)) == int(info["splits"][0]["numBytes"])
     for record, episode in zip(records, source.episodes):
         assert source.rows(episode)["action"].astype("<f4").tobytes() in record
-        assert png(episode.video("wrist_camera")[3]) in record and episode.task.encode() in record
+        assert png_of(episode.video("wrist_camera")[3]) in record and episode.task.encode() in record
     with pytest.raises(ValueError, match=r"'Pick It' cannot be the name of a data set of tensorflow-datasets; .*, such as 'pick_it'"):
         mjs.export_rlds(root, tmp_path / "Pick It")
 
@@ -224,7 +226,7 @@ def test_quaternions_of_rotations():
     for quat in ([1, 0, 0, 0], [0, 1, 0, 0], [0, 0.6, 0.8, 0], [0.5, -0.5, 0.5, -0.5], [0.1, 0.7, -0.1, 0.7]):
         matrix, back = np.empty(9), np.empty(9)
         mujoco.mju_quat2Mat(matrix, np.array(quat) / np.linalg.norm(quat))
-        mujoco.mju_quat2Mat(back, quats_of(matrix.reshape(1, 3, 3))[0])
+        mujoco.mju_quat2Mat(back, quaternions_of(matrix.reshape(1, 3, 3))[0])
         np.testing.assert_allclose(back, matrix, atol=1e-12)
 
 

@@ -13,10 +13,10 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed")
 
+from mjsense._rotations import rotation_of
 from mjsense.teleoperation.devices import SpaceMouse, device_of
 from mjsense.teleoperation.page import STEP, TURN
-from mjsense.teleoperation.rotations import Pose
-from mjsense.view.poses import rotation_of
+from mjsense.teleoperation.pose import Pose
 
 import mjsense as mjs
 

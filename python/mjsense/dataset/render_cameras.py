@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core, _mujoco
+from mjsense._rotations import quaternions_of
 from mjsense.configs import CameraSensorCfg
 from mjsense.core_sensors import CameraImageSensor, CameraParameterSensor
 from mjsense.dataset.files import open_h5, text_of
@@ -104,18 +105,7 @@ def _looking(name: str, pos: np.ndarray, target: np.ndarray, up: np.ndarray) -> 
     if not np.linalg.norm(right) > 0:
         raise ValueError(f"camera '{name}': up is zero")
     right /= np.linalg.norm(right)
-    return _quaternion(np.stack([right, np.cross(right, forward), -forward], 1))
-
-
-def _quaternion(axes: np.ndarray) -> np.ndarray:
-    """Quaternion of a rotation matrix: the eigenvector of a symmetric matrix (Bar-Itzhack), which has no special cases."""
-    m = axes
-    k = np.array([[m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-                  [0, m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2]],
-                  [0, 0, m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2]],
-                  [0, 0, 0, m[2, 2] - m[0, 0] - m[1, 1]]])  # fmt: skip
-    q = np.linalg.eigh(k + np.triu(k, 1).T)[1][:, -1]
-    return q if q[0] >= 0 else -q
+    return quaternions_of(np.stack([right, np.cross(right, forward), -forward], 1))
 
 
 def added_camera(name: str, given: Mapping[str, Any], size: tuple[int, int]) -> RenderCamera:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense._arguments import checked
+from mjsense._rotations import quaternions_of
 from mjsense.export.images import depth_videos
 from mjsense.export.mapping import Source
 from mjsense.export.output import needs, new_output
-from mjsense.export.scene import Body, Shape, bodies, quats_of
+from mjsense.export.scene import Body, Shape, bodies
 
 if TYPE_CHECKING:
     from mjsense.dataset import Episode, Video
@@ -157,7 +158,7 @@ def _encoded(video: Video) -> Iterator[bytes]:
     import av  # pyright: ignore[reportMissingImports]
 
     height, width = video.shape[1:3]
-    pad = ((0, height % 2), (0, width % 2), (0, 0))
+    pad = [(0, int(height % 2)), (0, int(width % 2)), (0, 0)]
     encoder: Any = av.CodecContext.create("libx264", "w")
     encoder.width, encoder.height, encoder.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
     encoder.framerate = video.fps
@@ -210,7 +211,7 @@ def _transforms(source: Source, episode: Episode, shown: list[Body]) -> Iterator
         place = f"obs/sensor_param/{camera}/cam2world_gl"
         if place in episode.streams:
             poses = episode[place]
-            frames[name] = poses[:, :3, 3], quats_of(poses[:, :3, :3])
+            frames[name] = poses[:, :3, 3], quaternions_of(poses[:, :3, :3])
     frames |= {_frame(body): (body.positions, body.quats) for body in shown}
     for t in range(episode.length if frames else 0):
         moved = {name: pose for name, pose in frames.items() if t == 0 or any((rows[t] != rows[t - 1]).any() for rows in pose)}

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense._arguments import checked
-from mjsense.export.images import depth_unit, depth_videos, png, to_uint16
+from mjsense._png import png_of
+from mjsense.export.images import depth_unit, depth_videos, to_uint16
 from mjsense.export.mapping import Source
 from mjsense.export.output import needs, new_output
 from mjsense.export.scene import Shape, bodies
@@ -122,7 +123,7 @@ def _camera_poses(source: Source, episode: Episode, name: str) -> np.ndarray | N
 def _log_depth(rr: Any, stream: Any, source: Source, episode: Episode) -> None:
     for name, video in depth_videos(source, episode).items():
         unit = depth_unit(video)
-        images = [png(to_uint16(video[t], unit)) for t in range(episode.length)]
+        images = [png_of(to_uint16(video[t], unit)) for t in range(episode.length)]
         place = f"world/cameras/{name}/depth"
         stream.log(place, rr.EncodedDepthImage.from_fields(media_type="image/png", meter=1 / unit), static=True)
         stream.send_columns(place, _times(rr, source, len(images)), rr.EncodedDepthImage.columns(blob=images))

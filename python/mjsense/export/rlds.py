@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from mjsense._arguments import checked
-from mjsense.export.images import FLAGS, depth_unit, depth_videos, png, to_uint16
+from mjsense._png import png_of
+from mjsense.export.images import FLAGS, depth_unit, depth_videos, to_uint16
 from mjsense.export.mapping import Source
 from mjsense.export.output import needs, new_output
 
@@ -138,9 +139,9 @@ def _example(source: Source, episode: Episode) -> bytes:
             values[place] = rows[name][:steps].astype(np.float32 if feature.dtype.kind == "f" else np.int64)
     for name in source.cameras:
         video = source.video(episode, name)
-        values[f"steps/observation/{name}"] = [png(video[t]) for t in range(steps)]
+        values[f"steps/observation/{name}"] = [png_of(video[t]) for t in range(steps)]
     for name, video in depth_videos(source, episode).items():
-        values[f"steps/observation/{name}_depth"] = [png(to_uint16(video[t], depth_unit(video))) for t in range(steps)]
+        values[f"steps/observation/{name}_depth"] = [png_of(to_uint16(video[t], depth_unit(video))) for t in range(steps)]
     values["episode_metadata/file_path"] = [f"{episode.path}/{episode.trajectory}".encode()]
     values["episode_metadata/outcome"] = [episode.outcome.encode()]
     values["episode_metadata/success"] = np.array([episode.success])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mjsense import _libmujoco
+from mjsense._rotations import rotation_of
 from mjsense.dataset import playback
 
 if TYPE_CHECKING:
@@ -43,9 +44,7 @@ class Shape:
     @property
     def rotation(self) -> np.ndarray:
         """[3, 3]."""
-        result = np.empty(9)
-        mujoco.mju_quat2Mat(result, self.quat)
-        return result.reshape(3, 3)
+        return rotation_of(self.quat)
 
 
 @dataclass(frozen=True)
@@ -103,12 +102,3 @@ def _shapes(model: mujoco.MjModel, body: int) -> Iterator[Shape]:
             vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
             faces = model.mesh_face[model.mesh_faceadr[mesh] :][: model.mesh_facenum[mesh]]
             yield Shape(name, "mesh", size, position, quat, rgba, vertices[faces])
-
-
-def quats_of(rotations: np.ndarray) -> np.ndarray:
-    """Quaternions wxyz [T, 4] of rotation matrices [T, 3, 3]."""
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotations, 0, -1)
-    matrix = np.array([[a - e - i, b + d, c + g, h - f], [b + d, e - a - i, f + h, c - g], [c + g, f + h, i - a - e, d - b], [h - f, c - g, d - b, a + e + i]])
-    _, vectors = np.linalg.eigh(np.moveaxis(matrix, -1, 0))  # Bar-Itzhack: xyzw is the eigenvector of the largest eigenvalue
-    quats = vectors[:, [3, 0, 1, 2], 3]
-    return quats * np.where(quats[:, :1] < 0, -1, 1)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.simulation import Simulation
-from mjsense.teleoperation.rotations import Pose
+from mjsense.teleoperation.pose import Pose
 from mjsense.view.pictures import Pictures
 from mjsense.view.source import LiveSource
 from mjsense.view.viewer import Viewer

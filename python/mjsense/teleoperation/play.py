@@ -16,7 +16,7 @@ from mjsense.policy import Policy
 from mjsense.record import RecordSummary, record
 from mjsense.teleoperation.devices import Device, device_of
 from mjsense.teleoperation.page import DrivePage
-from mjsense.teleoperation.rotations import Pose
+from mjsense.teleoperation.pose import Pose
 
 _POLL = 0.005  # s between two looks for events while the worlds wait
 

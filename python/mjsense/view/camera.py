@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjsense import _mujoco
-from mjsense.view.poses import rotation_of
+from mjsense._rotations import rotation_of
 
 View = tuple[np.ndarray, np.ndarray, float]
 """Position of a view, the point that it looks at, and its vertical field of view in rad."""

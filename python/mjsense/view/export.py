@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjsense._progress import tracked
+from mjsense._rotations import rotation_of
 from mjsense.dataset import Dataset, Episode
 from mjsense.view import surfaces
 from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES
-from mjsense.view.poses import rotation_of
 from mjsense.view.source import LiveSource
 from mjsense.view.stage import MIN_REACH, VISIBLE_GROUPS, Stage, node
 from mjsense.view.viewer import serve, stop

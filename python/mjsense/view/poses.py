@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mjsense._rotations import rotation_of
 from mjsense.drawing import DebugShapes
 
 POSE = "m, wxyz"
@@ -38,11 +39,3 @@ class PoseStream(NamedTuple):
                 position, rotation = xpos[body] + turn @ position, turn @ rotation
             length = max(_MIN_LENGTH, 1.5 * shapes.meansize)
             shapes.add_frame(position, rotation, length, self.name, 0.04 * length)
-
-
-def rotation_of(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a quaternion wxyz."""
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])  # fmt: skip

@@ -1,28 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quaternions wxyz as float64 arrays [4]."""
+"""Poses of the tool and the base."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mjsense.view.poses import rotation_of
-
-
-def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The rotation b followed by a, normalised."""
-    aw, av, bw, bv = a[0], a[1:], b[0], b[1:]
-    q = np.concatenate([[aw * bw - av @ bv], aw * bv + bw * av + np.cross(av, bv)])
-    return q / np.linalg.norm(q)
-
-
-def inverse(q: np.ndarray) -> np.ndarray:
-    return q * [1, -1, -1, -1]
-
-
-def rotation_by(vector: np.ndarray) -> np.ndarray:
-    """The rotation about this vector by its length, rad."""
-    angle = float(np.linalg.norm(vector))
-    return np.concatenate([[np.cos(angle / 2)], np.sinc(angle / (2 * np.pi)) / 2 * vector])
+from mjsense._rotations import inverse, product, rotation_by, rotation_of
 
 
 class Pose:
