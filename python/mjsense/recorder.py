@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "append": False, "overwrite": False, "house": 0, "batches": 0, "gzip": 4}
-"""Options that the C++ recorder needs, besides those of the videos, with their defaults."""
+"""Options that the C++ recorder needs in addition to those of the videos, with their defaults."""
 
 
 @checked

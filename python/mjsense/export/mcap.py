@@ -158,7 +158,7 @@ def _encoded(video: Video) -> Iterator[bytes]:
     import av  # pyright: ignore[reportMissingImports]
 
     height, width = video.shape[1:3]
-    pad = [(0, int(height % 2)), (0, int(width % 2)), (0, 0)]
+    pad: Any = ((0, height % 2), (0, width % 2), (0, 0))
     encoder: Any = av.CodecContext.create("libx264", "w")
     encoder.width, encoder.height, encoder.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
     encoder.framerate = video.fps
