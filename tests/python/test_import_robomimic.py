@@ -9,7 +9,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
-from mjsense.export.images import png
+from mjsense._png import png_of as png
 
 import mjsense as mjs
 
