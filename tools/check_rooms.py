@@ -1,10 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the order of includes between rooms (the folders of src/mjsense), which the table in docs/architecture.md defines.
+"""Checks the includes between rooms (the folders of src/mjsense), whose order the table in docs/architecture.md defines, and the
+namespaces of rooms.
 
 A file may include headers of its own room and of the rooms above it in that table. Tests, benchmarks and folders testing/ may
 include anything. Nothing in src/ may include python/. x.cc must include x.h first, which shows that the header is
 self-contained.
+
+The namespace of a room is mjsense::ROOM, that of core/ is mjsense. Folders testing/ may use mjsense::testing. In other namespaces of the
+library, a file may only declare types and specialise templates.
 """
 
 from __future__ import annotations
@@ -17,6 +21,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "src" / "mjsense"
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 FIRST = re.compile(r'^\s*#\s*include\s+[<"]([^">]+)[">]', re.MULTILINE)
+NAMESPACE = re.compile(r"^namespace (mjsense[\w:]*) \{\n(.*?)^\}  // namespace \1$", re.MULTILINE | re.DOTALL)
+DECLARATIONS = re.compile(r"\s*(template <>\n.*|((class|struct|enum class) \w+;\s*)*)", re.DOTALL)
 JUDGES = re.compile(r"_(test|bench)\.cc$|/testing/")
 
 
@@ -46,6 +52,20 @@ def wrong_includes(path: Path, text: str, order: dict[str, int]) -> list[str]:
     return found
 
 
+def wrong_namespaces(path: Path, text: str, order: dict[str, int]) -> list[str]:
+    room = path.parts[0]
+    found = []
+    for name, body in NAMESPACE.findall(text):
+        owner = name.split("::")[1] if "::" in name else "core"
+        if owner not in order:  # mjsense::os
+            owner = "core"
+        helpers = name == "mjsense::testing" and "testing" in path.parts
+        if owner != room and not helpers and not DECLARATIONS.fullmatch(body):
+            own = "mjsense" if room == "core" else f"mjsense::{room}"
+            found.append(f"{path}: defines names in namespace {name}; the namespace of {room}/ is {own}")
+    return found
+
+
 def main() -> int:
     rooms = rooms_of((ROOT / "docs" / "architecture.md").read_text())
     order = {room: i for i, room in enumerate(rooms)}
@@ -55,8 +75,11 @@ def main() -> int:
     if not found:
         for path in sorted(SOURCES.rglob("*")):
             name = path.relative_to(SOURCES)
-            if path.suffix in (".h", ".cc") and len(name.parts) > 1 and not JUDGES.search(path.as_posix()):
-                found += wrong_includes(name, path.read_text(), order)
+            if path.suffix in (".h", ".cc") and len(name.parts) > 1:
+                text = path.read_text()
+                found += wrong_namespaces(name, text, order)
+                if not JUDGES.search(path.as_posix()):
+                    found += wrong_includes(name, text, order)
     print("\n".join(found), file=sys.stderr)
     return 1 if found else 0
 

@@ -18,7 +18,7 @@
 namespace mjsense::python {
 namespace {
 
-class VisitHook final : public WorldHooks {
+class VisitHook final : public worlds::WorldHooks {
  public:
   explicit VisitHook(std::function<void(const World&)> body) : body_(std::move(body)) {}
   void substep(const World& /*world*/) override {}
@@ -33,13 +33,13 @@ class PyCameraSystem {
  public:
   PyCameraSystem(const std::string& name_or_path, const std::string& robot_file,
                  const std::string& prefix, const std::string& base)
-      : system_(load_camera_system(name_or_path, robot_file, prefix), prefix, base) {}
+      : system_(cameras::load_camera_system(name_or_path, robot_file, prefix), prefix, base) {}
 
   nb::list mounts() const {
     nb::list out;
     for (std::size_t i = 0; i < system_.cfg().cameras.size(); ++i) {
-      const CameraMountCfg& cfg = system_.cfg().cameras[i];
-      const CameraSystem::Mounted& mounted = system_.mounted(static_cast<int>(i));
+      const cameras::CameraMountCfg& cfg = system_.cfg().cameras[i];
+      const cameras::CameraSystem::Mounted& mounted = system_.mounted(static_cast<int>(i));
       std::array<double, 3> pos{};
       std::array<double, 4> quat{};
       write_vec(mounted.pose.p, pos.data());
@@ -61,13 +61,13 @@ class PyCameraSystem {
     return out;
   }
   void initialize(PySimulation& sim) {
-    sim.change("cameras", [&](Simulation& s) { system_.initialize(s); });
+    sim.change("cameras", [&](sim::Simulation& s) { system_.initialize(s); });
   }
   bool varies() const { return system_.varies(); }
   std::string place(PySimulation& sim, int world, std::uint64_t seed, std::uint64_t episode,
                     const std::array<double, 3>& centre, const std::vector<int>& objects) {
     std::string why;
-    sim.change("cameras", [&](Simulation& s) {
+    sim.change("cameras", [&](sim::Simulation& s) {
       VisitHook hook([&](const World& w) {
         why = system_.place_cameras(w, seed, episode, vec3(centre.data()), objects);
       });
@@ -79,7 +79,7 @@ class PyCameraSystem {
   }
 
  private:
-  CameraSystem system_;
+  cameras::CameraSystem system_;
 };
 
 }  // namespace

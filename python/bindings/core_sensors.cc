@@ -33,16 +33,16 @@ namespace {
 // (name, addresses in qpos, addresses in qvel)
 using Group = std::tuple<std::string, std::vector<int>, std::vector<int>>;
 
-std::vector<JointGroup> groups_of(const std::vector<Group>& groups) {
-  std::vector<JointGroup> all;
+std::vector<observe::JointGroup> groups_of(const std::vector<Group>& groups) {
+  std::vector<observe::JointGroup> all;
   for (const auto& [name, qpos, dof] : groups) all.push_back({name, qpos, dof});
   return all;
 }
 
 SensorHandle joint_state(const std::string& name, bool velocity, const std::vector<Group>& groups) {
-  using What = JointStateSensor::What;
-  return {std::make_shared<JointStateSensor>(name, velocity ? What::kVelocity : What::kPosition,
-                                             groups_of(groups))};
+  using What = observe::JointStateSensor::What;
+  return {std::make_shared<observe::JointStateSensor>(
+      name, velocity ? What::kVelocity : What::kPosition, groups_of(groups))};
 }
 
 // A frame: (type, name).
@@ -50,53 +50,55 @@ using Frame = std::pair<std::string, std::string>;
 
 SensorHandle pose(const std::string& name, const Frame& frame, const Frame& reference,
                   const std::string& description) {
-  return {std::make_shared<PoseSensor>(name, PoseSensor::Ref{frame.first, frame.second},
-                                       PoseSensor::Ref{reference.first, reference.second},
-                                       description)};
+  return {std::make_shared<observe::PoseSensor>(
+      name, observe::PoseSensor::Ref{frame.first, frame.second},
+      observe::PoseSensor::Ref{reference.first, reference.second}, description)};
 }
 
 SensorHandle camera_parameters(const std::string& name, const std::string& camera, int width,
                                int height) {
-  return {std::make_shared<CameraParameterSensor>(name, camera, width, height)};
+  return {std::make_shared<observe::CameraParameterSensor>(name, camera, width, height)};
 }
 
 SensorHandle env_states(const std::string& name, const std::string& articulation,
                         const std::vector<Group>& groups, int length, const std::string& robot_body,
                         const std::string& robot, const TaskView* view) {
-  Presence presence;
+  observe::Presence presence;
   if (view) {
     presence = {view->task().absentees(),
                 [task = *view](int world, int body) { return task.task().present(world, body); }};
   }
-  return {std::make_shared<EnvStatesSensor>(name, articulation, groups_of(groups), length,
-                                            robot_body, robot, std::move(presence))};
+  return {std::make_shared<observe::EnvStatesSensor>(name, articulation, groups_of(groups), length,
+                                                     robot_body, robot, std::move(presence))};
 }
 
 SensorHandle grasp_state(const std::string& name, const std::string& object,
                          const std::vector<std::pair<std::string, std::string>>& grippers) {
-  std::vector<GraspStateSensor::Gripper> all;
+  std::vector<robots::GraspStateSensor::Gripper> all;
   for (const auto& [gripper, body] : grippers) all.push_back({gripper, body});
-  return {std::make_shared<GraspStateSensor>(name, BodyRef(object), std::move(all))};
+  return {
+      std::make_shared<robots::GraspStateSensor>(name, observe::BodyRef(object), std::move(all))};
 }
 
 // objects: (key, body, erode); cameras: (name, sensor of the scene, skip erosion).
 SensorHandle image_points(const std::string& name,
                           const std::vector<std::tuple<std::string, std::string, bool>>& objects,
                           nb::list cameras) {
-  std::vector<ImagePointsSensor::Object> bodies;
-  for (const auto& [key, body, erode] : objects) bodies.push_back({key, BodyRef(body), erode});
-  std::vector<ImagePointsSensor::Camera> views;
+  std::vector<observe::ImagePointsSensor::Object> bodies;
+  for (const auto& [key, body, erode] : objects)
+    bodies.push_back({key, observe::BodyRef(body), erode});
+  std::vector<observe::ImagePointsSensor::Camera> views;
   for (nb::handle camera : cameras) {
     views.push_back({.name = nb::cast<std::string>(camera[0]),
                      .sensor = nb::cast<SensorHandle&>(camera[1]).sensor.get(),
                      .skip_erosion = nb::cast<bool>(camera[2])});
   }
-  return {std::make_shared<ImagePointsSensor>(name, std::move(bodies), std::move(views))};
+  return {std::make_shared<observe::ImagePointsSensor>(name, std::move(bodies), std::move(views))};
 }
 
 SensorHandle shared_field(const std::string& name, const SensorHandle& source,
                           const std::string& field) {
-  return {field_of_camera(name, *source.sensor, field)};
+  return {observe::field_of_camera(name, *source.sensor, field)};
 }
 
 }  // namespace

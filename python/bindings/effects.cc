@@ -29,9 +29,9 @@ class PyPipeline {
  public:
   PyPipeline(nb::handle config, int num_worlds, std::uint64_t seed) : seed_(seed) {
     if (num_worlds < 1) throw ValueError("observation pipeline: num_envs must be at least 1");
-    PipelineCfg cfg;
+    effects::PipelineCfg cfg;
     read_struct(config, cfg);
-    cfg_ = pipeline(cfg);
+    cfg_ = effects::pipeline(cfg);
     worlds_.resize(num_worlds);
   }
 
@@ -74,7 +74,7 @@ class PyPipeline {
   struct World {
     std::int64_t tick = -1, episode = 0;
   };
-  ChainTick tick(int w) const {
+  effects::ChainTick tick(int w) const {
     return {w, static_cast<std::uint32_t>(w), seed_, worlds_[w].tick, worlds_[w].episode};
   }
   void make_chain(std::int64_t size) {
@@ -82,7 +82,7 @@ class PyPipeline {
     spec.name = "pipeline";
     spec.shape = {size};
     const int n = static_cast<int>(worlds_.size());
-    auto chain = std::make_unique<EffectChain>("pipeline", spec, cfg_, n, 1.0, 1.0);
+    auto chain = std::make_unique<effects::EffectChain>("pipeline", spec, cfg_, n, 1.0, 1.0);
     out_ = Array(DType::kFloat32, chain->spec().shape.with_front(n));
     chain_ = std::move(chain);
     size_ = size;
@@ -93,8 +93,8 @@ class PyPipeline {
     chain_->reset(tick(w));
   }
 
-  EffectChainCfg cfg_;
-  std::unique_ptr<EffectChain> chain_;  // created with the first rows
+  effects::EffectChainCfg cfg_;
+  std::unique_ptr<effects::EffectChain> chain_;  // created with the first rows
   std::int64_t size_ = 0;
   Array out_;  // its output, which also stores the history
   std::vector<World> worlds_;

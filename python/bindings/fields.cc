@@ -177,7 +177,7 @@ void read_options(nb::dict options, const StructDecl& decl, void* out) {
 
 std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config) {
   const std::string kind = kind_of(config);
-  for (const SensorKind& known : sensor_kinds()) {
+  for (const SensorKind& known : sensors::sensor_kinds()) {
     if (kind != known.cfg->kind) continue;
     void* fields = nullptr;
     std::shared_ptr<SensorCfg> cfg = known.make(&fields);
@@ -190,14 +190,14 @@ std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config) {
 
 void check_cfg(nb::handle config) {
   const std::string kind = kind_of(config);
-  for (const SensorKind& known : sensor_kinds()) {
+  for (const SensorKind& known : sensors::sensor_kinds()) {
     if (kind == known.cfg->kind) {
       static_cast<void>(read_sensor_cfg(config)->build());
       return;
     }
   }
   for (nb::handle base : config.type().attr("__mro__")) {
-    const StructDecl* decl = find_struct(nb::cast<std::string>(base.attr("__qualname__")));
+    const StructDecl* decl = app::find_struct(nb::cast<std::string>(base.attr("__qualname__")));
     if (!decl) continue;
     const std::shared_ptr<void> object = decl->make();
     read_struct(config, *decl, object.get());

@@ -106,7 +106,7 @@ void bind_libmujoco(nb::module_& m) {
       "Version of the libmujoco that is loaded.");
   m.def("mujoco_layout_difference", &layout_difference,
         "How its structs differ from those this was compiled with; empty: they do not.");
-  m.def("leave_no_log_file", &disable_mujoco_log_file,
+  m.def("leave_no_log_file", &scene::disable_mujoco_log_file,
         "Keeps MUJOCO_LOG.TXT out of the current folder, unless another file was chosen.");
 }
 

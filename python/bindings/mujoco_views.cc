@@ -200,7 +200,7 @@ std::uintptr_t make_model(nb::dict sizes) {
   fields.name = reinterpret_cast<type*>(const_cast<char*>(zeros.data()));
   MJMODEL_POINTERS
 #undef X
-  return reinterpret_cast<std::uintptr_t>(copy_fields(fields).release());
+  return reinterpret_cast<std::uintptr_t>(scene::copy_fields(fields).release());
 }
 
 nb::dict data_fields(std::uintptr_t model, std::uintptr_t address) {

@@ -22,7 +22,8 @@ namespace nb = nanobind;
 
 void bind_program(nb::module_& m) {
   m.def(
-      "objects_json", [] { return list_objects(true); }, "What `mjsense objects --json` prints.");
+      "objects_json", [] { return app::list_objects(true); },
+      "What `mjsense objects --json` prints.");
   m.def(
       "run_program",
       [](const std::vector<nb::bytes>& given,
@@ -32,10 +33,10 @@ void bind_program(nb::module_& m) {
         std::vector<char*> argv;
         for (std::string& word : words) argv.push_back(word.data());
         argv.push_back(nullptr);
-        std::vector<OtherCommand> others;
+        std::vector<app::OtherCommand> others;
         for (const auto& [name, description] : listed) others.push_back({name, description});
         nb::gil_scoped_release unlock;
-        const int code = run_program(static_cast<int>(words.size()), argv.data(), others);
+        const int code = app::run_program(static_cast<int>(words.size()), argv.data(), others);
         std::fflush(stdout);
         return code;
       },

@@ -80,21 +80,22 @@ class SimulationLock {
 
 class PySimulation {
  public:
-  PySimulation(std::shared_ptr<Scene> scene, int num_worlds, int decimation, int threads,
+  PySimulation(std::shared_ptr<scene::Scene> scene, int num_worlds, int decimation, int threads,
                std::uint64_t seed) {
-    const SimulationCfg cfg{num_worlds, decimation, threads, seed};
+    const sim::SimulationCfg cfg{num_worlds, decimation, threads, seed};
     nb::gil_scoped_release unlock;
-    sim_ = make_shared_guarded<Simulation>(std::move(scene), cfg);
+    sim_ = make_shared_guarded<sim::Simulation>(std::move(scene), cfg);
   }
   // Wraps an existing simulation.
-  explicit PySimulation(std::shared_ptr<Simulation> sim, std::shared_ptr<SimulationLock> sim_lock =
-                                                             std::make_shared<SimulationLock>())
+  explicit PySimulation(
+      std::shared_ptr<sim::Simulation> sim,
+      std::shared_ptr<SimulationLock> sim_lock = std::make_shared<SimulationLock>())
       : sim_(std::move(sim)), sim_lock_(std::move(sim_lock)) {}
 
   void close() {
     if (!sim_lock_->is_current())
       return sim_.reset();  // in a forked process the copy must not be destroyed
-    std::shared_ptr<Simulation> last;
+    std::shared_ptr<sim::Simulation> last;
     sim_lock_->change("close", [&] { last = std::move(sim_); });
   }
   bool closed() const { return sim_ == nullptr; }
@@ -114,7 +115,7 @@ class PySimulation {
     sim_lock_->read([&] { body(open()); });
   }
 
-  Simulation& open() const {
+  sim::Simulation& open() const {
     if (!sim_) throw RuntimeError("the simulation is closed");
     return *sim_;
   }
@@ -127,7 +128,7 @@ class PySimulation {
   const std::vector<std::shared_ptr<PythonSensor>>& python() const { return python_; }
 
  private:
-  std::shared_ptr<Simulation> sim_;
+  std::shared_ptr<sim::Simulation> sim_;
   std::shared_ptr<SimulationLock> sim_lock_ = std::make_shared<SimulationLock>();
   // These sensors are notified of the resets of their worlds (also of failed worlds), even if they
   // are not computed.

@@ -28,12 +28,13 @@ std::string shape_text(const Numbers& array) {
 
 }  // namespace
 
-nb::list suite_streams(Rollout& rollout) {
+nb::list suite_streams(rollout::Rollout& rollout) {
   nb::list list;
   for (const auto& sensor : rollout.suite().sensors()) {
     // Keep the simulation alive too, because some rows belong to a camera of the scene.
-    auto keep = std::make_shared<std::pair<std::shared_ptr<Simulation>, std::shared_ptr<Sensor>>>(
-        rollout.simulation_ptr(), sensor);
+    auto keep =
+        std::make_shared<std::pair<std::shared_ptr<sim::Simulation>, std::shared_ptr<Sensor>>>(
+            rollout.simulation_ptr(), sensor);
     nb::object owner = owner_of(keep);
     for (Field& field : sensor->fields()) {
       list.append(nb::make_tuple(sensor->name(), nb::cast(field.spec, nb::rv_policy::copy),
@@ -43,9 +44,9 @@ nb::list suite_streams(Rollout& rollout) {
   return list;
 }
 
-nb::list action_layout(const Robot& robot) {
+nb::list action_layout(const robots::Robot& robot) {
   nb::list layout;
-  for (const MoveGroup& group : robot.groups()) {
+  for (const robots::MoveGroup& group : robot.groups()) {
     if (group.controlled())
       layout.append(nb::make_tuple(group.name, group.command_low, group.command_high));
   }
@@ -78,7 +79,7 @@ std::string PythonPolicy::layout_text() const {
                      fmt::join(groups, ", "));
 }
 
-void PythonPolicy::initialize(Task& task) {
+void PythonPolicy::initialize(episode::Task& task) {
   task_ = &task;
   const auto B = static_cast<std::size_t>(task.num_worlds());
   group_.clear();
@@ -99,7 +100,7 @@ void PythonPolicy::initialize(Task& task) {
             .left = std::vector<std::size_t>(B)};
 }
 
-void PythonPolicy::observe(Rollout& rollout) {
+void PythonPolicy::observe(rollout::Rollout& rollout) {
   host_->call(place("initialize"), [&] {
     nb::object policy = nb::borrow(policy_.get());
     nb::object bound =
@@ -114,7 +115,7 @@ void PythonPolicy::observe(Rollout& rollout) {
 
 std::vector<std::shared_ptr<Sensor>> PythonPolicy::create_policy_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors;
-  if (!phases_.empty()) sensors = PlannerPolicy::create_policy_sensors();
+  if (!phases_.empty()) sensors = episode::PlannerPolicy::create_policy_sensors();
   host_->call(place("sensors"), [&] {
     for (auto& own : host_->members(policy_.get().attr("_mjs_sensors")(), simulation_.lock()))
       sensors.push_back(std::move(own));
@@ -137,7 +138,7 @@ std::string PythonPolicy::failure(int world) const {
   });
 }
 
-void PythonPolicy::reset_all(ActiveWorlds& worlds) {
+void PythonPolicy::reset_all(episode::ActiveWorlds& worlds) {
   for (int w : worlds.ids()) chunk_.left[w] = 0;
   host_->call(place("reset"), [&] {
     nb::list ids, episodes;
@@ -150,7 +151,7 @@ void PythonPolicy::reset_all(ActiveWorlds& worlds) {
   });
 }
 
-void PythonPolicy::act_all(ActiveWorlds& worlds, std::span<Action> actions) {
+void PythonPolicy::act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) {
   bool any = false;
   for (int w : worlds.ids()) any |= chunk_.left[w] == 0;
   if (any) {
@@ -296,7 +297,7 @@ void PythonPolicy::read_phases() {
   read_ints("num_retries", retries_);
 }
 
-void PythonPolicy::fill(int world, Action& action) {
+void PythonPolicy::fill(int world, robots::Action& action) {
   const std::size_t at = chunk_.steps - chunk_.left[world];
   const double* values = chunk_.values.data() + (world * chunk_.steps + at) * n_;
   for (std::size_t i = 0; i < group_.size(); ++i) {

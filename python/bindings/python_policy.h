@@ -11,32 +11,36 @@
 #include "mjsense/episode/task.h"
 #include "python/bindings/rollout_host.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 class Rollout;
-}
+}  // namespace mjsense::rollout
+
+namespace mjsense {}
 
 namespace mjsense::python {
 
 // (sensor, spec, rows) of every stream of a rollout's suite. The rows are read-only and may outlive
 // the rollout.
-nb::list suite_streams(Rollout& rollout);
+nb::list suite_streams(rollout::Rollout& rollout);
 // (name, low, high) of every controlled move group.
-nb::list action_layout(const Robot& robot);
+nb::list action_layout(const robots::Robot& robot);
 
-class PythonPolicy final : public PlannerPolicy {
+class PythonPolicy final : public episode::PlannerPolicy {
  public:
   // Requires the GIL.
   PythonPolicy(nb::object policy, std::shared_ptr<PythonHost> host);
 
   std::string_view name() const override { return name_; }
-  void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
-  void initialize(Task& task) override;
+  void bind(const std::shared_ptr<sim::Simulation>& simulation) override {
+    simulation_ = simulation;
+  }
+  void initialize(episode::Task& task) override;
   // Call when the suite exists: act() receives its rows.
-  void observe(Rollout& rollout);
-  void reset_all(ActiveWorlds& worlds) override;
-  void act_all(ActiveWorlds& worlds, std::span<Action> actions) override;
+  void observe(rollout::Rollout& rollout);
+  void reset_all(episode::ActiveWorlds& worlds) override;
+  void act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) override;
 
-  std::span<const Phase> phases() const override { return phases_; }
+  std::span<const episode::Phase> phases() const override { return phases_; }
   int phase(int world) const override { return phase_[world]; }
   int num_retries(int world) const override { return retries_[world]; }
   Pose grasp_pose(int /*world*/) const override { return {}; }
@@ -62,15 +66,15 @@ class PythonPolicy final : public PlannerPolicy {
   void read_group(nb::handle value, std::size_t first, std::size_t width, const std::string& what);
   void read_flags(nb::handle value, const char* what, auto&& set);
   void read_phases();
-  void fill(int world, Action& action);
+  void fill(int world, robots::Action& action);
 
   PyHandle policy_;
   std::shared_ptr<PythonHost> host_;
-  std::weak_ptr<Simulation> simulation_;
-  Task* task_ = nullptr;
+  std::weak_ptr<sim::Simulation> simulation_;
+  episode::Task* task_ = nullptr;
   std::string name_;
   std::vector<std::string> phase_names_;
-  std::vector<Phase> phases_;
+  std::vector<episode::Phase> phases_;
   std::vector<int> phase_, retries_;  // [B]
   PyHandle act_, observation_, wanted_, as_array_;
   bool* wanted_rows_ = nullptr;     // [B], memory of wanted_

@@ -35,11 +35,11 @@ std::string last_part(const std::string& name) { return name.substr(name.rfind('
 
 }  // namespace
 
-PythonTask::PythonTask(TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost> host)
-    : Task(std::move(cfg)), task_(std::move(task)), host_(std::move(host)) {}
+PythonTask::PythonTask(episode::TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost> host)
+    : episode::Task(std::move(cfg)), task_(std::move(task)), host_(std::move(host)) {}
 
 std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<PythonHost> host,
-                                             TaskCfg cfg, bool own_horizon) {
+                                             episode::TaskCfg cfg, bool own_horizon) {
   nb::object settings = task.attr("_mjs_settings")();
   if (!cfg.scene.empty() || cfg.make_scene) {
     throw ValueError(fmt::format("task '{}' makes its scene itself: it cannot take the scene '{}'",
@@ -57,7 +57,7 @@ std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<Py
   made->type_ = nb::cast<std::string>(settings["task_type"]);
   made->robot_entity_ = nb::cast<std::string>(settings["robot_entity"]);
   made->table_height_ = nb::cast<double>(settings["table_height"]);
-  made->groups_ = nb::cast<ActuatorGroups>(settings["move_groups"]);
+  made->groups_ = nb::cast<robots::ActuatorGroups>(settings["move_groups"]);
   for (const auto& [name, camera] :
        nb::cast<std::vector<std::pair<std::string, std::string>>>(settings["cameras"])) {
     made->cameras_.push_back({.name = name, .mjcf_camera = camera});
@@ -69,7 +69,7 @@ std::string PythonTask::place(const char* method) const {
   return fmt::format("task '{}': {}()", name_, method);
 }
 
-SceneCfg PythonTask::scene_cfg() const {
+scene::SceneCfg PythonTask::scene_cfg() const {
   return call("scene", [&] { return host_->read_prepared(task_.get().attr("_mjs_scene")()); });
 }
 
@@ -83,7 +83,7 @@ void PythonTask::initialize_task() {
   target_.assign(num_worlds(), 0);
   call("initialize", [&] {
     nb::list groups;
-    for (const MoveGroup& group : robot().groups()) {
+    for (const robots::MoveGroup& group : robot().groups()) {
       if (group.controlled())
         groups.append(nb::make_tuple(group.name, group.command_low, group.command_high));
     }
@@ -91,8 +91,8 @@ void PythonTask::initialize_task() {
     graspable_.clear();
     for (nb::handle body : task_.get().attr("_mjs_graspable")()) {
       const auto full = nb::cast<std::string>(body);
-      const int id = resolve(model(), mjOBJ_BODY, full, fmt::format("task '{}'", name_));
-      graspable_.push_back({id, last_part(full), object_shape(model(), id)});
+      const int id = scene::resolve(model(), mjOBJ_BODY, full, fmt::format("task '{}'", name_));
+      graspable_.push_back({id, last_part(full), episode::object_shape(model(), id)});
     }
     for (int w = 0; w < num_worlds(); ++w) {
       set_objects(w, task_.get().attr("_mjs_roles")(w));
@@ -101,18 +101,19 @@ void PythonTask::initialize_task() {
 }
 
 void PythonTask::set_objects(int world, nb::handle roles) {
-  std::vector<TaskObject> found;
+  std::vector<episode::TaskObject> found;
   for (auto [role, body] : nb::cast<nb::dict>(roles)) {
     const auto full = nb::cast<std::string>(body);
     const auto name = nb::cast<std::string>(role);
     found.push_back({.role = name,
-                     .body = resolve(model(), mjOBJ_BODY, full,
-                                     fmt::format("task '{}', object '{}'", name_, name)),
+                     .body = scene::resolve(model(), mjOBJ_BODY, full,
+                                            fmt::format("task '{}', object '{}'", name_, name)),
                      .name = last_part(full),
                      .thin = name.find("handle") != std::string::npos});
   }
-  std::vector<TaskObject>& now = objects_[world];
-  if (!now.empty() && !std::ranges::equal(now, found, {}, &TaskObject::role, &TaskObject::role)) {
+  std::vector<episode::TaskObject>& now = objects_[world];
+  if (!now.empty() &&
+      !std::ranges::equal(now, found, {}, &episode::TaskObject::role, &episode::TaskObject::role)) {
     throw ValueError(
         fmt::format("task '{}': the roles of its objects must be the same, in the same order, "
                     "in every episode",
@@ -121,7 +122,7 @@ void PythonTask::set_objects(int world, nb::handle roles) {
   now = std::move(found);
   starts_[world].resize(now.size());
   if (now.empty() || graspable_.empty()) return;
-  const auto at = std::ranges::find(graspable_, now[0].body, &GraspObject::body);
+  const auto at = std::ranges::find(graspable_, now[0].body, &episode::GraspObject::body);
   if (at == graspable_.end()) {
     throw ValueError(fmt::format("task '{}': the object '{}' is body '{}', which is not graspable",
                                  name_, now[0].role, now[0].name));
@@ -129,7 +130,7 @@ void PythonTask::set_objects(int world, nb::handle roles) {
   target_[world] = static_cast<int>(at - graspable_.begin());
 }
 
-std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
   robot().write_joints(state, rng);  // before sample(), which may change them
   return call("sample", [&]() -> std::optional<Pose> {
     nb::object base = task_.get().attr("_mjs_sample")(world, episode(world), cfg().seed);
@@ -140,15 +141,15 @@ std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const StateRow
 }
 
 void PythonTask::begin(const World& world) {
-  Task::begin(world);
+  episode::Task::begin(world);
   for (std::size_t i = 0; i < objects_[world.id].size(); ++i) {
     const int body = objects_[world.id][i].body;
     starts_[world.id][i] = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
   }
 }
 
-void PythonTask::begin_all(ActiveWorlds& worlds) {
-  Task::begin_all(worlds);
+void PythonTask::begin_all(episode::ActiveWorlds& worlds) {
+  episode::Task::begin_all(worlds);
   call("begin", [&] {
     nb::list ids;
     for (int w : worlds.ids()) ids.append(w);
@@ -156,7 +157,7 @@ void PythonTask::begin_all(ActiveWorlds& worlds) {
   });
 }
 
-void PythonTask::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
+void PythonTask::evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) {
   call("evaluate", [&] {
     nb::list ids;
     for (int w : worlds.ids()) ids.append(w);
@@ -216,11 +217,11 @@ std::string PythonTask::description(int world) const {
               [&] { return nb::cast<std::string>(task_.get().attr("_mjs_description")(world)); });
 }
 
-Task::Referrals PythonTask::referrals(int world) const {
+episode::Task::Referrals PythonTask::referrals(int world) const {
   return call("referrals", [&] {
     Referrals all;
     for (auto [role, texts] : nb::cast<nb::dict>(task_.get().attr("_mjs_referrals")(world))) {
-      std::vector<Referral> list;
+      std::vector<episode::Referral> list;
       for (nb::handle text : texts)
         list.push_back({nb::cast<std::string>(text[0]), nb::cast<double>(text[1])});
       all.emplace_back(nb::cast<std::string>(role), std::move(list));
@@ -240,7 +241,7 @@ std::vector<std::pair<std::string, std::string>> PythonTask::scene_info(int worl
 
 std::size_t PythonTask::role_index(std::string_view role) const {
   std::vector<std::string> roles;
-  for (const TaskObject& object : objects_[0]) {
+  for (const episode::TaskObject& object : objects_[0]) {
     if (object.role == role) return roles.size();
     roles.push_back(object.role);
   }
@@ -259,10 +260,11 @@ std::optional<Pose> PythonTask::goal_pose(int /*world*/, std::string_view role) 
 std::vector<std::shared_ptr<Sensor>> PythonTask::create_task_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors;
   if (!objects_[0].empty()) {
-    sensors.push_back(start_pose_sensor(*this, "obj_start", objects_[0][0].role));
+    sensors.push_back(episode::start_pose_sensor(*this, "obj_start", objects_[0][0].role));
   }
-  for (const TaskObject& object : objects_[0]) {
-    if (auto held = grasp_state_sensor(*this, object.role)) sensors.push_back(std::move(held));
+  for (const episode::TaskObject& object : objects_[0]) {
+    if (auto held = episode::grasp_state_sensor(*this, object.role))
+      sensors.push_back(std::move(held));
   }
   call("sensors", [&] {
     for (auto& own : host_->members(task_.get().attr("_mjs_sensors")(), simulation_.lock()))
@@ -271,7 +273,7 @@ std::vector<std::shared_ptr<Sensor>> PythonTask::create_task_sensors() const {
   return sensors;
 }
 
-void PythonTask::edit_suite(SensorSuite& suite) const {
+void PythonTask::edit_suite(observe::SensorSuite& suite) const {
   call("suite", [&] {
     nb::object wanted = task_.get().attr("_mjs_suite")(suite.names());
     if (!wanted.is_none()) suite.select(nb::cast<std::vector<std::string>>(wanted));

@@ -46,7 +46,7 @@ class PyRecorder {
       : sim_(simulation.is_none() ? nullptr : &nb::cast<PySimulation&>(simulation)),
         simulation_(simulation),
         num_worlds_(num_worlds) {
-    RecordingCfg cfg;
+    record::RecordingCfg cfg;
     cfg.out_dir = out;
     cfg.num_worlds = num_worlds;
     cfg.fps = {fps_num, fps_den};
@@ -72,11 +72,11 @@ class PyRecorder {
       cfg.archive_name = nb::cast<std::string>(archive[0]);
       cfg.archive.assign(bytes.c_str(), bytes.size());
     }
-    read_options(options, struct_of<VideoCfg>(), &cfg.video);
+    read_options(options, struct_of<record::VideoCfg>(), &cfg.video);
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
     nb::gil_scoped_release unlock;
-    recorder_ = make_shared_guarded<Recorder>(cfg);
+    recorder_ = make_shared_guarded<record::Recorder>(cfg);
   }
   ~PyRecorder() {
     nb::gil_scoped_release unlock;
@@ -93,7 +93,7 @@ class PyRecorder {
     for (int w : worlds) check(w);
     std::vector<Sensor*> fresh;
     for (const auto& sensor : sources_) fresh.push_back(sensor.get());
-    if (sim_) sim_->read([&](Simulation& sim) { sim.refresh(fresh, worlds); });
+    if (sim_) sim_->read([&](sim::Simulation& sim) { sim.refresh(fresh, worlds); });
     unlocked([&] {
       for (std::size_t i = 0; i < worlds.size(); ++i) {
         recorder_->append(worlds[i], {.reward = static_cast<float>(reward[i]),
@@ -130,7 +130,7 @@ class PyRecorder {
     unlocked([&] { recorder_->complete(); });
   }
 
-  Recorder& recorder() { return *recorder_; }
+  record::Recorder& recorder() { return *recorder_; }
   bool recording(int world) const {
     check(world);
     return recorder_->recording(world);
@@ -160,7 +160,7 @@ class PyRecorder {
     }
     for (const Field& field : sensor->fields()) {
       const std::string suffix = field.name == "rgb" ? "" : "_" + field.name;
-      sensors_.push_back(field_of_camera(sensor->name() + suffix, *sensor, field.name));
+      sensors_.push_back(observe::field_of_camera(sensor->name() + suffix, *sensor, field.name));
       sensors_.back()->initialize({.model = nullptr, .num_worlds = num_worlds_});
     }
   }
@@ -171,11 +171,11 @@ class PyRecorder {
   std::vector<std::shared_ptr<Sensor>> sources_;  // sensors to refresh
   std::vector<std::shared_ptr<Sensor>> sensors_;  // sensors to store
   const ProcessGuard process_;
-  std::shared_ptr<Recorder> recorder_;
+  std::shared_ptr<record::Recorder> recorder_;
 };
 
 nb::dict stats(PyRecorder& self) {
-  const RecordStats s = self.recorder().stats();
+  const record::RecordStats s = self.recorder().stats();
   nb::dict d;
   d["rows"] = s.rows;
   d["frames"] = s.frames;

@@ -22,14 +22,14 @@ namespace {
 
 using Array = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
 
-NamedArrays named_arrays(const nb::dict& arrays) {
-  NamedArrays out;
+render::NamedArrays named_arrays(const nb::dict& arrays) {
+  render::NamedArrays out;
   for (auto [key, value] : arrays) {
     const auto name = nb::cast<std::string>(key);
     Array array;
     if (!nb::try_cast<Array>(value, array))
       throw ValueError("the model's field '" + name + "' is not a contiguous array");
-    NamedArray& named = out[name];
+    render::NamedArray& named = out[name];
     named.data = const_cast<void*>(static_cast<const void*>(array.data()));
     for (std::size_t i = 0; i < array.ndim(); ++i)
       named.shape.push_back(static_cast<std::int64_t>(array.shape(i)));
@@ -45,8 +45,8 @@ NamedArrays named_arrays(const nb::dict& arrays) {
 }
 
 // {field: (offset, bytes)}
-StructLayout layout_of(const nb::dict& fields) {
-  StructLayout out;
+render::StructLayout layout_of(const nb::dict& fields) {
+  render::StructLayout out;
   for (auto [key, value] : fields) {
     const auto place = nb::cast<nb::tuple>(value);
     out[nb::cast<std::string>(key)] = {nb::cast<std::ptrdiff_t>(place[0]),
@@ -56,7 +56,7 @@ StructLayout layout_of(const nb::dict& fields) {
 }
 
 template <class T>
-void bind_soft(const NamedArrays& arrays, const char* name, const T*& out) {
+void bind_soft(const render::NamedArrays& arrays, const char* name, const T*& out) {
   const auto found = arrays.find(name);
   if (found == arrays.end()) throw ValueError(std::string("MjvScene has no field '") + name + "'");
   if (found->second.bytes != static_cast<int>(sizeof(T)))
@@ -65,9 +65,9 @@ void bind_soft(const NamedArrays& arrays, const char* name, const T*& out) {
   out = static_cast<const T*>(found->second.data);
 }
 
-SoftArrays soft_arrays(const nb::dict& fields) {
-  const NamedArrays arrays = named_arrays(fields);
-  SoftArrays soft;
+render::SoftArrays soft_arrays(const nb::dict& fields) {
+  const render::NamedArrays arrays = named_arrays(fields);
+  render::SoftArrays soft;
 #define MJSENSE_SOFT(name) bind_soft(arrays, #name, soft.name)
   MJSENSE_SOFT(flexedgeadr);
   MJSENSE_SOFT(flexedgenum);
@@ -93,8 +93,8 @@ const char* address(const nb::handle& value) {
   return reinterpret_cast<const char*>(nb::cast<std::uintptr_t>(value));
 }
 
-SceneMemory memory_of(const nb::dict& scene) {
-  SceneMemory m{};
+render::SceneMemory memory_of(const nb::dict& scene) {
+  render::SceneMemory m{};
   m.geoms = address(scene["geoms"]);
   m.geom_stride = nb::cast<std::ptrdiff_t>(scene["geom_stride"]);
   m.lights = address(scene["lights"]);
@@ -106,21 +106,21 @@ SceneMemory memory_of(const nb::dict& scene) {
 
 // A renderer and the memory of the scene that it draws.
 struct BoundRenderer {
-  SceneRenderer renderer;
-  SceneMemory memory;
+  render::SceneRenderer renderer;
+  render::SceneMemory memory;
   std::mutex mutex;  // held while rendering
 
   BoundRenderer(const nb::dict& model, const nb::dict& settings, const nb::dict& layouts,
                 const nb::dict& scene, const nb::dict& soft)
       : renderer(named_arrays(model), settings_of(settings),
-                 StructReader::geoms(layout_of(nb::cast<nb::dict>(layouts["geom"]))),
-                 StructReader::lights(layout_of(nb::cast<nb::dict>(layouts["light"]))),
-                 StructReader::cameras(layout_of(nb::cast<nb::dict>(layouts["camera"]))),
+                 render::StructReader::geoms(layout_of(nb::cast<nb::dict>(layouts["geom"]))),
+                 render::StructReader::lights(layout_of(nb::cast<nb::dict>(layouts["light"]))),
+                 render::StructReader::cameras(layout_of(nb::cast<nb::dict>(layouts["camera"]))),
                  soft_arrays(soft)),
         memory(memory_of(scene)) {}
 
-  static SceneSettings settings_of(const nb::dict& from) {
-    SceneSettings out;
+  static render::SceneSettings settings_of(const nb::dict& from) {
+    render::SceneSettings out;
     out.samples = nb::cast<int>(from["samples"]);
     out.shadows = nb::cast<bool>(from["shadows"]);
     out.shadow_clip = nb::cast<float>(from["shadow_clip"]);
@@ -136,13 +136,13 @@ struct BoundRenderer {
 
   void render(int num_geoms, int num_lights, nb::tuple flags, int width, int height,
               std::uintptr_t rgb, std::uintptr_t depth, std::uintptr_t segmentation) {
-    SceneMemory scene = memory;
+    render::SceneMemory scene = memory;
     scene.num_geoms = num_geoms;
     scene.num_lights = num_lights;
     bool* const all[] = {&scene.shadow,        &scene.reflection, &scene.skybox,   &scene.haze,
                          &scene.flex_vertices, &scene.flex_edges, &scene.flex_skin};
     for (std::size_t i = 0; i < std::size(all); ++i) *all[i] = nb::cast<bool>(flags[i]);
-    ImageTargets targets;
+    render::ImageTargets targets;
     targets.rgb = reinterpret_cast<std::uint8_t*>(rgb);
     targets.depth = reinterpret_cast<float*>(depth);
     targets.segmentation = reinterpret_cast<std::int32_t*>(segmentation);

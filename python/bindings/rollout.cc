@@ -50,11 +50,11 @@ class Parts {
 
   const std::shared_ptr<PythonHost>& host() const { return host_; }
 
-  void join(RolloutCfg& cfg) const {
+  void join(rollout::RolloutCfg& cfg) const {
     cfg.code = code_;
     if (!task_.get().is_none()) {
       const bool own_horizon = !cfg.horizon;
-      cfg.make_task = [task = task_, host = host_, own_horizon](TaskCfg wanted) {
+      cfg.make_task = [task = task_, host = host_, own_horizon](episode::TaskCfg wanted) {
         nb::gil_scoped_acquire lock;
         return PythonTask::make(nb::borrow(task.get()), host, std::move(wanted), own_horizon);
       };
@@ -72,7 +72,7 @@ class Parts {
       };
     }
     const auto members = [host = host_](const PyHandle& sensors) {
-      return [sensors, host](Rollout& rollout) {
+      return [sensors, host](rollout::Rollout& rollout) {
         nb::gil_scoped_acquire lock;
         return host->members(sensors.get(), rollout.simulation_ptr());
       };
@@ -83,7 +83,7 @@ class Parts {
     if (are_there(sensors_)) cfg.more_sensors = members(sensors_);
     if (are_there(robot_sensors_)) cfg.robot_sensors = members(robot_sensors_);
     if (!select_.get().is_none()) {
-      cfg.edit_suite = [select = select_](SensorSuite& suite) {
+      cfg.edit_suite = [select = select_](observe::SensorSuite& suite) {
         nb::gil_scoped_acquire lock;
         nb::list known;
         for (const std::string& name : suite.names())
@@ -91,8 +91,10 @@ class Parts {
         suite.select(nb::cast<std::vector<std::string>>(nb::borrow(select.get())(known)));
       };
     }
-    cfg.on_construct_begin = [host = host_](Rollout& rollout) { host->set_rollout(rollout); };
-    cfg.on_constructed = [](Rollout& rollout) {
+    cfg.on_construct_begin = [host = host_](rollout::Rollout& rollout) {
+      host->set_rollout(rollout);
+    };
+    cfg.on_constructed = [](rollout::Rollout& rollout) {
       if (auto* policy = dynamic_cast<PythonPolicy*>(rollout.policy())) policy->observe(rollout);
     };
   }
@@ -100,8 +102,9 @@ class Parts {
  private:
   std::shared_ptr<PythonHost> host_;
   // Reads the configuration, including a Python function that creates its models.
-  static SceneFileCfg read_scene_file(nb::object scene, const std::shared_ptr<PythonHost>& host) {
-    SceneFileCfg cfg;
+  static scenes::SceneFileCfg read_scene_file(nb::object scene,
+                                              const std::shared_ptr<PythonHost>& host) {
+    scenes::SceneFileCfg cfg;
     read_struct(scene, cfg);
     if (!scene.attr("models").is_none()) {
       cfg.models = [scene = PyHandle(scene), host,
@@ -114,11 +117,11 @@ class Parts {
   }
 
   PyHandle task_, policy_, sensors_, scene_;
-  decltype(RolloutCfg::code) code_;
+  decltype(rollout::RolloutCfg::code) code_;
   PyHandle robot_sensors_, select_;
 };
 
-nb::dict progress_dict(const RecordProgress& p) {
+nb::dict progress_dict(const rollout::RecordProgress& p) {
   nb::dict d;
   d["kept"] = p.kept;
   d["wanted"] = p.wanted;
@@ -135,13 +138,13 @@ nb::dict progress_dict(const RecordProgress& p) {
 
 nb::dict record(nb::dict options, nb::object progress, nb::object objects,
                 nb::object make_simulation) {
-  RecordJobCfg cfg;
-  read_options(options, struct_of<RecordJobCfg>(), &cfg);
+  rollout::RecordJobCfg cfg;
+  read_options(options, struct_of<rollout::RecordJobCfg>(), &cfg);
   const Parts parts(objects, make_simulation);
   parts.join(cfg.rollout);
-  StopFlag stop{0};
+  rollout::StopFlag stop{0};
   nb::object error;  // raised by `progress`, or KeyboardInterrupt
-  const auto report = [&](const RecordProgress& p) {
+  const auto report = [&](const rollout::RecordProgress& p) {
     nb::gil_scoped_acquire lock;
     if (error) return;
     try {
@@ -152,12 +155,12 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
       stop = 2;
     }
   };
-  RecordSummary s;
+  rollout::RecordSummary s;
   refuse_python_callbacks();
   try {
     nb::gil_scoped_release unlock;
     // User code that runs inside may read the worlds but not step or reset them.
-    parts.host()->sim_lock()->work([&] { s = record_episodes(cfg, report, &stop); });
+    parts.host()->sim_lock()->work([&] { s = rollout::record_episodes(cfg, report, &stop); });
   } catch (...) {
     parts.host()->close();
     throw;
@@ -193,14 +196,14 @@ class PyRollout {
   PyRollout(nb::dict options, nb::object objects, nb::object make_simulation)
       : parts_(objects, make_simulation), sim_lock_(parts_.host()->sim_lock()) {
     refuse_python_callbacks();
-    RolloutCfg cfg;
+    rollout::RolloutCfg cfg;
     cfg.default_view = nb::cast<bool>(options.attr("pop")("default_view", false));
     cfg.replay_sensor = nb::cast<bool>(options.attr("pop")("replay_sensor", false));
-    read_options(options, struct_of<RolloutCfg>(), &cfg);
+    read_options(options, struct_of<rollout::RolloutCfg>(), &cfg);
     parts_.join(cfg);
     nb::gil_scoped_release unlock;
     try {
-      rollout_ = make_shared_guarded<Rollout>(cfg);
+      rollout_ = make_shared_guarded<rollout::Rollout>(cfg);
     } catch (...) {
       parts_.host()->end();
       throw;
@@ -212,7 +215,7 @@ class PyRollout {
     rollout_.reset();
   }
 
-  Rollout& rollout() { return *rollout_; }
+  rollout::Rollout& rollout() { return *rollout_; }
   // mjsense.Simulation of the worlds, which shares the rollout's lock.
   nb::object simulation() const { return parts_.host()->simulation(rollout_->simulation_ptr()); }
 
@@ -232,7 +235,7 @@ class PyRollout {
   using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
   void repeat(
       const std::vector<std::tuple<int, Row, std::optional<Row>, std::optional<Row>>>& steps) {
-    std::vector<Rollout::RecordedStep> recorded;
+    std::vector<rollout::Rollout::RecordedStep> recorded;
     const auto span = [](const Row& row) { return std::span(row.data(), row.size()); };
     const mjModel* m = rollout_->simulation().model();
     const auto state = static_cast<std::size_t>(mj_stateSize(m, mjSTATE_INTEGRATION));
@@ -271,7 +274,7 @@ class PyRollout {
   void step_chunk(const Chunks& values, bool stop_on_success) {
     check(values.shape(0), values.shape(2), "(B, steps, n)");
     const std::size_t B = values.shape(0), steps = values.shape(1);
-    std::vector<Action> actions(B * steps);
+    std::vector<robots::Action> actions(B * steps);
     for (std::size_t w = 0; w < B; ++w) {
       for (std::size_t k = 0; k < steps; ++k)
         actions[k * B + w] = action(values.data() + (w * steps + k) * width());
@@ -299,7 +302,8 @@ class PyRollout {
  private:
   std::size_t width() const {
     std::size_t width = 0;
-    for (const MoveGroup& group : rollout_->task().robot().groups()) width += group.command_size;
+    for (const robots::MoveGroup& group : rollout_->task().robot().groups())
+      width += group.command_size;
     return width;
   }
   void check(std::size_t worlds, std::size_t width, const char* what) const {
@@ -308,8 +312,8 @@ class PyRollout {
     throw ValueError(fmt::format("actions: {} worlds of {} commands, expected {} = {} worlds of {}",
                                  worlds, width, what, rollout_->num_worlds(), this->width()));
   }
-  Action action(const double* commands) const {
-    Action action;
+  robots::Action action(const double* commands) const {
+    robots::Action action;
     const auto groups = rollout_->task().robot().groups();
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const std::size_t n = groups[g].command_size;
@@ -321,7 +325,7 @@ class PyRollout {
 
   Parts parts_;
   std::shared_ptr<SimulationLock> sim_lock_;
-  std::shared_ptr<Rollout> rollout_;
+  std::shared_ptr<rollout::Rollout> rollout_;
 };
 
 // (reward, success, terminal, truncated), each [B], and {world: fault}.
@@ -331,9 +335,9 @@ nb::tuple outcomes(PyRollout& self) {
   const auto reward = make(DType::kFloat64), success = make(DType::kBool),
              terminal = make(DType::kBool), truncated = make(DType::kBool);
   std::vector<std::pair<int, std::string>> faults;
-  self.read([&](Rollout& rollout) {
+  self.read([&](rollout::Rollout& rollout) {
     for (int w = 0; w < B; ++w) {
-      const Evaluation& e = rollout.evaluation(w);
+      const episode::Evaluation& e = rollout.evaluation(w);
       reward->all<double>()[w] = e.reward;
       success->all<bool>()[w] = e.success;
       terminal->all<bool>()[w] = e.terminal;
@@ -358,14 +362,14 @@ void bind_rollout(nb::module_& m) {
       "rollout_options",
       [] {
         std::vector<std::string> names;
-        for (const FieldDecl& field : struct_of<RolloutCfg>().fields)
+        for (const FieldDecl& field : struct_of<rollout::RolloutCfg>().fields)
           names.emplace_back(field.name);
         return names;
       },
       "Names of the options of a rollout, which are also those of a recording's settings.");
-  m.def("task_names", &task_names, "Names of the tasks there are.");
-  m.def("robot_names", &robot_names, "Names of the robots there are.");
-  m.def("policy_names", &policy_names, "Names of the policies there are.");
+  m.def("task_names", &rollout::task_names, "Names of the tasks there are.");
+  m.def("robot_names", &robots::robot_names, "Names of the robots there are.");
+  m.def("policy_names", &rollout::policy_names, "Names of the policies there are.");
   nb::class_<PyRollout>(m, "Rollout", "The C++ rollout.")
       .def(nb::init<nb::dict, nb::object, nb::object>(), nb::arg("options"), nb::arg("objects"),
            nb::arg("make_simulation"))
@@ -387,7 +391,7 @@ void bind_rollout(nb::module_& m) {
           "sensors",
           [](PyRollout& s) {
             nb::list list;
-            SensorSuite& suite = s.rollout().suite();
+            observe::SensorSuite& suite = s.rollout().suite();
             for (const auto& sensor : suite.sensors())
               list.append(nb::make_tuple(SensorHandle{sensor}, suite.owner(sensor->name())));
             return list;

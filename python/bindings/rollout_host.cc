@@ -13,9 +13,9 @@ void PythonHost::add_note(nb::python_error& error, const std::string& context) {
   value.attr("add_note")("in " + context);
 }
 
-SceneCfg PythonHost::read_prepared(nb::object prepared) {
+scene::SceneCfg PythonHost::read_prepared(nb::object prepared) {
   nb::list alive;
-  SceneCfg cfg =
+  scene::SceneCfg cfg =
       read_scene(prepared[0], prepared[1], nb::cast<nb::list>(prepared[2]), prepared[3], alive);
   alive.append(prepared);
   scene_ = PyHandle(nb::object(prepared[4]));
@@ -23,7 +23,7 @@ SceneCfg PythonHost::read_prepared(nb::object prepared) {
   return cfg;
 }
 
-nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {
+nb::object PythonHost::simulation(const std::shared_ptr<sim::Simulation>& sim) {
   if (!simulation_) {
     core_ = new PySimulation(sim, sim_lock_);
     nb::object core = nb::cast(core_, nb::rv_policy::take_ownership);
@@ -33,8 +33,8 @@ nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {
   return nb::borrow(simulation_.get());
 }
 
-std::vector<std::shared_ptr<Sensor>> PythonHost::members(nb::handle sensors,
-                                                         const std::shared_ptr<Simulation>& sim) {
+std::vector<std::shared_ptr<Sensor>> PythonHost::members(
+    nb::handle sensors, const std::shared_ptr<sim::Simulation>& sim) {
   nb::object shown = simulation(sim);
   nb::object prepared = nb::module_::import_("mjsense._members").attr("prepare")(shown, sensors);
   std::vector<std::shared_ptr<Sensor>> made;

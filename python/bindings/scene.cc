@@ -33,8 +33,8 @@ mjSpec* spec_of(nb::handle mjspec) {
 
 // Reads an EntityCfg's `model` as returned by EntityCfg._source(): ("path" | "xml" | "spec",
 // value). Referenced objects are added to `alive`.
-ModelSource read_source(nb::handle config, nb::list& alive) {
-  ModelSource source;
+scene::ModelSource read_source(nb::handle config, nb::list& alive) {
+  scene::ModelSource source;
   const auto from = nb::cast<nb::tuple>(config.attr("_source")());
   alive.append(from);
   const auto kind = nb::cast<std::string>(from[0]);
@@ -71,20 +71,20 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
 }
 
 // `model`: address of a compiled model that the scene uses instead of its own; 0: none.
-std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
-                                  nb::object edit, std::uintptr_t model) {
+std::shared_ptr<scene::Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
+                                         nb::object edit, std::uintptr_t model) {
   refuse_python_callbacks();  // compilation may call them too
   nb::list alive;
-  SceneCfg cfg = read_scene(config, spec, sensors, edit, alive);
+  scene::SceneCfg cfg = read_scene(config, spec, sensors, edit, alive);
   nb::gil_scoped_release unlock;
-  std::optional<CompiledModel> compiled;
+  std::optional<scene::CompiledModel> compiled;
   if (model) compiled.emplace(reinterpret_cast<const mjModel*>(model), cfg.spec);
-  auto scene = std::make_shared<Scene>(std::move(cfg));
+  auto scene = std::make_shared<scene::Scene>(std::move(cfg));
   if (compiled) compiled->replace_model(*scene);
   return scene;
 }
 
-nb::dict entity_names(const Entity& e) {
+nb::dict entity_names(const scene::Entity& e) {
   nb::dict names;
   const auto add = [&](const char* key, const std::vector<std::string>& list) {
     nb::list items;
@@ -110,32 +110,32 @@ NumpyArray array_of(const std::vector<From>& values, const Shape& shape) {
   return to_numpy(array->view(), owner_of(array));
 }
 
-NumpyArray env_origins(const Scene& scene, int num_worlds) {
+NumpyArray env_origins(const scene::Scene& scene, int num_worlds) {
   return array_of<float>(scene.env_origins(num_worlds), {num_worlds, 3});
 }
 
 // Generated terrain; null if there is none.
-const Terrain* tiles_of(const Scene& scene) {
+const scene::Terrain* tiles_of(const scene::Scene& scene) {
   return scene.terrain() && scene.terrain()->levels() > 0 ? scene.terrain() : nullptr;
 }
 
-std::optional<NumpyArray> env_tiles(const Scene& scene, int num_worlds) {
-  const Terrain* tiles = tiles_of(scene);
+std::optional<NumpyArray> env_tiles(const scene::Scene& scene, int num_worlds) {
+  const scene::Terrain* tiles = tiles_of(scene);
   if (!tiles) return std::nullopt;
   return array_of<std::int32_t>(tiles->env_tiles(num_worlds), {num_worlds, 2});
 }
 
-std::optional<NumpyArray> tile_origins(const Scene& scene) {
-  const Terrain* tiles = tiles_of(scene);
+std::optional<NumpyArray> tile_origins(const scene::Scene& scene) {
+  const scene::Terrain* tiles = tiles_of(scene);
   if (!tiles) return std::nullopt;
   return array_of<float>(tiles->tile_origins(), {tiles->levels(), tiles->types(), 3});
 }
 
 }  // namespace
 
-SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors, nb::handle edit,
-                    nb::list& alive) {
-  SceneCfg cfg;
+scene::SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors, nb::handle edit,
+                           nb::list& alive) {
+  scene::SceneCfg cfg;
   read_struct(config, cfg);
   std::size_t i = 0;
   for (auto [name, entity] : dict_of(config.attr("entities")))
@@ -156,7 +156,7 @@ void bind_scene(nb::module_& m) {
   m.def(
       "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },
       "Key in a scene's registry.");
-  m.def("schema", &schema_json, "All configurations and data classes, as JSON.");
+  m.def("schema", &app::schema_json, "All configurations and data classes, as JSON.");
   m.def(
       "embedded_models",
       [] {
@@ -207,51 +207,51 @@ void bind_scene(nb::module_& m) {
         return sensor ? sensor->self() : nb::none();
       });
 
-  nb::class_<Scene>(m, "Scene", "The C++ scene.")
+  nb::class_<scene::Scene>(m, "Scene", "The C++ scene.")
       .def_static("make", &make_scene, nb::arg("config"), nb::arg("spec"), nb::arg("sensors"),
                   nb::arg("edit"), nb::arg("model") = 0,
                   "model: address of a compiled model for a scene that compiles none.")
       .def(
           "set_options",
-          [](Scene& s, nb::handle config, std::uintptr_t copy) {
-            OptionsCfg options;
+          [](scene::Scene& s, nb::handle config, std::uintptr_t copy) {
+            scene::OptionsCfg options;
             read_struct(config, options);
             s.set_options(options);
             reinterpret_cast<mjModel*>(copy)->opt = s.model()->opt;
           },
           nb::arg("config"), nb::arg("copy"),
           "Replaces the physics options, also of a copy of the model at this address.")
-      .def("to_xml", &Scene::to_xml)
+      .def("to_xml", &scene::Scene::to_xml)
       .def("assets",
-           [](const Scene& s) {
+           [](const scene::Scene& s) {
              nb::dict assets;
              for (const auto& [name, bytes] : s.assets())
                assets[name.c_str()] = nb::bytes(bytes.data(), bytes.size());
              return assets;
            })
       .def("warnings",
-           [](const Scene& s) {
+           [](const scene::Scene& s) {
              std::vector<std::string> texts;
              for (const std::string& text : s.warnings()) texts.push_back(printable_lines(text));
              return texts;
            })
       .def(
           "copy_model",
-          [](const Scene& s) {
+          [](const scene::Scene& s) {
             return reinterpret_cast<std::uintptr_t>(call_mujoco(mj_copyModel, nullptr, s.model()));
           },
           "Address of a copy of the mjModel, which the caller owns.")
       .def("sensors",
-           [](std::shared_ptr<Scene> s) {
+           [](std::shared_ptr<scene::Scene> s) {
              nb::list handles;
              for (const auto& sensor : s->sensors())
                handles.append(SensorHandle{std::shared_ptr<Sensor>(s, sensor.get())});
              return handles;
            })
       .def("entities",
-           [](const Scene& s) {
+           [](const scene::Scene& s) {
              nb::dict all;
-             for (const Entity& entity : s.entities())
+             for (const scene::Entity& entity : s.entities())
                all[entity.name.c_str()] = entity_names(entity);
              return all;
            })

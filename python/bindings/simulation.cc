@@ -25,14 +25,16 @@ namespace {
 using Ids = std::optional<std::vector<int>>;
 
 // None selects all worlds.
-WorldIds worlds_of(const Ids& ids) { return ids ? WorldIds(*ids) : WorldIds(all_worlds); }
+worlds::WorldIds worlds_of(const Ids& ids) {
+  return ids ? worlds::WorldIds(*ids) : worlds::WorldIds(worlds::all_worlds);
+}
 
 void step(PySimulation& self, int control_steps) {
-  self.change("step", [&](Simulation& sim) { sim.step(control_steps); });
+  self.change("step", [&](sim::Simulation& sim) { sim.step(control_steps); });
 }
 
 void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint64_t> seed) {
-  self.change("reset", [&](Simulation& sim) {
+  self.change("reset", [&](sim::Simulation& sim) {
     const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
     if (seed) sim.seed(*seed);
     sim.reset(checked, key);
@@ -42,9 +44,9 @@ void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint6
 // mjlab's call order: MuJoCo's steps first, then the update of every sensor. All sensors are
 // updated even if rows of some fail; then the first error is thrown.
 void update_sensors(PySimulation& self, double dt) {
-  self.change("update", [&](Simulation& sim) {
+  self.change("update", [&](sim::Simulation& sim) {
     sim.update_sensors(dt);
-    const std::vector<int> ids = sim.worlds().checked_ids(all_worlds);
+    const std::vector<int> ids = sim.worlds().checked_ids(worlds::all_worlds);
     const double seconds = dt > 0 ? dt : sim.model()->opt.timestep;
     std::exception_ptr fault;
     for (const auto& sensor : self.python()) {
@@ -59,7 +61,7 @@ void update_sensors(PySimulation& self, double dt) {
 }
 
 void follow(PySimulation& self, int substeps, const Ids& ids) {
-  self.change("update", [&](Simulation& sim) {
+  self.change("update", [&](sim::Simulation& sim) {
     for (const auto& sensor : self.python())
       sensor->set_step_dt(substeps * sim.model()->opt.timestep);
     sim.follow(substeps, worlds_of(ids));
@@ -67,11 +69,11 @@ void follow(PySimulation& self, int substeps, const Ids& ids) {
 }
 
 void reset_sensors(PySimulation& self, const Ids& ids) {
-  self.change("reset_sensors", [&](Simulation& sim) { sim.reset_sensors(worlds_of(ids)); });
+  self.change("reset_sensors", [&](sim::Simulation& sim) { sim.reset_sensors(worlds_of(ids)); });
 }
 
 void forward(PySimulation& self, const Ids& ids) {
-  self.change("forward", [&](Simulation& sim) { sim.forward(worlds_of(ids)); });
+  self.change("forward", [&](sim::Simulation& sim) { sim.forward(worlds_of(ids)); });
 }
 
 // Rows [B, bytes] of a field of the model. Python gets the data type and shape from MuJoCo's own
@@ -79,7 +81,7 @@ void forward(PySimulation& self, const Ids& ids) {
 NumpyArray model_field(PySimulation& self, const std::string& name) {
   int size = 0, element = 0, worlds = 0;
   void* data = nullptr;
-  self.read([&](Simulation& sim) {
+  self.read([&](sim::Simulation& sim) {
     data = mjb_expand(sim.worlds().batch(), name.c_str(), &size, &element);
     worlds = sim.num_worlds();
   });
@@ -97,7 +99,7 @@ nb::tuple draw(PySimulation& self, int world, nb::list handles) {
   std::vector<Sensor*> sensors;
   for (nb::handle h : handles) sensors.push_back(nb::cast<SensorHandle&>(h).sensor.get());
   DebugShapes shapes(0);
-  self.read([&](Simulation& sim) { shapes = sim.draw(world, sensors); });
+  self.read([&](sim::Simulation& sim) { shapes = sim.draw(world, sensors); });
   const auto n = static_cast<std::int64_t>(shapes.list().size());
   const auto array = [](DType dtype, Shape shape) { return std::make_shared<Array>(dtype, shape); };
   const auto positions = array(DType::kFloat64, {n, 3}), vectors = array(DType::kFloat64, {n, 3}),
@@ -123,8 +125,9 @@ nb::tuple draw(PySimulation& self, int world, nb::list handles) {
 
 void bind_simulation(nb::module_& m) {
   nb::class_<PySimulation>(m, "Simulation", "The C++ simulation.")
-      .def(nb::init<std::shared_ptr<Scene>, int, int, int, std::uint64_t>(), nb::arg("scene"),
-           nb::arg("num_worlds"), nb::arg("decimation"), nb::arg("threads"), nb::arg("seed"))
+      .def(nb::init<std::shared_ptr<scene::Scene>, int, int, int, std::uint64_t>(),
+           nb::arg("scene"), nb::arg("num_worlds"), nb::arg("decimation"), nb::arg("threads"),
+           nb::arg("seed"))
       .def("scene", [](const PySimulation& s) { return s.open().scene_ptr(); })
       .def("close", &PySimulation::close)
       .def_prop_ro("closed", &PySimulation::closed)
@@ -146,14 +149,14 @@ void bind_simulation(nb::module_& m) {
       .def(
           "step_raw",
           [](PySimulation& s, int n) {
-            s.change("step_raw", [&](Simulation& sim) { sim.step_raw(n); });
+            s.change("step_raw", [&](sim::Simulation& sim) { sim.step_raw(n); });
           },
           nb::arg("substeps"))
       .def("update_sensors", &update_sensors, nb::arg("dt") = 0.0)
       .def(
           "refresh",
           [](PySimulation& s, const SensorHandle& h) {
-            s.read([&](Simulation& sim) { sim.refresh(*h.sensor); });
+            s.read([&](sim::Simulation& sim) { sim.refresh(*h.sensor); });
           },
           nb::arg("sensor"))
       .def(
@@ -161,14 +164,14 @@ void bind_simulation(nb::module_& m) {
           [](PySimulation& s, nb::list handles) {
             std::vector<Sensor*> sensors;
             for (nb::handle h : handles) sensors.push_back(nb::cast<SensorHandle&>(h).sensor.get());
-            s.read([&](Simulation& sim) { sim.refresh(sensors); });
+            s.read([&](sim::Simulation& sim) { sim.refresh(sensors); });
           },
           nb::arg("sensors"))
       .def("draw", &draw, nb::arg("world"), nb::arg("sensors"))
       .def(
           "invalidate",
           [](PySimulation& s, const Ids& ids) {
-            s.change("invalidate", [&](Simulation& sim) { sim.invalidate(worlds_of(ids)); });
+            s.change("invalidate", [&](sim::Simulation& sim) { sim.invalidate(worlds_of(ids)); });
           },
           nb::arg("world_ids") = nb::none())
       .def(
@@ -177,7 +180,7 @@ void bind_simulation(nb::module_& m) {
             auto sensor =
                 std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
                                                WeakObject(object), read_python_spec(object));
-            s.change("add", [&](Simulation& sim) {
+            s.change("add", [&](sim::Simulation& sim) {
               sim.add(sensor);
               s.add_python(sensor);
             });
@@ -187,14 +190,14 @@ void bind_simulation(nb::module_& m) {
       .def(
           "add_native",
           [](PySimulation& s, const SensorHandle& h) {
-            s.change("add", [&](Simulation& sim) { sim.add(h.sensor); });
+            s.change("add", [&](sim::Simulation& sim) { sim.add(h.sensor); });
           },
           nb::arg("sensor"), "Adds a C++ sensor that is not part of the scene.")
       .def(
           "data_copies",
           [](PySimulation& s, nb::list datas) {
             auto sensor = make_data_copies(datas);
-            s.read([&](Simulation& sim) { sim.add(sensor); });
+            s.read([&](sim::Simulation& sim) { sim.add(sensor); });
             return SensorHandle{sensor};
           },
           nb::arg("datas"), "mujoco.MjData objects that show the worlds when this is refreshed.")
@@ -202,7 +205,7 @@ void bind_simulation(nb::module_& m) {
           "own_sensor",
           [](PySimulation& s, const SensorHandle& h) {
             if (auto sensor = std::dynamic_pointer_cast<PythonSensor>(h.sensor))
-              s.read([&](Simulation&) { s.add_python(sensor); });
+              s.read([&](sim::Simulation&) { s.add_python(sensor); });
           },
           nb::arg("sensor"), "Tells a Python sensor of the scene about resets from now on.")
       .def(
@@ -217,7 +220,7 @@ void bind_simulation(nb::module_& m) {
           "derived_field",
           [](PySimulation& s, const std::string& name) {
             auto sensor = make_derived_field(name, s.open().model());
-            s.read([&](Simulation& sim) { sim.add(sensor); });
+            s.read([&](sim::Simulation& sim) { sim.add(sensor); });
             return SensorHandle{sensor};
           },
           nb::arg("name"), "A field of mjData as a sensor.")
@@ -227,7 +230,7 @@ void bind_simulation(nb::module_& m) {
       .def(
           "model_changed",
           [](PySimulation& s, const Ids& ids, bool set_const) {
-            s.change("randomize", [&](Simulation& sim) {
+            s.change("randomize", [&](sim::Simulation& sim) {
               const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
               if (checked.empty()) return;  // MuJoCo would interpret an empty list as all worlds
               if (set_const)
@@ -241,7 +244,7 @@ void bind_simulation(nb::module_& m) {
           "copy_model",
           [](PySimulation& s) {
             std::uintptr_t copy = 0;
-            s.read([&](Simulation& sim) {
+            s.read([&](sim::Simulation& sim) {
               copy = reinterpret_cast<std::uintptr_t>(mj_copyModel(nullptr, sim.model()));
             });
             return copy;
@@ -250,7 +253,7 @@ void bind_simulation(nb::module_& m) {
       .def(
           "write_model",
           [](PySimulation& s, int world, std::uintptr_t address) {
-            s.read([&](Simulation& sim) {
+            s.read([&](sim::Simulation& sim) {
               sim.worlds().write_model(world, reinterpret_cast<mjModel*>(address));
             });
           },
@@ -258,14 +261,14 @@ void bind_simulation(nb::module_& m) {
       .def("model_version",
            [](PySimulation& s) {
              std::int64_t version = 0;
-             s.read([&](Simulation& sim) { version = sim.worlds().model_version(); });
+             s.read([&](sim::Simulation& sim) { version = sim.worlds().model_version(); });
              return version;
            })
       .def(
           "warning_counts",
           [](PySimulation& s) {
             std::vector<std::vector<std::int64_t>> counts(mjNWARNING);
-            s.read([&](Simulation& sim) {
+            s.read([&](sim::Simulation& sim) {
               for (int i = 0; i < mjNWARNING; ++i) {
                 for (int w = 0; w < sim.num_worlds(); ++w)
                   counts[i].push_back(sim.worlds().warning_counts(w)[i]);
@@ -277,16 +280,16 @@ void bind_simulation(nb::module_& m) {
       .def("times",
            [](PySimulation& s) {
              std::vector<double> times;
-             s.read([&](Simulation& sim) {
+             s.read([&](sim::Simulation& sim) {
                for (int w = 0; w < sim.num_worlds(); ++w) times.push_back(sim.worlds().time(w));
              });
              return times;
            })
       .def("failures", [](PySimulation& s) {
-        std::vector<Failure> now;
-        s.read([&](Simulation& sim) { now = sim.failures(); });
+        std::vector<worlds::Failure> now;
+        s.read([&](sim::Simulation& sim) { now = sim.failures(); });
         nb::list failures;
-        for (const Failure& f : now) failures.append(nb::make_tuple(f.world, f.message));
+        for (const worlds::Failure& f : now) failures.append(nb::make_tuple(f.world, f.message));
         return failures;
       });
 }

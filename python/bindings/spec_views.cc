@@ -29,7 +29,7 @@ T* at(Address address) {
 Address address_of(const void* pointer) { return reinterpret_cast<Address>(pointer); }
 
 struct OwnedSpec {
-  SpecPtr pointer;
+  scene::SpecPtr pointer;
   Address address() const { return address_of(pointer.get()); }
 };
 
@@ -225,20 +225,20 @@ void bind_spec_views(nb::module_& m) {
           "__init__",
           [](OwnedSpec* self, const std::optional<std::string>& base) {
             if (!base) {
-              new (self) OwnedSpec{SpecPtr(mj_makeSpec())};
+              new (self) OwnedSpec{scene::SpecPtr(mj_makeSpec())};
               return;
             }
-            ModelSource source;
+            scene::ModelSource source;
             const bool is_text = base->find_first_not_of(" \t\r\n") == base->find('<');
             (is_text ? source.xml : source.path) = *base;
-            new (self) OwnedSpec{parse_model(source, "SceneCfg.base")};
+            new (self) OwnedSpec{scene::parse_model(source, "SceneCfg.base")};
           },
           nb::arg("base").none())
       .def_prop_ro("address", &OwnedSpec::address);
   m.def(
       "spec_names",
       [](Address spec, int kind) {
-        return spec_names(at<const mjSpec>(spec), static_cast<mjtObj>(kind));
+        return scene::spec_names(at<const mjSpec>(spec), static_cast<mjtObj>(kind));
       },
       nb::arg("spec"), nb::arg("kind"), "Names of the elements of an mjSpec, in its order.");
   m.def("spec_fields", &spec_fields, nb::arg("spec"));
@@ -246,7 +246,8 @@ void bind_spec_views(nb::module_& m) {
       "spec_elements",
       [](Address spec, int kind) {
         std::vector<Address> all;
-        for (const auto* e : spec_elements(at<const mjSpec>(spec), static_cast<mjtObj>(kind)))
+        for (const auto* e :
+             scene::spec_elements(at<const mjSpec>(spec), static_cast<mjtObj>(kind)))
           all.push_back(address_of(e));
         return all;
       },
@@ -261,7 +262,8 @@ void bind_spec_views(nb::module_& m) {
   m.def("element_fields", &element_fields, nb::arg("element"));
   m.def("element_kind",
         [](Address element) { return static_cast<int>(at<mjsElement>(element)->elemtype); });
-  m.def("element_name", [](Address element) { return element_name(at<mjsElement>(element)); });
+  m.def("element_name",
+        [](Address element) { return scene::element_name(at<mjsElement>(element)); });
   m.def("set_element_name", [](Address element, const std::string& name) {
     auto* e = at<mjsElement>(element);
     if (mjs_setName(e, name.c_str()) != 0) throw ValueError(mjs_getError(mjs_getSpec(e)));

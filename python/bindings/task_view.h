@@ -17,13 +17,13 @@ class TaskView {
  public:
   // Shared by all objects that refer to a rollout. The owner sets the pointer to null when the
   // rollout ends.
-  using Cell = std::shared_ptr<Rollout*>;
+  using Cell = std::shared_ptr<rollout::Rollout*>;
   TaskView(Cell cell, std::shared_ptr<SimulationLock> sim_lock)
       : cell_(std::move(cell)), sim_lock_(std::move(sim_lock)) {}
 
-  Rollout& rollout() const;
-  Task& task() const { return rollout().task(); }
-  const Robot& robot() const { return rollout().task().robot(); }
+  rollout::Rollout& rollout() const;
+  episode::Task& task() const { return rollout().task(); }
+  const robots::Robot& robot() const { return rollout().task().robot(); }
   SimulationLock& sim_lock() const { return *sim_lock_; }
   // Throws ValueError if there is no such world.
   int checked(int world) const;

@@ -113,3 +113,22 @@
 #include "mjsense/sim/simulation.h"
 #include "mjsense/worlds/world_ids.h"
 #include "mjsense/worlds/worlds.h"
+
+// The names of all rooms are available in mjsense: mjsense::Simulation is sim::Simulation.
+namespace mjsense {
+using namespace cameras;
+using namespace effects;
+using namespace episode;
+using namespace observe;
+using namespace policies;
+using namespace rays;
+using namespace record;
+using namespace replay;
+using namespace robots;
+using namespace rollout;
+using namespace scene;
+using namespace scenes;
+using namespace sensors;
+using namespace sim;
+using namespace worlds;
+}  // namespace mjsense

@@ -9,10 +9,10 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace mjsense;
-  RecordJobCfg job;
+  rollout::RecordJobCfg job;
   try {
-    read_toml_text({reinterpret_cast<const char*>(data), size}, "experiment.toml",
-                   struct_of<RecordJobCfg>(), &job);
+    app::read_toml_text({reinterpret_cast<const char*>(data), size}, "experiment.toml",
+                        struct_of<rollout::RecordJobCfg>(), &job);
     check_fields(job, "");  // the fields were also checked while reading
   } catch (const Error& e) {
     if (!std::string_view(e.what()).starts_with("experiment.toml"))

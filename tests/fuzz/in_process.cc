@@ -5,7 +5,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 
 std::string in_child(std::string_view, std::uint64_t, const std::function<std::string()>& read,
                      std::uint64_t, int) {
@@ -16,4 +16,4 @@ std::string in_child(std::string_view, std::uint64_t, const std::function<std::s
   }
 }
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace mjsense;
   const std::string text(reinterpret_cast<const char*>(data), size);
   std::size_t numbers = 0;
-  const std::string wrong = parse_json(text, [&](const std::string& path, double) {
+  const std::string wrong = replay::parse_json(text, [&](const std::string& path, double) {
     if (path.size() > text.size()) fuzz::broken("paths are no longer than the text", path);
     ++numbers;
   });
@@ -56,7 +56,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (const auto& [was, now] :
        {std::pair<std::string, std::string>{text, kRecording}, {kRecording, text}}) {
     try {
-      const std::string difference = fingerprint_difference(was, now);
+      const std::string difference = record::fingerprint_difference(was, now);
       if (difference.empty() && was != now &&
           nlohmann::json::parse(was, nullptr, false) != nlohmann::json::parse(now, nullptr, false))
         fuzz::broken("different descriptions give a difference", text);

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static fuzz::MemoryFile file;
   file.write(data, size);
   try {
-    const auto pairs = read_npy_pairs(file.path(), "sensor 'lidar'");
+    const auto pairs = sensors::read_npy_pairs(file.path(), "sensor 'lidar'");
     if (pairs.empty() || 8 * pairs.size() > size)
       fuzz::broken("rows are no larger than the file", "");
   } catch (const Error& e) {

@@ -62,7 +62,7 @@ constexpr const char* kTexts[] = {"",
                                   "traj_0"};
 
 // Wraps an HDF5 id. Errors are expected here, because the fuzzer makes many invalid requests.
-h5::Id id(hid_t number, herr_t (*close)(hid_t)) {
+hdf5::Id id(hid_t number, herr_t (*close)(hid_t)) {
   if (number >= 0) return {number, close, "fuzz"};
   H5Eclear2(H5E_DEFAULT);
   return {};
@@ -109,26 +109,26 @@ class Writer {
     return in_.ConsumeBool() ? in_.PickValueInArray(kTexts) : in_.ConsumeRandomLengthString(40);
   }
 
-  h5::Id type() {
+  hdf5::Id type() {
     switch (in_.ConsumeIntegralInRange(0, 14)) {
       case 0:
       case 1:
         return id(H5Tcopy(H5T_STD_U8LE), H5Tclose);
       case 2:
-        return h5::memory_type(DType::kBool);
+        return hdf5::memory_type(DType::kBool);
       case 3:
         return id(H5Tcopy(H5T_IEEE_F32LE), H5Tclose);
       case 4:
         return id(H5Tcopy(H5T_STD_I64BE), H5Tclose);
       case 5:
-        return h5::text_type();
+        return hdf5::text_type();
       case 6: {
-        h5::Id fixed = id(H5Tcopy(H5T_C_S1), H5Tclose);
+        hdf5::Id fixed = id(H5Tcopy(H5T_C_S1), H5Tclose);
         H5Tset_size(fixed, in_.ConsumeIntegralInRange<std::size_t>(1, 5000));
         return fixed;
       }
       case 7: {
-        h5::Id enumeration =
+        hdf5::Id enumeration =
             id(H5Tenum_create(in_.ConsumeBool() ? H5T_STD_I8LE : H5T_STD_I64LE), H5Tclose);
         const std::int64_t values[] = {0, 1};
         H5Tenum_insert(enumeration, "FALSE", &values[0]);
@@ -136,9 +136,9 @@ class Writer {
         return enumeration;
       }
       case 8: {
-        h5::Id compound = id(H5Tcreate(H5T_COMPOUND, 24), H5Tclose);
+        hdf5::Id compound = id(H5Tcreate(H5T_COMPOUND, 24), H5Tclose);
         H5Tinsert(compound, "a", 0, H5T_STD_I64LE);
-        if (in_.ConsumeBool()) H5Tinsert(compound, "b", 8, h5::text_type());
+        if (in_.ConsumeBool()) H5Tinsert(compound, "b", 8, hdf5::text_type());
         return compound;
       }
       case 9:
@@ -152,7 +152,7 @@ class Writer {
       case 12:
         return id(H5Tcopy(in_.ConsumeBool() ? H5T_STD_REF_OBJ : H5T_STD_REF_DSETREG), H5Tclose);
       case 13: {
-        h5::Id odd = id(H5Tcopy(in_.ConsumeBool() ? H5T_STD_I64LE : H5T_IEEE_F64LE), H5Tclose);
+        hdf5::Id odd = id(H5Tcopy(in_.ConsumeBool() ? H5T_STD_I64LE : H5T_IEEE_F64LE), H5Tclose);
         H5Tset_precision(odd, in_.ConsumeIntegralInRange<std::size_t>(1, 64));
         return odd;
       }
@@ -161,7 +161,7 @@ class Writer {
     }
   }
 
-  h5::Id space(bool& simple) {
+  hdf5::Id space(bool& simple) {
     simple = false;
     switch (in_.ConsumeIntegralInRange(0, 7)) {
       case 0:
@@ -182,8 +182,8 @@ class Writer {
     return id(H5Screate_simple(rank, dims, nullptr), H5Sclose);
   }
 
-  h5::Id layout(int rank) {
-    h5::Id properties = id(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  hdf5::Id layout(int rank) {
+    hdf5::Id properties = id(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
     const int kind = in_.ConsumeIntegralInRange(0, 9);
     if (kind == 0) H5Pset_layout(properties, H5D_COMPACT);
     if (kind == 1) H5Pset_external(properties, "/etc/passwd", 0, H5F_UNLIMITED);
@@ -204,13 +204,13 @@ class Writer {
 
   void dataset(const std::string& at) {
     bool simple = false;
-    const h5::Id of = type(), in = space(simple);
+    const hdf5::Id of = type(), in = space(simple);
     if (!of.valid() || !in.valid()) return;
     const int rank = simple ? H5Sget_simple_extent_ndims(in) : 0;
-    const h5::Id properties = layout(rank);
+    const hdf5::Id properties = layout(rank);
     if (H5Lexists(file_, at.c_str(), H5P_DEFAULT) > 0) H5Ldelete(file_, at.c_str(), H5P_DEFAULT);
-    const h5::Id made =
-        id(H5Dcreate2(file_, at.c_str(), of, in, h5::link_properties(), properties, H5P_DEFAULT),
+    const hdf5::Id made =
+        id(H5Dcreate2(file_, at.c_str(), of, in, hdf5::link_properties(), properties, H5P_DEFAULT),
            H5Dclose);
     const hssize_t count = H5Sget_simple_extent_npoints(in);
     if (!made.valid() || count <= 0) return;
@@ -237,18 +237,18 @@ class Writer {
   }
 
   void attribute(const std::string& at) {
-    const h5::Id object =
-        at.empty() ? h5::Id() : id(H5Oopen(file_, at.c_str(), H5P_DEFAULT), H5Oclose);
+    const hdf5::Id object =
+        at.empty() ? hdf5::Id() : id(H5Oopen(file_, at.c_str(), H5P_DEFAULT), H5Oclose);
     const hid_t of = object.valid() && in_.ConsumeIntegralInRange(0, 7) != 0
                          ? static_cast<hid_t>(object)
                          : file_;
     const char* name = in_.PickValueInArray(kAttributes);
     H5Adelete(of, name);
-    if (in_.ConsumeBool()) return h5::set_attribute(of, name, std::string_view(text()));
+    if (in_.ConsumeBool()) return hdf5::set_attribute(of, name, std::string_view(text()));
     bool simple = false;
-    const h5::Id what = type(), in = space(simple);
+    const hdf5::Id what = type(), in = space(simple);
     if (!what.valid() || !in.valid()) return;
-    const h5::Id made = id(H5Acreate2(of, name, what, in, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+    const hdf5::Id made = id(H5Acreate2(of, name, what, in, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     const hssize_t count = H5Sget_simple_extent_npoints(in);
     if (!made.valid() || count <= 0 || count > 4000 || H5Tdetect_class(what, H5T_VLEN) > 0 ||
         H5Tdetect_class(what, H5T_REFERENCE) > 0 || H5Tis_variable_str(what) > 0 ||
@@ -261,7 +261,7 @@ class Writer {
 
   void link(const std::string& at) {
     const std::string to = "/" + std::string(in_.PickValueInArray(kPlaces));
-    const h5::Id properties = h5::link_properties();
+    const hdf5::Id properties = hdf5::link_properties();
     switch (in_.ConsumeIntegralInRange(0, 2)) {
       case 0:
         H5Lcreate_soft(to.c_str(), file_, at.c_str(), properties, H5P_DEFAULT);
@@ -276,7 +276,7 @@ class Writer {
   }
 
   void group(const std::string& at) {
-    id(H5Gcreate2(file_, at.c_str(), h5::link_properties(), H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    id(H5Gcreate2(file_, at.c_str(), hdf5::link_properties(), H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
   }
 
   FuzzedDataProvider& in_;
@@ -285,16 +285,16 @@ class Writer {
 
 // Writes a valid recording, which the fuzzer's bytes then change.
 void write_sound(hid_t file) {
-  h5::set_attribute(file, "recording", std::string_view(R"({"batches":1,"episodes":1})"));
+  hdf5::set_attribute(file, "recording", std::string_view(R"({"batches":1,"episodes":1})"));
   const auto rows = [&](const char* at, hid_t type, std::vector<hsize_t> dims, const void* data) {
-    const h5::Id space =
+    const hdf5::Id space =
         id(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), H5Sclose);
-    const h5::Id made =
-        id(H5Dcreate2(file, at, type, space, h5::link_properties(), H5P_DEFAULT, H5P_DEFAULT),
+    const hdf5::Id made =
+        id(H5Dcreate2(file, at, type, space, hdf5::link_properties(), H5P_DEFAULT, H5P_DEFAULT),
            H5Dclose);
     H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
   };
-  const h5::Id boolean = h5::memory_type(DType::kBool);
+  const hdf5::Id boolean = hdf5::memory_type(DType::kBool);
   const std::int8_t no[] = {0, 0, 0}, yes[] = {1, 1, 1};
   const float numbers[3 * 7] = {1, 2, 3};
   for (const char* name : {"success", "terminated", "truncated"})
@@ -308,7 +308,7 @@ void write_sound(hid_t file) {
   std::string name = "cam.mp4";
   name.resize(100);
   rows("traj_0/obs/sensor_data/cam", H5T_STD_U8LE, {100}, name.data());
-  h5::write_text(file, "traj_0/obs_scene", "{}");
+  hdf5::write_text(file, "traj_0/obs_scene", "{}");
 }
 
 // A folder with one file, in memory if the machine has a file system in memory.
@@ -333,9 +333,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool staged = in.ConsumeBool();
   const fs::path file = staged ? house() / "episode/traj.h5" : path;
   try {
-    const h5::H5Lock lock;
+    const hdf5::H5Lock lock;
     fs::create_directories(file.parent_path());
-    const h5::Id made = h5::create_file(file);
+    const hdf5::Id made = hdf5::create_file(file);
     if (in.ConsumeIntegralInRange(0, 7) != 0) write_sound(made);
     Writer(in, made).all();
   } catch (const Error&) {
@@ -343,12 +343,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     if (staged) {
-      static_cast<void>(read_staged(Folder::open(file.parent_path())));
+      static_cast<void>(record::read_staged(record::Folder::open(file.parent_path())));
     } else {
-      const VerifyResult found = verify(path, {.decode = false, .ffmpeg = "/bin/false"});
+      const replay::VerifyResult found =
+          replay::verify(path, {.decode = false, .ffmpeg = "/bin/false"});
       if (found.text().find('\x1b') != std::string::npos)
         fuzz::broken("no control characters reach a terminal", found.text());
-      static_cast<void>(inspect(path).text());
+      static_cast<void>(replay::inspect(path).text());
     }
   } catch (const Error&) {
   }

@@ -9,7 +9,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace mjsense;
   static fuzz::MemoryFile file;
   file.write(data, size);
-  const VideoFacts facts = read_video_facts(file.fd());
+  const record::VideoFacts facts = record::read_video_facts(file.fd());
   if (facts.frames < 0 || facts.width < 0 || facts.height < 0)
     fuzz::broken("sizes are not negative", "");
   if (facts.error.empty() && static_cast<std::uint64_t>(facts.frames) > size)

@@ -52,7 +52,7 @@ class Hash {
 
 using Hashes = std::map<std::string, Hash>;  // by "state" or "sensor field"
 
-void add_state(Simulation& sim, Hashes& out) {
+void add_state(sim::Simulation& sim, Hashes& out) {
   const ArrayView state = sim.worlds().state();
   out["state"].add(state.data, state.bytes());
 }
@@ -63,26 +63,26 @@ void add_rows(const Sensor& sensor, Hashes& out) {
 }
 
 template <class Cfg, class Fill>
-void add(SceneCfg& scene, const char* name, Fill&& fill) {
+void add(scene::SceneCfg& scene, const char* name, Fill&& fill) {
   auto cfg = std::make_shared<Cfg>();
   cfg->name = name;
   fill(*cfg);
   scene.sensors.push_back(std::move(cfg));
 }
 
-void add_entity(SceneCfg& scene, const char* name, const char* xml,
+void add_entity(scene::SceneCfg& scene, const char* name, const char* xml,
                 std::array<double, 3> pos = {}) {
-  EntityCfg entity;
+  scene::EntityCfg entity;
   entity.model.xml = xml;
   entity.pos = pos;
   scene.entities.emplace_back(name, entity);
 }
 
 // Plays worlds with different starts and controls. One world is reset halfway.
-Hashes play(SceneCfg cfg, int steps) {
+Hashes play(scene::SceneCfg cfg, int steps) {
   constexpr int kWorlds = 3;
-  Simulation sim(std::make_shared<Scene>(std::move(cfg)),
-                 {.num_worlds = kWorlds, .decimation = 4, .threads = 2, .seed = 11});
+  sim::Simulation sim(std::make_shared<scene::Scene>(std::move(cfg)),
+                      {.num_worlds = kWorlds, .decimation = 4, .threads = 2, .seed = 11});
   const mjModel* m = sim.model();
   const auto row = [&](const char* component, int w) {
     const ArrayView v = sim.worlds().state_component(component);
@@ -91,7 +91,7 @@ Hashes play(SceneCfg cfg, int steps) {
   // A triangle wave, because results of libm functions differ between versions.
   const auto wave = [](double x) { return 4 * std::abs(x - std::floor(x + 0.5)) - 1; };
   const int key = m->nkey > 0 ? 0 : -1;
-  sim.reset(all_worlds, key);
+  sim.reset(worlds::all_worlds, key);
   for (int w = 0; w < kWorlds; ++w)
     for (int i = 0; i < m->nv; ++i) row("qvel", w)[i] += 0.1 * wave(0.37 * i + 0.21 * w);
   sim.forward();
@@ -117,7 +117,7 @@ Hashes play(SceneCfg cfg, int steps) {
 
 Hashes pick() {
   unsetenv("MJSENSE_FRANKA_MESHES");
-  RolloutCfg cfg;
+  rollout::RolloutCfg cfg;
   cfg.scene = "table";
   cfg.policy = "top_down_planner";
   cfg.num_worlds = 2;
@@ -126,7 +126,7 @@ Hashes pick() {
   cfg.width = 64;
   cfg.height = 48;
   cfg.depth = true;
-  Rollout rollout(cfg);
+  rollout::Rollout rollout(cfg);
   const int worlds[] = {0, 1};
   const std::int64_t episodes[] = {0, 7};
   rollout.start(worlds, episodes);
@@ -135,7 +135,7 @@ Hashes pick() {
     add_state(rollout.simulation(), out);
     for (const auto& sensor : rollout.suite().sensors()) add_rows(*sensor, out);
     for (const int w : worlds) {
-      const Evaluation& e = rollout.evaluation(w);
+      const episode::Evaluation& e = rollout.evaluation(w);
       out["reward"].add(&e.reward, sizeof e.reward);
     }
     rollout.act();
@@ -174,22 +174,22 @@ constexpr char kDog[] = R"(
 </mujoco>)";
 
 Hashes legged() {
-  SceneCfg scene;
-  scene.terrain = TerrainCfg{.terrain_type = "generator",
-                             .levels = 2,
-                             .tile_size = {4, 4},
-                             .border = 1,
-                             .seed = 3,
-                             .daylight = false};
-  for (const SubTerrain kind :
-       {SubTerrain::kRough, SubTerrain::kSlope, SubTerrain::kStairs, SubTerrain::kWaves}) {
-    SubTerrainCfg sub{.kind = kind};
+  scene::SceneCfg scene;
+  scene.terrain = scene::TerrainCfg{.terrain_type = "generator",
+                                    .levels = 2,
+                                    .tile_size = {4, 4},
+                                    .border = 1,
+                                    .seed = 3,
+                                    .daylight = false};
+  for (const scene::SubTerrain kind : {scene::SubTerrain::kRough, scene::SubTerrain::kSlope,
+                                       scene::SubTerrain::kStairs, scene::SubTerrain::kWaves}) {
+    scene::SubTerrainCfg sub{.kind = kind};
     sub.platform_width = 1;
     scene.terrain->sub_terrains.emplace_back(enum_name(kind), sub);
   }
   add_entity(scene, "dog", kDog, {-1.2, -5.2, 0.75});
   const auto feet = std::vector<std::string>{".*_foot"};
-  add<ContactSensorCfg>(scene, "feet", [&](auto& c) {
+  add<sensors::ContactSensorCfg>(scene, "feet", [&](auto& c) {
     c.primary = {.mode = "geom", .pattern = feet, .entity = "dog"};
     c.fields = {"found", "force", "torque", "dist", "pos", "normal", "tangent"};
     c.num_slots = 2;
@@ -197,24 +197,24 @@ Hashes legged() {
     c.track_air_time = c.track_events = c.latch = true;
     c.history_length = 2;
   });
-  add<ContactSensorCfg>(scene, "net", [&](auto& c) {
+  add<sensors::ContactSensorCfg>(scene, "net", [&](auto& c) {
     c.primary = {.mode = "subtree", .pattern = {"trunk"}, .entity = "dog"};
     c.reduce = "netforce";
   });
-  add<ImuSensorCfg>(scene, "imu", [](auto& c) {
+  add<sensors::ImuSensorCfg>(scene, "imu", [](auto& c) {
     c.site = {"site", "imu", "dog"};
     c.preset = "mpu6050";
     c.orientation = true;
   });
-  add<RayCastSensorCfg>(scene, "scan", [](auto& c) {
+  add<sensors::RayCastSensorCfg>(scene, "scan", [](auto& c) {
     c.frame = {{"body", "trunk", "dog"}};
     c.ray_alignment = "yaw";
     c.hit_ids = true;
   });
-  add<TerrainHeightSensorCfg>(scene, "foot_height", [](auto& c) {
+  add<sensors::TerrainHeightSensorCfg>(scene, "foot_height", [](auto& c) {
     for (const char* foot : {"lf_foot", "rf_foot", "lh_foot", "rh_foot"})
       c.frame.push_back({"site", foot, "dog"});
-    c.pattern = RingPattern::single_ring(0.05, 6);
+    c.pattern = sensors::RingPattern::single_ring(0.05, 6);
   });
   return play(std::move(scene), 60);
 }
@@ -249,11 +249,11 @@ constexpr char kStudio[] = R"(
 </mujoco>)";
 
 Hashes studio() {
-  SceneCfg scene;
+  scene::SceneCfg scene;
   scene.base.xml = kStudio;
   const auto camera = [&](const char* name, const char* of, std::vector<std::string> types,
                           auto&& more) {
-    add<CameraSensorCfg>(scene, name, [&](auto& c) {
+    add<sensors::CameraSensorCfg>(scene, name, [&](auto& c) {
       c.camera_name = of;
       c.width = 72;
       c.height = 54;
@@ -270,7 +270,7 @@ Hashes studio() {
     c.height = 30;
   });
   camera("fisheye", "moving", {"rgb", "depth"}, [](auto& c) {
-    c.intrinsics = CameraIntrinsics{30, 30, 36, 27};
+    c.intrinsics = sensors::CameraIntrinsics{30, 30, 36, 27};
     c.distortion = {"fisheye", {0.01, 0.002, 0, 0}};
     c.depth_kind = "ray";
   });
@@ -297,18 +297,18 @@ constexpr char kSoft[] = R"(
 </mujoco>)";
 
 Hashes soft() {
-  SceneCfg scene;
+  scene::SceneCfg scene;
   scene.base.xml = kSoft;
-  add<CameraSensorCfg>(scene, "camera", [](auto& c) {
+  add<sensors::CameraSensorCfg>(scene, "camera", [](auto& c) {
     c.camera_name = "eye";
     c.width = 64;
     c.height = 48;
     c.data_types = {"rgb", "depth", "segmentation", "normals"};
     c.use_shadows = true;
   });
-  add<LidarSensorCfg>(scene, "lidar", [](auto& c) {
+  add<sensors::LidarSensorCfg>(scene, "lidar", [](auto& c) {
     c.frame = {{"site", "eye", ""}};
-    c.scan = SpinningScan{.channels = 8, .samples = 90};
+    c.scan = sensors::SpinningScan{.channels = 8, .samples = 90};
   });
   return play(std::move(scene), 25);
 }
@@ -328,10 +328,11 @@ constexpr char kDevices[] = R"(
 </mujoco>)";
 
 Hashes devices() {
-  SceneCfg scene;
+  scene::SceneCfg scene;
   scene.base.xml = kDevices;
-  const auto effects = [&](const char* name, const char* sensor, Effects list, int history = 0) {
-    add<EffectSensorCfg>(scene, name, [&](auto& c) {
+  const auto effects = [&](const char* name, const char* sensor, effects::Effects list,
+                           int history = 0) {
+    add<effects::EffectSensorCfg>(scene, name, [&](auto& c) {
       c.sensor = sensor;
       c.effects = std::move(list);
       c.history_length = history;
@@ -340,35 +341,37 @@ Hashes devices() {
   const auto one = [](auto effect) {
     return std::make_shared<decltype(effect)>(std::move(effect));
   };
-  BiasDrift drift;
+  effects::BiasDrift drift;
   drift.std = {0.05};
   drift.time_constant_s = 0.3;
-  Misalignment axes;
+  effects::Misalignment axes;
   axes.scale_error_std = 0.02;
   axes.angle_std = 0.03;
-  Delay delay(0.005);
+  effects::Delay delay(0.005);
   delay.delay_max_s = 0.03;
   delay.jitter_s = 0.004;
   delay.interpolate = true;
-  StepDelay lag;
+  effects::StepDelay lag;
   lag.max_lag = 3;
   lag.hold_probability = 0.3;
-  effects("noisy", "acc",
-          {one(axes), one(EpisodeBias(Draw::gaussian({0.1, 0.2, 0.3}))), one(drift),
-           one(Noise::with_density({0.01})), one(Clip::saturation(15)),
-           one(Quantize(PerComponent{0.02}))});
-  effects("late", "gyro", {one(Noise(Draw::uniform({-0.1}, {0.1}))), one(delay)}, 3);
-  effects("slow", "pos", {one(Rate(60, 0.003)), one(Dropout(0.3))});
-  effects("lagging", "pos", {one(lag), one(Dropout(0.1, Dropout::Mode::kZero))});
-  add<LidarSensorCfg>(scene, "lidar", [](auto& c) {
+  effects(
+      "noisy", "acc",
+      {one(axes), one(effects::EpisodeBias(effects::Draw::gaussian({0.1, 0.2, 0.3}))), one(drift),
+       one(effects::Noise::with_density({0.01})), one(effects::Clip::saturation(15)),
+       one(effects::Quantize(effects::PerComponent{0.02}))});
+  effects("late", "gyro", {one(effects::Noise(effects::Draw::uniform({-0.1}, {0.1}))), one(delay)},
+          3);
+  effects("slow", "pos", {one(effects::Rate(60, 0.003)), one(effects::Dropout(0.3))});
+  effects("lagging", "pos", {one(lag), one(effects::Dropout(0.1, effects::Dropout::Mode::kZero))});
+  add<sensors::LidarSensorCfg>(scene, "lidar", [](auto& c) {
     c.frame = {{"site", "tip", ""}};
-    c.scan = SpinningScan{.channels = 4, .samples = 60};
+    c.scan = sensors::SpinningScan{.channels = 4, .samples = 60};
     c.range_noise_std = 0.01;
     c.range_noise_relative = 0.005;
     c.dropout = 0.05;
     c.motion_distortion = true;
   });
-  add<CameraSensorCfg>(scene, "stereo", [](auto& c) {
+  add<sensors::CameraSensorCfg>(scene, "stereo", [](auto& c) {
     c.camera_name = "tip";
     c.width = 48;
     c.height = 36;

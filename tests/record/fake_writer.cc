@@ -58,7 +58,7 @@ Options parse(int argc, char** argv) {
 // Rows of one episode, created before the time measurement, which covers only the recorder.
 class Rows {
  public:
-  Rows(FakeSuite& suite, int steps) : suite_(suite) {
+  Rows(record::FakeSuite& suite, int steps) : suite_(suite) {
     for (int t = 0; t < steps; ++t) {
       suite.fill(0, 0, t, steps);
       std::vector<std::byte>& row = rows_.emplace_back();
@@ -80,16 +80,16 @@ class Rows {
   }
 
  private:
-  FakeSuite& suite_;
+  record::FakeSuite& suite_;
   std::vector<std::vector<std::byte>> rows_;
 };
 
 // Data for replay that do not depend on the step.
-std::vector<EpisodeArray> replay_arrays(std::int64_t episode) {
+std::vector<record::EpisodeArray> replay_arrays(std::int64_t episode) {
   std::vector<double> sizes(300, std::numeric_limits<double>::quiet_NaN());
   sizes[episode % 300] = 0.02;
   const auto bytes = std::as_bytes(std::span(sizes));
-  EpisodeArray sizes_of_geoms;
+  record::EpisodeArray sizes_of_geoms;
   sizes_of_geoms.path = "model/geom_size";
   sizes_of_geoms.description =
       "Values of this episode's model; NaN: the value of the archived model.";
@@ -103,22 +103,22 @@ struct Running {
   int t = 0;
 };
 
-int record(const std::string& out, const Options& o) {
+int write_recording(const std::string& out, const Options& o) {
   const int worlds = o.number("--worlds", 2), steps = o.number("--steps", 20),
             discard = o.number("--discard", 0);
   const bool video = !o.flag("--no-video");
-  FakeSuite suite({worlds, o.number("--width", 64), o.number("--height", 48), video,
-                   video && !o.flag("--no-depth"), o.number("--cameras", 1)});
-  RecordingCfg cfg;
+  record::FakeSuite suite({worlds, o.number("--width", 64), o.number("--height", 48), video,
+                           video && !o.flag("--no-depth"), o.number("--cameras", 1)});
+  record::RecordingCfg cfg;
   cfg.out_dir = out;
   cfg.episodes = o.number("--episodes", 4);
   cfg.batches = o.number("--batches", 0);
   cfg.num_worlds = worlds;
-  cfg.fps = Fps::from_period_ms(66);
+  cfg.fps = record::Fps::from_period_ms(66);
   cfg.sensors = suite.sensors();
   cfg.settings = R"({"task": "fake", "seed": 0})";
   cfg.archive = std::string(5000, 'a');  // stands for a ZIP archive of a model
-  Checksum sum;
+  record::Checksum sum;
   sum.add(cfg.archive.data(), cfg.archive.size());
   cfg.archive_name = fmt::format("model_{}.zip", sum.text());
   cfg.resume = o.flag("--resume");
@@ -127,8 +127,8 @@ int record(const std::string& out, const Options& o) {
   cfg.video.threads = o.number("--threads", 1);
   cfg.video.molmospaces_depth = o.flag("--red-green");
   if (o.flag("--timeout")) cfg.video.ffmpeg_timeout = o.number("--timeout", 60);
-  Recorder recorder(cfg);
-  const EpisodeSource source{o.text("--carry"), "traj_0", {"obs/sensor_data"}};
+  record::Recorder recorder(cfg);
+  const record::EpisodeSource source{o.text("--carry"), "traj_0", {"obs/sensor_data"}};
 
   const bool measure = o.flag("--measure");
   std::optional<Rows> rows;
@@ -173,8 +173,8 @@ int record(const std::string& out, const Options& o) {
       } else {
         if (!source.file.empty()) recorder.carry_over(w, source);
         recorder.finish_episode(
-            w, FakeSuite::obs_scene(r.episode), "success",
-            source.file.empty() ? replay_arrays(r.episode) : std::vector<EpisodeArray>());
+            w, record::FakeSuite::obs_scene(r.episode), "success",
+            source.file.empty() ? replay_arrays(r.episode) : std::vector<record::EpisodeArray>());
         if (o.flag("--print")) {
           recorder.flush();
           fmt::print("finished {}\n", r.episode);
@@ -190,7 +190,7 @@ int record(const std::string& out, const Options& o) {
   if (measure) {
     const double wall =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const RecordStats s = recorder.stats();
+    const record::RecordStats s = recorder.stats();
     fmt::print(
         R"({{"wall_s":{},"rows":{},"frames":{},"raw_bytes":{},"disk_bytes":{},"copy_s":{},"wait_s":{},"write_s":{},"commit_s":{},)"
         R"("encode_cpu_s":{},"bytes_per_world":{}}})"
@@ -203,13 +203,13 @@ int record(const std::string& out, const Options& o) {
 
 int look(const std::string& command, const std::string& path, const std::string& png) {
   if (command == "verify") {
-    const VerifyResult result = verify(path, {.decode = png == "decode"});
+    const replay::VerifyResult result = replay::verify(path, {.decode = png == "decode"});
     fmt::print("{}", result.text());
     return result.ok() ? 0 : 1;
   }
-  if (command == "repair") fmt::print("{}", repair(path).text());
-  if (command == "inspect") fmt::print("{}", inspect(path).text());
-  if (command == "sheet") contact_sheet(path, png);
+  if (command == "repair") fmt::print("{}", replay::repair(path).text());
+  if (command == "inspect") fmt::print("{}", replay::inspect(path).text());
+  if (command == "sheet") replay::contact_sheet(path, png);
   return 0;
 }
 
@@ -219,7 +219,7 @@ int main(int argc, char** argv) {
   if (argc < 2) return 2;
   try {
     if (argc > 2 && argv[2][0] != '-') return look(argv[1], argv[2], argc > 3 ? argv[3] : "");
-    return record(argv[1], parse(argc, argv));
+    return write_recording(argv[1], parse(argc, argv));
   } catch (const Error& error) {
     fmt::print(stderr, "error: {}\n", error.what());
     return 2;

@@ -23,15 +23,15 @@ void bind_contact(nb::module_& m) {
     return nb::tuple(list);
   };
   m.def("contact_primary_names", [tuple_of](const SensorHandle& h) {
-    return tuple_of(h.as<ContactSensor>().primary_names());
+    return tuple_of(h.as<sensors::ContactSensor>().primary_names());
   });
   m.def("contact_secondary_names", [tuple_of](const SensorHandle& h) {
-    return tuple_of(h.as<ContactSensor>().secondary_names());
+    return tuple_of(h.as<sensors::ContactSensor>().secondary_names());
   });
   m.def(
       "contact_first",
       [](const SensorHandle& h, std::string_view phase, double dt, double abs_tol) {
-        const auto& sensor = h.as<ContactSensor>();
+        const auto& sensor = h.as<sensors::ContactSensor>();
         auto first =
             std::make_shared<Array>(phase == "air" ? sensor.compute_first_air(dt, abs_tol)
                                                    : sensor.compute_first_contact(dt, abs_tol));

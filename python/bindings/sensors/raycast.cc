@@ -36,10 +36,10 @@ void bind_raycast(nb::module_& m) {
   m.def(
       "pattern_rays",
       [](nb::handle config) {
-        RayCastSensorCfg cfg;
-        const FieldDecl& field = *struct_of<RayCastSensorCfg>().find("pattern");
+        sensors::RayCastSensorCfg cfg;
+        const FieldDecl& field = *struct_of<sensors::RayCastSensorCfg>().find("pattern");
         read_value(config, field, config, &cfg.pattern);
-        const RayPattern rays = make_pattern(cfg.pattern, nullptr, "pattern");
+        const sensors::RayPattern rays = sensors::make_pattern(cfg.pattern, nullptr, "pattern");
         return std::pair(rows_of(rays.offsets), rows_of(rays.directions));
       },
       "Offsets and directions, float32 [n, 3], of a pattern.");
@@ -49,9 +49,9 @@ void bind_raycast(nb::module_& m) {
          std::optional<nb::ndarray<const float, nb::c_contig, nb::device::cpu>> intensity,
          std::optional<nb::ndarray<const float, nb::c_contig, nb::device::cpu>> distances) {
         const auto span = [](const auto& a) { return std::span<const float>(a.data(), a.size()); };
-        write_point_cloud(path, span(points),
-                          intensity ? span(*intensity) : std::span<const float>{},
-                          distances ? span(*distances) : std::span<const float>{});
+        sensors::write_point_cloud(path, span(points),
+                                   intensity ? span(*intensity) : std::span<const float>{},
+                                   distances ? span(*distances) : std::span<const float>{});
       },
       nb::arg("path"), nb::arg("points"), nb::arg("intensity") = nb::none(),
       nb::arg("distances") = nb::none(),
@@ -59,11 +59,11 @@ void bind_raycast(nb::module_& m) {
   m.def(
       "pinhole_fovy",
       [](const std::array<double, 9>& matrix, int height) {
-        return PinholePattern::from_intrinsic_matrix(matrix, 1, height).fovy;
+        return sensors::PinholePattern::from_intrinsic_matrix(matrix, 1, height).fovy;
       },
       nb::arg("matrix"), nb::arg("height"), "Degrees, of a camera with this 3x3 matrix.");
   m.def("ray_counts", [](const SensorHandle& h) {
-    const auto& sensor = h.as<RayCastSensor>();
+    const auto& sensor = h.as<sensors::RayCastSensor>();
     return nb::make_tuple(sensor.num_frames(), sensor.num_rays_per_frame());
   });
 }

@@ -6,7 +6,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 constexpr const char* kBash = R"sh(# source <(mjsense completion bash)
@@ -104,4 +104,4 @@ std::vector<std::string> complete(const CLI::App& program, const Choices& choice
   return found;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

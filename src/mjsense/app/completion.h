@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::app {
 
 // The values of an option ("--robot") or of a positional ("task"). Options without an entry take
 // anything: the shell completes file names.
@@ -24,4 +24,4 @@ std::string completion_script(const std::string& shell);
 std::vector<std::string> complete(const CLI::App& program, const Choices& choices,
                                   std::span<const std::string> words);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

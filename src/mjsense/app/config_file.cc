@@ -9,7 +9,7 @@
 #include "mjsense/core/fields/toml_value.h"
 #include "mjsense/core/files/regular_file.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 using Kind = FieldType::Kind;
@@ -81,4 +81,4 @@ void read_toml_text(std::string_view text, const std::string& path, const Struct
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

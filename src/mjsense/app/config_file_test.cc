@@ -15,7 +15,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/testing/temp_dir.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 using ::testing::ElementsAre;
@@ -27,14 +27,14 @@ RecordOptions read(const std::string& toml) {
   const std::string name = folder.file("experiment.toml");
   std::ofstream(name) << toml;
   RecordOptions options;
-  read_toml(name, struct_of<RecordJobCfg>(), &options.job);
+  read_toml(name, struct_of<rollout::RecordJobCfg>(), &options.job);
   return options;
 }
 
 // The options that a file can set, as one text; options that it does not set keep their value.
 std::string text(const RecordOptions& options) {
-  const RecordJobCfg& job = options.job;
-  const RolloutCfg& r = job.rollout;
+  const rollout::RecordJobCfg& job = options.job;
+  const rollout::RolloutCfg& r = job.rollout;
   std::string cameras = r.cameras ? "" : "all";
   for (const std::string& name : r.cameras.value_or(std::vector<std::string>{}))
     cameras += name + ",";
@@ -132,10 +132,10 @@ TEST(ConfigFile, LettersBeyondAscii) {
     letter += static_cast<char>(c >= 0x800 ? 0x80 | (c >> 6 & 0x3F) : 0xC0 | c >> 6);
     letter += static_cast<char>(0x80 | (c & 0x3F));
     const bool space = spaces.contains(c) || (c >= 0x2000 && c <= 0x200B);
-    RecordJobCfg job;
+    rollout::RecordJobCfg job;
     const auto parse = [&] {
-      read_toml_text("seed = 1\n" + letter + "task = 'place'", "x", struct_of<RecordJobCfg>(),
-                     &job);
+      read_toml_text("seed = 1\n" + letter + "task = 'place'", "x",
+                     struct_of<rollout::RecordJobCfg>(), &job);
     };
     if (space) {
       try {
@@ -144,7 +144,7 @@ TEST(ConfigFile, LettersBeyondAscii) {
       }
     } else {
       EXPECT_THROW(parse(), ValueError) << c;
-      EXPECT_EQ(job.rollout.task, RecordJobCfg().rollout.task) << c;
+      EXPECT_EQ(job.rollout.task, rollout::RecordJobCfg().rollout.task) << c;
     }
   }
 }
@@ -155,16 +155,17 @@ TEST(ConfigFile, InvalidHeadersAreErrors) {
        {"+a",   "[+a",    "=", "#",  ".",        ".a",  "a.", "a.+", "a..b",
         ",",    "{",      "'", "\"", "''' a'''", " ",   "\n", "\r",  "\x01",
         "\x7f", "\u00e9", "[", "[[", "a",        "a b", "[a]"}) {
-    RecordJobCfg job;
-    EXPECT_THROW(read_toml_text("seed = 1\n[" + header, "x", struct_of<RecordJobCfg>(), &job),
-                 ValueError)
+    rollout::RecordJobCfg job;
+    EXPECT_THROW(
+        read_toml_text("seed = 1\n[" + header, "x", struct_of<rollout::RecordJobCfg>(), &job),
+        ValueError)
         << header;
   }
 }
 
 TEST(Options, Sizes) {
-  RolloutCfg rollout;
-  read_size(struct_of<RolloutCfg>(), &rollout, "640x368");
+  rollout::RolloutCfg rollout;
+  read_size(struct_of<rollout::RolloutCfg>(), &rollout, "640x368");
   EXPECT_EQ(rollout.width, 640);
   EXPECT_EQ(rollout.height, 368);
 }
@@ -179,4 +180,4 @@ TEST(Texts, FormatTimesAndSizes) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::app

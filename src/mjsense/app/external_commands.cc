@@ -14,7 +14,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 constexpr std::string_view kPrefix = "mjsense-";
@@ -54,4 +54,4 @@ void run_external(const std::string& word, char** arguments, std::span<const std
   throw KeyError(fmt::format("no command '{}'{}", word, nearest.empty() ? hint : nearest));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

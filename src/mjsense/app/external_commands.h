@@ -6,11 +6,11 @@
 #include <string>
 #include <string_view>
 
-namespace mjsense {
+namespace mjsense::app {
 
 // Replaces this process. If there is no such program, throws KeyError with the nearest names among
 // `known` and the programs in PATH, or `hint` if none is near.
 [[noreturn]] void run_external(const std::string& word, char** arguments,
                                std::span<const std::string> known, std::string_view hint);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 using Kind = FieldType::Kind;
@@ -175,4 +175,4 @@ void read_size(const StructDecl& decl, void* object, std::string_view text) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -9,7 +9,7 @@
 #include "mjsense/app/completion.h"
 #include "mjsense/core/fields/fields.h"
 
-namespace mjsense {
+namespace mjsense::app {
 
 // Adds an option for every field that is not hidden and can be written as one text: --name VALUE;
 // for booleans --name if the default is false, --no-name if it is true. `skip`: names of fields
@@ -31,4 +31,4 @@ void read_toml(const std::string& path, const StructDecl& decl, void* object);
 void read_toml_text(std::string_view text, const std::string& path, const StructDecl& decl,
                     void* object);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

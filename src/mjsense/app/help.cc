@@ -9,7 +9,7 @@
 
 #include "mjsense/app/terminal.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 constexpr std::size_t kNameColumn = 28;  // where descriptions begin
@@ -82,4 +82,4 @@ void add_examples(CLI::App& app, const std::vector<Example>& examples) {
   app.footer(text);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::app {
 
 struct Example {
   std::string command, explanation;
@@ -19,4 +19,4 @@ void set_help_format(CLI::App& program);
 // Shown below the options.
 void add_examples(CLI::App& app, const std::vector<Example>& examples);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -16,7 +16,7 @@
 #include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/object_catalogue.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 constexpr std::size_t kMaxWidth = 100;  // longer lines are hard to read
@@ -71,9 +71,9 @@ constexpr struct {
 };
 
 // Packages that entities of a scene come from: "package:<package>/...".
-std::string packages_of(const SceneFileCfg& scene) {
+std::string packages_of(const scenes::SceneFileCfg& scene) {
   std::vector<std::string> found;
-  for (const SceneEntityCfg& entity : scene.entities) {
+  for (const scenes::SceneEntityCfg& entity : scene.entities) {
     constexpr std::string_view kPrefix = "package:";
     if (!entity.model.starts_with(kPrefix)) continue;
     const std::string inside = entity.model.substr(kPrefix.size());
@@ -90,14 +90,14 @@ std::string packages_of(const SceneFileCfg& scene) {
 
 std::string list_tasks(bool json) {
   std::vector<Line> lines;
-  for (const std::string& name : task_names()) {
+  for (const std::string& name : rollout::task_names()) {
     Line line{name, "", ""};
     for (const auto& one : kTasks) {
       if (name == one.name) line = {name, one.what, one.needs};
     }
     if (!line.what.empty())
-      line.needs += fmt::format(" Default: {} in {}.", default_robot(name),
-                                default_scene(task_components(name)[0]));
+      line.needs += fmt::format(" Default: {} in {}.", rollout::default_robot(name),
+                                rollout::default_scene(rollout::task_components(name)[0]));
     lines.push_back(line);
   }
   return text_of(lines, json);
@@ -105,15 +105,15 @@ std::string list_tasks(bool json) {
 
 std::string list_robots(bool json) {
   std::vector<Line> lines;
-  for (const std::string& name : robot_names())
-    lines.push_back({name, robot_cfg(name).description, ""});
+  for (const std::string& name : robots::robot_names())
+    lines.push_back({name, robots::robot_cfg(name).description, ""});
   return text_of(lines, json);
 }
 
 std::string list_scenes(bool json) {
   std::vector<Line> lines;
-  for (const std::string& name : scene_names()) {
-    const SceneFileCfg scene = load_scene(name);
+  for (const std::string& name : scenes::scene_names()) {
+    const scenes::SceneFileCfg scene = scenes::load_scene(name);
     const char* houses = !scene.generator.empty() ? " Each house number gives a different house."
                          : scene.catalogue_count >= 0 ? " Each house number gives other objects."
                                                       : "";
@@ -125,9 +125,9 @@ std::string list_scenes(bool json) {
 std::string list_objects(bool json) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
   Table table{{"name", "kind", "source", "licence", "installed", ""}, "", {}};
-  for (const CatalogueObjectCfg& object : object_catalogue().objects) {
-    const ObjectSourceCfg& source = source_of(object);
-    const bool installed = is_installed(object);
+  for (const scenes::CatalogueObjectCfg& object : scenes::object_catalogue().objects) {
+    const scenes::ObjectSourceCfg& source = scenes::source_of(object);
+    const bool installed = scenes::is_installed(object);
     std::string note = object.receptacle ? "receptacle" : "";
     if (!object.excluded.empty()) note = "not used: " + object.excluded;
     table.rows.push_back(
@@ -147,4 +147,4 @@ std::string list_objects(bool json) {
   return json ? out.dump(2) : table.text();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -4,11 +4,11 @@
 
 #include <string>
 
-namespace mjsense {
+namespace mjsense::app {
 
 std::string list_tasks(bool json);
 std::string list_robots(bool json);
 std::string list_scenes(bool json);
 std::string list_objects(bool json);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -21,5 +21,5 @@ void take_standard_streams() {
 
 int main(int argc, char** argv) {
   take_standard_streams();
-  return mjsense::run_program(argc, argv);
+  return mjsense::app::run_program(argc, argv);
 }

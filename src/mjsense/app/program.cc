@@ -36,7 +36,7 @@
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/scenes/load_scene.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 constexpr int kFailed = 1;
@@ -49,18 +49,18 @@ void list_names(CLI::Option* option, const std::vector<std::string>& names) {
 }
 
 void list_names(CLI::App& app) {
-  list_names(app.get_option("--robot"), robot_names());
-  list_names(app.get_option("--policy"), policy_names());
+  list_names(app.get_option("--robot"), robots::robot_names());
+  list_names(app.get_option("--policy"), rollout::policy_names());
 }
 
 Choices choices() {
   Choices choices;
-  add_choices(struct_of<RecordJobCfg>(), choices);
-  add_choices(struct_of<LidarSensorCfg>(), choices);
-  choices["--robot"] = robot_names();
-  choices["--policy"] = policy_names();
-  choices["--scene"] = scene_names();
-  choices["task"] = choices["what"] = task_names();
+  add_choices(struct_of<rollout::RecordJobCfg>(), choices);
+  add_choices(struct_of<sensors::LidarSensorCfg>(), choices);
+  choices["--robot"] = robots::robot_names();
+  choices["--policy"] = rollout::policy_names();
+  choices["--scene"] = scenes::scene_names();
+  choices["task"] = choices["what"] = rollout::task_names();
   choices["shell"] = {"bash", "zsh", "fish"};
   return choices;
 }
@@ -70,9 +70,9 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   list_names(app.add_option("task", options.job.rollout.task, "Name of the task.")
                  ->capture_default_str()
                  ->type_name("TASK"),
-             task_names());
-  add_field_options(app, struct_of<RecordJobCfg>(), &options.job, {"task"});
-  add_set_options(app, struct_of<RecordJobCfg>(), &options.job);
+             rollout::task_names());
+  add_field_options(app, struct_of<rollout::RecordJobCfg>(), &options.job, {"task"});
+  add_set_options(app, struct_of<rollout::RecordJobCfg>(), &options.job);
   list_names(app);
   app.add_option("--config",
                  "TOML file with these options; options on the command line take precedence.")
@@ -116,9 +116,9 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
       app.add_option("what", options.what, "An MJCF file, embedded:FILE, or the name of a task.")
           ->required()
           ->type_name("SCENE.xml|TASK"),
-      task_names());
-  add_field_options(app, struct_of<RolloutCfg>(), &options.rollout, {"task", "worlds"});
-  add_set_options(app, struct_of<RolloutCfg>(), &options.rollout);
+      rollout::task_names());
+  add_field_options(app, struct_of<rollout::RolloutCfg>(), &options.rollout, {"task", "worlds"});
+  add_set_options(app, struct_of<rollout::RolloutCfg>(), &options.rollout);
   list_names(app);
   app.add_option("--steps", options.steps,
                  "Number of steps over which the cost is measured; 0: do not measure.")
@@ -144,14 +144,14 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
       ->type_name("TYPE:NAME");
   app.add_option("--out", options.out, "Output file, .ply or .pcd.")->required()->type_name("FILE");
   // The scene does not move, so the rate of a scan and motion distortion have no effect.
-  add_field_options(app, struct_of<TableScan>(), &options.table, {"rate-hz"});
+  add_field_options(app, struct_of<sensors::TableScan>(), &options.table, {"rate-hz"});
   CLI::Option* table = app.get_option("--table")->check(existing_file())->type_name("FILE.npy");
   app.get_option("--rays")->needs(table);
   const std::size_t others = app.get_options().size();
-  add_field_options(app, struct_of<SpinningScan>(), &options.spinning, {"rate-hz"});
+  add_field_options(app, struct_of<sensors::SpinningScan>(), &options.spinning, {"rate-hz"});
   const std::vector<CLI::Option*> all = app.get_options({});
   for (std::size_t i = others; i < all.size(); ++i) all[i]->excludes(table);
-  add_field_options(app, struct_of<LidarSensorCfg>(), &options.lidar,
+  add_field_options(app, struct_of<sensors::LidarSensorCfg>(), &options.lidar,
                     {"name", "any-frame", "debug-vis", "hit-ids", "motion-distortion"});
   app.add_option("--steps", options.steps, "Number of physics steps before the scan.")
       ->capture_default_str()
@@ -214,15 +214,15 @@ void read_config_argument(int argc, char** argv, RecordOptions& options) {
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--config" && i + 1 < argc)
-      read_toml(argv[i + 1], struct_of<RecordJobCfg>(), &options.job);
+      read_toml(argv[i + 1], struct_of<rollout::RecordJobCfg>(), &options.job);
     if (word.starts_with("--config="))
-      read_toml(word.substr(9), struct_of<RecordJobCfg>(), &options.job);
+      read_toml(word.substr(9), struct_of<rollout::RecordJobCfg>(), &options.job);
   }
 }
 
 int run(int argc, char** argv, std::span<const OtherCommand> others) {
   show_warnings();
-  disable_mujoco_log_file();
+  scene::disable_mujoco_log_file();
   CLI::App program("Sensors, cameras and recordings for MuJoCo simulations.", "mjsense");
   set_help_format(program);
   program.set_version_flag("--version", "mjsense " MJSENSE_VERSION, "Print the version and exit.");
@@ -356,20 +356,21 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     return 0;
   }
   if (inspect_app.parsed()) {
-    const InspectResult result = inspect(existing(inspect_options.path));
+    const replay::InspectResult result = replay::inspect(existing(inspect_options.path));
     // Before anything is printed, so that a failure prints one line only.
     if (inspect_app.get_option("--sheet")->count() > 0)
-      contact_sheet(inspect_options.path, inspect_options.sheet, 4, 8, inspect_options.ffmpeg);
+      replay::contact_sheet(inspect_options.path, inspect_options.sheet, 4, 8,
+                            inspect_options.ffmpeg);
     print(inspect_options.json ? result.json() : result.text());
     return 0;
   }
   if (verify_app.parsed()) {
-    const VerifyResult result =
-        verify(existing(verify_options.path), {verify_options.decode, verify_options.ffmpeg});
+    const replay::VerifyResult result = replay::verify(
+        existing(verify_options.path), {verify_options.decode, verify_options.ffmpeg});
     print(verify_options.json ? result.json() : result.text());
     return result.ok() ? 0 : kFailed;
   }
-  const RepairResult result = repair(existing(repair_options.path));
+  const replay::RepairResult result = replay::repair(existing(repair_options.path));
   print(repair_options.json ? result.json() : result.text());
   return result.failures.empty() ? 0 : kFailed;
 }
@@ -397,4 +398,4 @@ int run_program(int argc, char** argv, std::span<const OtherCommand> others) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::app {
 
 // A command that the caller of run_program() runs itself. The program lists it.
 struct OtherCommand {
@@ -17,4 +17,4 @@ struct OtherCommand {
 // on stderr. An unknown command may replace this process (external_commands.h).
 int run_program(int argc, char** argv, std::span<const OtherCommand> others = {});
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -8,12 +8,12 @@
 
 #include "mjsense/rollout/record_job.h"
 
-namespace mjsense {
+namespace mjsense::app {
 
 class ProgressLine {
  public:
   ProgressLine(std::string title, bool quiet);
-  void show(const RecordProgress& progress, int stop_level);
+  void show(const rollout::RecordProgress& progress, int stop_level);
   void finish();  // ends the line and keeps its text
 
  private:
@@ -28,10 +28,10 @@ class ProgressLine {
 };
 
 // "3/8 episodes  100 % success  412 steps/s  824 frames/s  0:42 left"
-std::string progress_text(const RecordProgress& progress);
+std::string progress_text(const rollout::RecordProgress& progress);
 // "1:05:09", "0:42"
 std::string clock_text(double seconds);
 // "412 B", "3.4 kB", "1.2 MB"
 std::string bytes_text(double bytes);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -7,10 +7,10 @@
 
 #include "mjsense/rollout/record_job.h"
 
-namespace mjsense {
+namespace mjsense::app {
 
 struct RecordOptions {
-  RecordJobCfg job;
+  rollout::RecordJobCfg job;
   bool json = false;
   bool quiet = false;
   bool sheet = true;  // write the contact sheet
@@ -19,4 +19,4 @@ struct RecordOptions {
 // Exit code: 0 all wanted episodes are on disk, 1 some are not.
 int run_record(const RecordOptions& options);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

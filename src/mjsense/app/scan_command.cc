@@ -12,14 +12,14 @@
 #include "mjsense/sensors/lidar/point_cloud.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::app {
 
 int run_scan(const ScanOptions& options) {
   const std::size_t colon = options.frame.find(':');
   if (colon == std::string::npos)
     throw ValueError(
         fmt::format("--frame {}: expected a type and a name, such as site:head", options.frame));
-  auto lidar = std::make_shared<LidarSensorCfg>(options.lidar);
+  auto lidar = std::make_shared<sensors::LidarSensorCfg>(options.lidar);
   lidar->name = "scan";
   lidar->frame = {{options.frame.substr(0, colon), options.frame.substr(colon + 1), ""}};
   if (options.table.file.empty())
@@ -29,24 +29,24 @@ int run_scan(const ScanOptions& options) {
 
   if (!names_model(options.scene, "an MJCF file"))
     throw ValueError(fmt::format("'{}': no such file", options.scene));
-  SceneCfg cfg;
+  scene::SceneCfg cfg;
   cfg.base.path = options.scene;
   cfg.sensors.push_back(lidar);
-  const auto scene = std::make_shared<Scene>(std::move(cfg));
+  const auto scene = std::make_shared<scene::Scene>(std::move(cfg));
   print_warnings(*scene);
-  Simulation simulation(scene, {.decimation = std::max(1, options.steps)});
+  sim::Simulation simulation(scene, {.decimation = std::max(1, options.steps)});
   if (options.steps > 0) simulation.step();
   check_physics(simulation, options.scene);
   Sensor& sensor = scene->sensor("scan");
   simulation.refresh(sensor);
   const auto rows = [&](const char* field) { return sensor.field(field).data.row<float>(0); };
   const std::span<const float> distances = rows("distances");
-  write_point_cloud(options.out, rows(options.world ? "hit_pos_w" : "points"), rows("intensity"),
-                    distances);
+  sensors::write_point_cloud(options.out, rows(options.world ? "hit_pos_w" : "points"),
+                             rows("intensity"), distances);
   const auto returns =
       std::count_if(distances.begin(), distances.end(), [](float t) { return t >= 0; });
   fmt::print("{}: {} of {} rays returned\n", options.out, returns, distances.size());
   return 0;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

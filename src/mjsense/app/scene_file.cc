@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/print_stderr.h"
 
-namespace mjsense {
+namespace mjsense::app {
 
 bool names_model(const std::string& what, const std::string& expected) {
   if (what.starts_with("embedded:")) return true;
@@ -21,14 +21,14 @@ bool names_model(const std::string& what, const std::string& expected) {
   return false;
 }
 
-void print_warnings(const Scene& scene) {
+void print_warnings(const scene::Scene& scene) {
   for (const std::string& text : scene.warnings()) print_stderr("mjsense: {}\n", text);
 }
 
-void check_physics(const Simulation& simulation, const std::string& context) {
+void check_physics(const sim::Simulation& simulation, const std::string& context) {
   if (simulation.failures().empty()) return;
   throw RuntimeError(
       fmt::format("{}: the physics failed: {}", context, simulation.failures()[0].message));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -13,7 +13,7 @@
 #include "mjsense/scenes/scene_file.h"
 #include "mjsense/sensors/all_sensors.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -168,14 +168,14 @@ class Schema {
 const Schema& schema() {
   static const Schema kSchema = [] {
     Schema schema;
-    schema.add(struct_of<SceneCfg>());
-    for (const SensorKind& kind : sensor_kinds()) {
+    schema.add(struct_of<scene::SceneCfg>());
+    for (const SensorKind& kind : sensors::sensor_kinds()) {
       schema.add(*kind.cfg);
       if (kind.data) schema.add(*kind.data, kind.cfg->kind);
     }
-    schema.add(struct_of<SceneFileCfg>());
-    schema.add(struct_of<RecordJobCfg>());
-    schema.add(struct_of<RolloutCfg>());
+    schema.add(struct_of<scenes::SceneFileCfg>());
+    schema.add(struct_of<rollout::RecordJobCfg>());
+    schema.add(struct_of<rollout::RolloutCfg>());
     return schema;
   }();
   return kSchema;
@@ -190,4 +190,4 @@ const StructDecl* find_struct(std::string_view name) {
   return found == schema().decls().end() ? nullptr : found->second;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -10,7 +10,7 @@
 #include "mjsense/app/text_table.h"
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 struct Line {
@@ -21,12 +21,13 @@ struct Line {
 // Streams of some sensors. The cost of a sensor is given at its first stream. Cost that sensors
 // share (one camera of the scene shown as colour and as depth) is included in the first sensor that
 // reads it.
-std::vector<Line> lines_of(Simulation& simulation, std::span<Sensor* const> sensors, int steps) {
+std::vector<Line> lines_of(sim::Simulation& simulation, std::span<Sensor* const> sensors,
+                           int steps) {
   std::vector<Line> lines;
   std::set<const Sensor*> counted;
   const auto seconds = [&](const Sensor* sensor) {
     if (!counted.insert(sensor).second) return 0.0;
-    const Simulation::Cost cost = simulation.cost(*sensor);
+    const sim::Simulation::Cost cost = simulation.cost(*sensor);
     return cost.compute + cost.cast;
   };
   for (Sensor* sensor : sensors) {
@@ -81,7 +82,7 @@ void print(const std::vector<Line>& lines, bool json) {
   fmt::print("{}", table.text());
 }
 
-std::vector<Line> task_lines(Rollout& rollout, int steps) {
+std::vector<Line> task_lines(rollout::Rollout& rollout, int steps) {
   const int worlds[] = {0};
   const std::int64_t episodes[] = {0};
   rollout.start(worlds, episodes);
@@ -95,7 +96,7 @@ std::vector<Line> task_lines(Rollout& rollout, int steps) {
   return lines_of(rollout.simulation(), sensors, taken + (steps > 0 ? 1 : 0));
 }
 
-std::vector<Line> scene_lines(Simulation& simulation, int steps, const std::string& context) {
+std::vector<Line> scene_lines(sim::Simulation& simulation, int steps, const std::string& context) {
   std::vector<Sensor*> sensors;
   for (const auto& sensor : simulation.scene().sensors()) sensors.push_back(sensor.get());
   simulation.measure_cost(true);
@@ -116,18 +117,18 @@ int run_sensors(const SensorsOptions& options) {
         throw ValueError(
             fmt::format("{} applies to tasks only, and {} is a scene", option, options.what));
     }
-    SceneCfg cfg;
+    scene::SceneCfg cfg;
     cfg.base.path = options.what;
-    Simulation simulation(std::make_shared<Scene>(std::move(cfg)), {});
+    sim::Simulation simulation(std::make_shared<scene::Scene>(std::move(cfg)), {});
     print_warnings(simulation.scene());
     print(scene_lines(simulation, options.steps, options.what), options.json);
     return 0;
   }
-  RolloutCfg rollout_cfg = options.rollout;
+  rollout::RolloutCfg rollout_cfg = options.rollout;
   rollout_cfg.task = options.what;
-  Rollout rollout(rollout_cfg);
+  rollout::Rollout rollout(rollout_cfg);
   print(task_lines(rollout, options.steps), options.json);
   return 0;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-namespace mjsense {
+namespace mjsense::app {
 
 std::size_t terminal_width(int fd) {
   winsize size{};
@@ -41,4 +41,4 @@ std::vector<std::string> wrap(std::string_view text, std::size_t width) {
   return lines;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::app {
 
 // Columns of the terminal behind a file descriptor. If it is not a terminal: $COLUMNS, else 80.
 std::size_t terminal_width(int fd);
@@ -18,4 +18,4 @@ std::size_t display_width(std::string_view text);
 // Lines of at most `width` characters, broken at spaces. A longer word gets a line of its own.
 std::vector<std::string> wrap(std::string_view text, std::size_t width);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 using testing::ElementsAre;
@@ -25,4 +25,4 @@ TEST(Terminal, WidthCountsCharactersNotBytes) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::app

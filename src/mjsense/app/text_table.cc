@@ -10,7 +10,7 @@
 #include "mjsense/app/terminal.h"
 #include "mjsense/core/files/regular_file.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 void add_tree(const std::filesystem::path& folder, const std::string& indent, std::size_t maximum,
@@ -68,4 +68,4 @@ std::string tree_text(const std::string& folder, std::size_t maximum) {
   return out;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::app

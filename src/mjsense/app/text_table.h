@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::app {
 
 struct Table {
   std::vector<std::string> header;
@@ -18,4 +18,4 @@ struct Table {
 // per folder.
 std::string tree_text(const std::string& folder, std::size_t maximum = 40);
 
-}  // namespace mjsense
+}  // namespace mjsense::app

@@ -5,7 +5,7 @@
 
 #include "mjsense/core/system/print_stderr.h"
 
-namespace mjsense {
+namespace mjsense::app {
 namespace {
 
 TEST(Table, NamesDoNotControlTheTerminal) {
@@ -20,4 +20,4 @@ TEST(Say, NamesDoNotControlTheTerminal) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::app

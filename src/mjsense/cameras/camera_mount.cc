@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 namespace {
 
 double size(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
@@ -63,4 +63,4 @@ void validate(const CameraMountCfg& c, std::string_view context) {
     fail(fmt::format("fovy {} +- {} degrees is not within (0, 180)", fovy, c.fovy_noise));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

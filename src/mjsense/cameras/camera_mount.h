@@ -9,12 +9,12 @@
 
 #include "mjsense/core/fields/named_enum.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 
 enum class MountKind { kMjcf, kBody, kLookAt, kFixed, kOrbit };
-template <>
-inline constexpr std::array<std::string_view, 5> kEnumNames<MountKind>{"mjcf", "body", "look_at",
-                                                                       "fixed", "orbit"};
+constexpr std::array<std::string_view, 5> enum_names(MountKind) {
+  return {"mjcf", "body", "look_at", "fixed", "orbit"};
+}
 
 // Poses are those of MuJoCo's camera frame: x right, y up, looking along -z. Noise is uniform in
 // [-x, x] and drawn once per episode.
@@ -120,4 +120,4 @@ void visit_fields(V& v, CameraMountCfg& c) {
 // message.
 void validate(const CameraMountCfg& cfg, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

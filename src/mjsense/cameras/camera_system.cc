@@ -13,7 +13,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/rays/ray_scene.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 namespace {
 
 constexpr double kDefaultFovy = 45;  // degrees, MuJoCo's default
@@ -85,14 +85,14 @@ CameraSystem::CameraSystem(CameraSystemCfg cfg, const std::string& prefix, const
   }
 }
 
-void CameraSystem::initialize(Simulation& simulation) {
+void CameraSystem::initialize(sim::Simulation& simulation) {
   simulation_ = &simulation;
   const mjModel* m = simulation.model();
   ids_.clear();
   rest_.clear();
   for (std::size_t i = 0; i < mounted_.size(); ++i) {
-    const int id = object_id(m, mjOBJ_CAMERA, fmt::format("camera '{}'", cfg_.cameras[i].name),
-                             mounted_[i].camera);
+    const int id = observe::object_id(
+        m, mjOBJ_CAMERA, fmt::format("camera '{}'", cfg_.cameras[i].name), mounted_[i].camera);
     ids_.push_back(id);
     rest_.push_back({{vec3(m->cam_pos + 3 * id), quat(m->cam_quat + 4 * id)},
                      cfg_.cameras[i].fovy.value_or(m->cam_fovy[id])});
@@ -247,4 +247,4 @@ std::string CameraSystem::frozen(int world) const {
   return all.dump();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

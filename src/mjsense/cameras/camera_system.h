@@ -21,7 +21,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 
 struct CameraSystemCfg {
   std::string name;
@@ -62,7 +62,7 @@ class CameraSystem {
   int height(int camera) const { return cfg_.cameras[camera].height.value_or(cfg_.height); }
 
   // Throws KeyError if the model lacks a camera.
-  void initialize(Simulation& simulation);
+  void initialize(sim::Simulation& simulation);
   // True if some camera must be placed at the start of an episode.
   bool varies() const { return varies_; }
 
@@ -99,7 +99,7 @@ class CameraSystem {
   std::vector<Lens> rest_;  // [cameras], without noise
   std::vector<Lens> now_;   // [B, cameras], of the current episode
   bool varies_ = false;
-  Simulation* simulation_ = nullptr;
+  sim::Simulation* simulation_ = nullptr;
   double *pos_ = nullptr, *quat_ = nullptr, *fovy_ = nullptr;  // [B, ncam, ...] of MuJoCo's batch
 };
 
@@ -107,4 +107,4 @@ class CameraSystem {
 // parallel to the viewing direction, x is used instead, or y if the camera looks along x.
 Pose look_at(Vec3 eye, Vec3 target, Vec3 up);
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

@@ -15,7 +15,7 @@
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 namespace {
 
 using ::testing::HasSubstr;
@@ -39,7 +39,7 @@ constexpr char kXml[] = R"(
   </worldbody>
 </mujoco>)";
 
-class Hooks final : public WorldHooks {
+class Hooks final : public worlds::WorldHooks {
  public:
   explicit Hooks(std::function<void(const World&)> body) : body_(std::move(body)) {}
   void substep(const World& /*world*/) override {}
@@ -51,17 +51,17 @@ class Hooks final : public WorldHooks {
 };
 
 struct Bench {
-  std::shared_ptr<Simulation> sim;
+  std::shared_ptr<sim::Simulation> sim;
   CameraSystem cameras;
 
   explicit Bench(CameraSystemCfg cfg, int worlds = 1)
       : cameras(std::move(cfg), "robot_0/", "base") {
-    SceneCfg scene;
+    scene::SceneCfg scene;
     scene.base.xml = kXml;
     for (std::size_t i = 0; i < cameras.cfg().cameras.size(); ++i) {
       const auto& mounted = cameras.mounted(static_cast<int>(i));
       if (!mounted.is_new) continue;
-      auto camera = std::make_shared<CameraSensorCfg>();
+      auto camera = std::make_shared<sensors::CameraSensorCfg>();
       camera->name = mounted.camera;
       camera->parent_body = mounted.body;
       write_vec(mounted.pose.p, camera->pos.data());
@@ -69,8 +69,8 @@ struct Bench {
       camera->fovy = mounted.fovy;
       scene.sensors.push_back(camera);
     }
-    sim = std::make_shared<Simulation>(std::make_shared<Scene>(scene),
-                                       SimulationCfg{.num_worlds = worlds});
+    sim = std::make_shared<sim::Simulation>(std::make_shared<scene::Scene>(scene),
+                                            sim::SimulationCfg{.num_worlds = worlds});
     cameras.initialize(*sim);
   }
   int body(const char* name) const { return mj_name2id(sim->model(), mjOBJ_BODY, name); }
@@ -81,7 +81,7 @@ struct Bench {
     Hooks hooks([&](const World& w) {
       why[w.id] = cameras.place_cameras(w, seed, episodes[w.id], {0, 0, 0}, objects);
     });
-    sim->worlds().visit(all_worlds, hooks);
+    sim->worlds().visit(worlds::all_worlds, hooks);
     sim->worlds().model_changed();
     sim->forward();
     for (const std::string& text : why) {
@@ -96,7 +96,7 @@ struct Bench {
       if (w.id == world)
         found = pose_from_mat(w.data->cam_xpos + 3 * id, w.data->cam_xmat + 9 * id);
     });
-    sim->worlds().visit(all_worlds, hooks);
+    sim->worlds().visit(worlds::all_worlds, hooks);
     return found;
   }
 };
@@ -265,7 +265,7 @@ TEST(Visibility, BallCoversItsDisc) {
                               {look_at({0, -distance, 0}, {0, 0, 0}, {0, 0, 1}), 60, width, height},
                               bodies);
     });
-    bench.sim->worlds().visit(all_worlds, hooks);
+    bench.sim->worlds().visit(worlds::all_worlds, hooks);
     const double focal = .5 * height / std::tan(30 * kDeg);
     const double radius = focal * std::tan(std::asin(.1 / distance));
     const double share = std::numbers::pi * radius * radius / (width * height);
@@ -283,7 +283,7 @@ TEST(Visibility, BodyIsVisibleThroughTheGeomsOfItsChildren) {
     shares = visible_shares(bench.sim->rays(), 0,
                             {look_at({-3, -1, 0}, {-3, 0, 0}, {0, 0, 1}), 60, 160, 120}, bodies);
   });
-  bench.sim->worlds().visit(all_worlds, hooks);
+  bench.sim->worlds().visit(worlds::all_worlds, hooks);
   EXPECT_GT(shares[0], 0.01);
   EXPECT_EQ(shares[0], shares[1]);
   EXPECT_EQ(shares[2], 0);
@@ -444,13 +444,13 @@ TEST(Visibility, CameraInsideAGeomIsDetected) {
   Bench bench(CameraSystemCfg{});
   Hooks hooks([&](const World& w) {
     bench.sim->rays().update(w);
-    const RayScene& rays = bench.sim->rays();
+    const rays::RayScene& rays = bench.sim->rays();
     EXPECT_TRUE(is_inside(rays, 0, look_at({.4, 0, .3}, {0, 0, 0}, {0, 0, 1})));
     EXPECT_FALSE(is_inside(rays, 0, look_at({.3, 0, .3}, {0, 0, 0}, {0, 0, 1})));
     EXPECT_FALSE(is_inside(rays, 0, look_at({0, -1, .3}, {0, 0, 0}, {0, 0, 1})));
   });
-  bench.sim->worlds().visit(all_worlds, hooks);
+  bench.sim->worlds().visit(worlds::all_worlds, hooks);
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::cameras

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -62,4 +62,4 @@ CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix,
   return system;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

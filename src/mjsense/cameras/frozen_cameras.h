@@ -6,7 +6,7 @@
 
 #include "mjsense/cameras/camera_system.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 
 // Reads the text of CameraSystem::frozen(), which obs_scene contains under `cameras`, as a camera
 // system without noise. Bodies must be the robot's: their names in the text begin with `prefix`.
@@ -14,4 +14,4 @@ namespace mjsense {
 CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix,
                             std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

@@ -14,7 +14,7 @@
 #include "mjsense/core/fields/toml_fields.h"
 #include "mjsense/core/files/data_file.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,4 +87,4 @@ CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot
   return cfg;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

@@ -9,7 +9,7 @@
 
 #include "mjsense/cameras/camera_system.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 
 // Names of the camera systems of the robot with this file ("embedded:robots/franka/robot.toml", or
 // a path).
@@ -22,4 +22,4 @@ std::vector<std::string> camera_system_names(std::string_view robot_file);
 CameraSystemCfg load_camera_system(std::string_view name_or_path, std::string_view robot_file,
                                    std::string_view prefix = "");
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

@@ -11,7 +11,7 @@
 #include "mjsense/core/files/data_file.h"
 #include "mjsense/core/testing/temp_dir.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 namespace {
 
 using ::testing::ElementsAre;
@@ -65,4 +65,4 @@ TEST(LoadCameras, LoadsSystemsOfARobotOnDisk) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::cameras

@@ -9,7 +9,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/rays/ray_scene.h"
 
-namespace mjsense {
+namespace mjsense::cameras {
 
 struct CameraView {
   Pose camera;        // X_WC: x right, y up, looking along -z
@@ -22,10 +22,10 @@ struct CameraView {
 // from outside; those with alpha 0 are invisible, and all others are treated as opaque. At most
 // about 16,000 pixels on a regular grid are sampled. The ray scene must be up to date for this
 // world.
-std::vector<double> visible_shares(const RayScene& rays, int world, const CameraView& from,
+std::vector<double> visible_shares(const rays::RayScene& rays, int world, const CameraView& from,
                                    std::span<const int> bodies);
 
 // Whether a camera is inside a visible solid geom. Its image would still show what is outside.
-bool is_inside(const RayScene& rays, int world, const Pose& camera);
+bool is_inside(const rays::RayScene& rays, int world, const Pose& camera);
 
-}  // namespace mjsense
+}  // namespace mjsense::cameras

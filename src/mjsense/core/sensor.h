@@ -26,11 +26,17 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor_spec.h"
 
+namespace mjsense::rays {
+class RayScene;
+}  // namespace mjsense::rays
+
+namespace mjsense::scene {
+class Scene;
+}  // namespace mjsense::scene
+
 namespace mjsense {
 
 class DebugShapes;
-class RayScene;
-class Scene;
 class SharedCache;
 class ThreadPool;
 
@@ -75,7 +81,7 @@ struct Field {
 
 struct SensorInit {
   const mjModel* model = nullptr;
-  const Scene* scene = nullptr;  // null if the sensor is used without a scene
+  const scene::Scene* scene = nullptr;  // null if the sensor is used without a scene
   int num_worlds = 1;
   int decimation = 1;  // substeps per control step
   int threads = 1;
@@ -84,7 +90,7 @@ struct SensorInit {
 
 // Input of cast(): the ray scene after compute() of the worlds `ids`.
 struct CastContext {
-  RayScene* rays;            // null for stage kBatch in a scene without ray casting
+  rays::RayScene* rays;      // null for stage kBatch in a scene without ray casting
   std::span<const int> ids;  // sorted
   ThreadPool& pool;
 };

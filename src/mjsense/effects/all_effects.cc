@@ -5,7 +5,7 @@
 
 #include "mjsense/core/fields/fields.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 namespace {
 
 using Shared = std::shared_ptr<const Effect>;
@@ -31,9 +31,7 @@ void* whole(const Shared& effect) {
   return const_cast<void*>(dynamic_cast<const void*>(effect.get()));
 }
 
-}  // namespace
-
-FieldType CustomFieldType<Shared>::make() {
+FieldType effect_type() {
   FieldType t{.kind = FieldType::Kind::kChoice, .choice = "Effect"};
   t.alternatives = []() -> std::span<const StructDecl* const> {
     static const std::vector<const StructDecl*> kDecls = [] {
@@ -59,6 +57,8 @@ FieldType CustomFieldType<Shared>::make() {
   return t;
 }
 
+}  // namespace
+
 void check_effect(const Shared& effect, std::string_view context) {
   const FieldType& type = field_type<Shared>();
   const int which = type.which(&effect);
@@ -66,4 +66,9 @@ void check_effect(const Shared& effect, std::string_view context) {
   check_fields(*type.alternatives()[which], whole(effect), context);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects
+
+mjsense::FieldType
+mjsense::CustomFieldType<std::shared_ptr<const mjsense::effects::Effect>>::make() {
+  return mjsense::effects::effect_type();
+}

@@ -10,7 +10,7 @@
 #include "mjsense/effects/noise.h"
 #include "mjsense/effects/timing.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 template <class... E>
 struct EffectTypes {};
@@ -18,13 +18,19 @@ struct EffectTypes {};
 using AllEffects = EffectTypes<Noise, EpisodeBias, BiasDrift, Scale, Misalignment, Clip, Quantize,
                                NanPolicy, Delay, StepDelay, Rate, Dropout>;
 
+}  // namespace mjsense::effects
+
+namespace mjsense {
 template <>
-struct CustomFieldType<std::shared_ptr<const Effect>> {
+struct CustomFieldType<std::shared_ptr<const effects::Effect>> {
   static FieldType make();
 };
+}  // namespace mjsense
+
+namespace mjsense::effects {
 
 // Checks the fields of an effect, also against each other. Throws ValueError; `context` starts its
 // message.
 void check_effect(const std::shared_ptr<const Effect>& effect, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

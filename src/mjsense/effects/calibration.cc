@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/print_stderr.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 void Scale::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -123,4 +123,4 @@ void NanPolicy::apply(const EffectTime& moment, const EffectRow& row) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -11,7 +11,7 @@
 
 #include "mjsense/effects/effect.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 // x <- factor x
 struct Scale : Effect {
@@ -113,9 +113,10 @@ void visit_fields(V& v, Quantize& c) {
 
 // What happens to NaN and infinite values.
 enum class NanAction { kDisabled, kWarn, kSanitize, kError };
-template <>
-inline constexpr std::array<std::string_view, 4> kEnumNames<NanAction>{"disabled", "warn",
-                                                                       "sanitize", "error"};
+constexpr std::array<std::string_view, 4> enum_names(NanAction) {
+  return {"disabled", "warn", "sanitize", "error"};
+}
+
 struct NanPolicy : Effect {
   using Action = NanAction;
   NamedEnum<Action> action = Action::kSanitize;
@@ -142,4 +143,4 @@ void visit_fields(V& v, NanPolicy& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

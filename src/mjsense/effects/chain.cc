@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/effects/all_effects.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 namespace {
 
@@ -99,4 +99,4 @@ void EffectChain::apply(const ChainTick& tick, std::span<const std::byte> in,
   worlds_[tick.world] = {tick.tick, false, moment.first};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

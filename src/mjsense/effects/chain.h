@@ -13,7 +13,7 @@
 #include "mjsense/core/sensor_spec.h"
 #include "mjsense/effects/effect.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 using Effects = std::vector<std::shared_ptr<const Effect>>;
 
@@ -69,4 +69,4 @@ class EffectChain {
   std::vector<WorldState> worlds_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::effects {
 
 Draw Draw::gaussian(PerComponent std, PerComponent mean) {
   return {Gaussian{std::move(std), std::move(mean)}};
@@ -39,4 +39,4 @@ double Draw::sample(Rng& rng, int i) const {
   return component(std::get<Constant>(distribution).value, i);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -9,7 +9,7 @@
 #include "mjsense/core/fields/named_enum.h"
 #include "mjsense/effects/effect.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 // Distributions. Each parameter is one value for all components, or one for each.
 struct Gaussian {
@@ -36,10 +36,17 @@ struct Draw {
   void check(const EffectInit& init) const;  // throws if it does not suit the row
   double sample(Rng& rng, int i) const;
 };
+
+}  // namespace mjsense::effects
+
+namespace mjsense {
 template <>
-inline constexpr const char* kChoiceName<Draw::Distribution> = "Draw";
+inline constexpr const char* kChoiceName<effects::Draw::Distribution> = "Draw";
 template <>
-inline constexpr int kPlainAlternative<Draw::Distribution> = 2;
+inline constexpr int kPlainAlternative<effects::Draw::Distribution> = 2;
+}  // namespace mjsense
+
+namespace mjsense::effects {
 
 template <class V>
 void visit_fields(V& v, Gaussian& c) {
@@ -61,10 +68,10 @@ void visit_fields(V& v, Constant& c) {
 
 // How a random number e changes a value x: x + e, x e, or e instead of x.
 enum class Operation { kAdd, kScale, kAbs };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<Operation>{"add", "scale", "abs"};
+constexpr std::array<std::string_view, 3> enum_names(Operation) { return {"add", "scale", "abs"}; }
+
 inline double operate(Operation operation, double x, double e) {
   return operation == Operation::kAdd ? x + e : operation == Operation::kScale ? x * e : e;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

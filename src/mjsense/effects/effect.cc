@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/config_checks.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 void check_order(const PerComponent& low, const PerComponent& high, std::string_view context) {
   const std::size_t n = std::max(low.size(), high.size());
@@ -39,4 +39,4 @@ void check_numeric(const EffectInit& init) {
                                dtype_name(init.dtype)));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

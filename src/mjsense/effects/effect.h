@@ -20,7 +20,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor_spec.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 // The time at which a row is measured.
 struct EffectTime {
@@ -118,4 +118,4 @@ void check_order(const PerComponent& low, const PerComponent& high, std::string_
 void check_components(const PerComponent& values, const char* name, const EffectInit& init);
 void check_numeric(const EffectInit& init);  // throws ValueError unless float32 or float64
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -12,7 +12,7 @@
 #include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 namespace {
 
 bool contains(const std::vector<std::string>& list, const std::string& x) {
@@ -31,8 +31,6 @@ std::unique_ptr<Sensor> EffectSensorCfg::build() const {
   check_fields(*this, context);
   return std::make_unique<EffectSensor>(*this);
 }
-
-SensorKind effect_kind() { return sensor_kind<EffectSensorCfg>(); }
 
 EffectSensor::EffectSensor(EffectSensorCfg cfg, Sensor* inner)
     : Sensor(cfg.name), cfg_(std::move(cfg)), inner_(inner) {}
@@ -103,4 +101,4 @@ void EffectSensor::reset(const World& world) {
   for (Stream& s : streams_) s.chain.reset(tick_of(world));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

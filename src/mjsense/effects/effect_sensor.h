@@ -13,7 +13,7 @@
 #include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/chain.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 struct EffectSensorCfg : SensorCfg {
   std::string sensor;
@@ -73,4 +73,4 @@ class EffectSensor : public Sensor {
   std::vector<Stream> streams_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

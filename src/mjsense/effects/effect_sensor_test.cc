@@ -14,7 +14,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 namespace {
 
 using ::testing::HasSubstr;
@@ -25,13 +25,13 @@ constexpr char kPendulum[] = R"(
 </worldbody>
 <sensor><gyro name="gyro" site="imu"/><accelerometer name="acc" site="imu"/></sensor></mujoco>)";
 
-std::shared_ptr<Scene> make_scene(EffectSensorCfg cfg) {
-  SceneCfg scene;
-  EntityCfg arm;
+std::shared_ptr<scene::Scene> make_scene(EffectSensorCfg cfg) {
+  scene::SceneCfg scene;
+  scene::EntityCfg arm;
   arm.model.xml = kPendulum;
   scene.entities.emplace_back("robot", arm);
   scene.sensors.push_back(std::make_shared<EffectSensorCfg>(std::move(cfg)));
-  return std::make_shared<Scene>(std::move(scene));
+  return std::make_shared<scene::Scene>(std::move(scene));
 }
 
 // Reads a sensor that the scene finds in the XML. Those follow the configured sensors, so this
@@ -58,9 +58,9 @@ TEST(EffectSensor, CleanSensorIsUnchangedAndDelayIsInSeconds) {
   cfg.sensor = "robot/gyro";
   cfg.effects = {std::make_shared<Delay>(0.016)};
   auto scene = make_scene(cfg);
-  SimulationCfg sim_cfg;
+  sim::SimulationCfg sim_cfg;
   sim_cfg.decimation = 4;  // 8 ms per step
-  Simulation sim(scene, sim_cfg);
+  sim::Simulation sim(scene, sim_cfg);
   std::vector<float> clean;
   for (int k = 0; k < 20; ++k) {
     sim.step();
@@ -82,7 +82,7 @@ TEST(EffectSensor, AHistoryHasEveryStep) {
   cfg.sensor = "robot/gyro";
   cfg.history_length = 3;
   auto scene = make_scene(cfg);
-  Simulation sim(scene, {});
+  sim::Simulation sim(scene, {});
   std::vector<float> clean;
   for (int k = 0; k < 6; ++k) {
     sim.step();
@@ -98,8 +98,8 @@ TEST(EffectSensor, AHistoryHasEveryStep) {
 
 // Two sensors with the same noise have different numbers.
 TEST(EffectSensor, NoiseDependsOnTheNameOfTheSensor) {
-  SceneCfg scene_cfg;
-  EntityCfg arm;
+  scene::SceneCfg scene_cfg;
+  scene::EntityCfg arm;
   arm.model.xml = kPendulum;
   scene_cfg.entities.emplace_back("robot", arm);
   for (const char* name : {"one", "other"}) {
@@ -109,8 +109,8 @@ TEST(EffectSensor, NoiseDependsOnTheNameOfTheSensor) {
     cfg->effects = {std::make_shared<Noise>(Draw::gaussian({1}))};
     scene_cfg.sensors.push_back(cfg);
   }
-  auto scene = std::make_shared<Scene>(scene_cfg);
-  Simulation sim(scene, {});
+  auto scene = std::make_shared<scene::Scene>(scene_cfg);
+  sim::Simulation sim(scene, {});
   Sensor* both[] = {&scene->sensor("one"), &scene->sensor("other")};
   sim.refresh(both);
   EXPECT_NE(both[0]->field().data.row<float>(0)[0], both[1]->field().data.row<float>(0)[0]);
@@ -118,22 +118,22 @@ TEST(EffectSensor, NoiseDependsOnTheNameOfTheSensor) {
 
 TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
   constexpr int kWorlds = 16, kAlone = 5;
-  std::vector<std::shared_ptr<Scene>> scenes;
-  std::vector<std::unique_ptr<Simulation>> sims;
+  std::vector<std::shared_ptr<scene::Scene>> scenes;
+  std::vector<std::unique_ptr<sim::Simulation>> sims;
   for (int threads : {1, 2, 5}) {
     scenes.push_back(make_scene(noisy()));
-    SimulationCfg cfg;
+    sim::SimulationCfg cfg;
     cfg.num_worlds = kWorlds;
     cfg.decimation = 3;
     cfg.threads = threads;
     cfg.seed = 9;
-    sims.push_back(std::make_unique<Simulation>(scenes.back(), cfg));
+    sims.push_back(std::make_unique<sim::Simulation>(scenes.back(), cfg));
   }
-  SimulationCfg one;
+  sim::SimulationCfg one;
   one.decimation = 3;
   one.seed = 9;
   auto alone_scene = make_scene(noisy());
-  Simulation alone(alone_scene, one);
+  sim::Simulation alone(alone_scene, one);
   alone.worlds().rekey(0, kAlone);
   alone.reset();
   for (int k = 0; k < 60; ++k) {
@@ -158,7 +158,7 @@ TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
 TEST(EffectSensor, ErrorsNameSensorsAndFields) {
   const auto message = [](EffectSensorCfg cfg) -> std::string {
     try {
-      Simulation sim(make_scene(std::move(cfg)), {});
+      sim::Simulation sim(make_scene(std::move(cfg)), {});
     } catch (const Error& e) {
       return e.what();
     }
@@ -176,4 +176,4 @@ TEST(EffectSensor, ErrorsNameSensorsAndFields) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::effects

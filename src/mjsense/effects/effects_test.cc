@@ -18,7 +18,7 @@
 #include "mjsense/effects/effect_sensor.h"
 #include "mjsense/effects/pipeline.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 namespace {
 
 using ::testing::ElementsAre;
@@ -640,4 +640,4 @@ TEST(Chain, DoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::effects

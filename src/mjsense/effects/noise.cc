@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 Noise::Noise(Draw d, Operation op) : draw(std::move(d)), operation(op) {}
 
@@ -103,4 +103,4 @@ void BiasDrift::apply(const EffectTime& moment, const EffectRow& row) {
   row.transform([&](double x, int i) { return x + bias[i]; });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -10,7 +10,7 @@
 #include "mjsense/effects/distribution.h"
 #include "mjsense/effects/effect.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 // x <- x + e (or x e, or e), with e drawn for every row and component.
 struct Noise : Effect {
@@ -130,4 +130,4 @@ void visit_fields(V& v, BiasDrift& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -5,7 +5,7 @@
 
 #include "mjsense/core/fields/fields.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 EffectChainCfg pipeline(const PipelineCfg& cfg) {
   constexpr std::string_view kPlace = "observation pipeline";
@@ -27,4 +27,4 @@ EffectChainCfg pipeline(const PipelineCfg& cfg) {
   return chain;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

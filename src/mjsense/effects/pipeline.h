@@ -11,7 +11,7 @@
 #include "mjsense/effects/noise.h"
 #include "mjsense/effects/timing.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 struct PipelineCfg {
   bool enable_corruption = true;
@@ -57,4 +57,4 @@ void visit_fields(V& v, PipelineCfg& c) {
 // Throws ValueError for an invalid configuration.
 EffectChainCfg pipeline(const PipelineCfg& cfg);
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

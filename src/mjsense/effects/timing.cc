@@ -10,7 +10,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 namespace {
 
 constexpr double kTimeEps = 1e-9;  // s, tolerance for the rounding of tick * period
@@ -192,4 +192,4 @@ void Dropout::apply(const EffectTime& moment, const EffectRow& row) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

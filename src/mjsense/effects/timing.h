@@ -9,7 +9,7 @@
 
 #include "mjsense/effects/effect.h"
 
-namespace mjsense {
+namespace mjsense::effects {
 
 // Ring buffer of the last rows of every world, with their times.
 class FrameRing {
@@ -151,8 +151,10 @@ void visit_fields(V& v, Rate& c) {
 // A row is lost with the given probability; the last row that arrived, NaN or 0 is reported
 // instead. The first row of an episode always arrives.
 enum class DropoutMode { kHold, kNan, kZero };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<DropoutMode>{"hold", "nan", "zero"};
+constexpr std::array<std::string_view, 3> enum_names(DropoutMode) {
+  return {"hold", "nan", "zero"};
+}
+
 struct Dropout : Effect {
   using Mode = DropoutMode;
   double probability = 0.0;
@@ -182,4 +184,4 @@ void visit_fields(V& v, Dropout& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::effects

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 class ActiveWorlds {
  public:
@@ -18,4 +18,4 @@ class ActiveWorlds {
   virtual void for_each(std::function<void(const World&)> body) = 0;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -10,7 +10,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/episode/object_shape.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 struct GraspObject {
   int body = -1;
@@ -46,4 +46,4 @@ class GraspScene {
   virtual const PlaceScene* place_scene() const { return nullptr; }
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -9,7 +9,7 @@
 #include "mjsense/robots/grasp_state.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 namespace {
 
 std::size_t index_of(const Task& task, const std::string& role) {
@@ -25,23 +25,24 @@ std::size_t index_of(const Task& task, const std::string& role) {
 
 std::shared_ptr<Sensor> start_pose_sensor(const Task& task, const std::string& name,
                                           const std::string& role) {
-  return std::make_shared<FunctionSensor<float>>(
-      name, pose_spec("world", "Pose of the object when the episode began."),
+  return std::make_shared<observe::FunctionSensor<float>>(
+      name, observe::pose_spec("world", "Pose of the object when the episode began."),
       [&task, role](const World& world, std::span<float> row) {
         write_pose(task.start_pose(world.id, role), row.data());
       });
 }
 
 std::shared_ptr<Sensor> grasp_state_sensor(const Task& task, const std::string& role) {
-  std::vector<GraspStateSensor::Gripper> grippers;
-  for (const MoveGroup& group : task.robot().groups()) {
-    if (group.kind == GroupKind::kGripper)
-      grippers.push_back({group.name, name_of(task.model(), mjOBJ_BODY, group.root_body)});
+  std::vector<robots::GraspStateSensor::Gripper> grippers;
+  for (const robots::MoveGroup& group : task.robot().groups()) {
+    if (group.kind == robots::GroupKind::kGripper)
+      grippers.push_back({group.name, scene::name_of(task.model(), mjOBJ_BODY, group.root_body)});
   }
   if (grippers.empty()) return nullptr;
-  return std::make_shared<GraspStateSensor>(
-      "grasp_state_" + role,
-      BodyRef([&task, i = index_of(task, role)](int world) { return task.objects(world)[i].body; }),
+  return std::make_shared<robots::GraspStateSensor>(
+      "grasp_state_" + role, observe::BodyRef([&task, i = index_of(task, role)](int world) {
+        return task.objects(world)[i].body;
+      }),
       std::move(grippers));
 }
 
@@ -49,7 +50,7 @@ std::shared_ptr<Sensor> body_poses_sensor(const Task& task, const std::string& n
                                           std::vector<NamedBody> bodies) {
   constexpr int kLength = 2000;
   std::ranges::sort(bodies, {}, &NamedBody::name);
-  return std::make_shared<JsonFunctionSensor>(
+  return std::make_shared<observe::JsonFunctionSensor>(
       name, kLength, "Poses of objects in the robot's base frame: 4x4 matrices by name.",
       [&task, bodies = std::move(bodies)](const World& world, JsonWriter& json) {
         const Pose to_base = inverse(task.robot().base_pose(world));
@@ -73,4 +74,4 @@ std::shared_ptr<Sensor> body_poses_sensor(const Task& task, const std::string& n
       });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -9,7 +9,7 @@
 
 #include "mjsense/episode/task.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 // Pose of the object with this role at the start of the episode, X_WO: float32 [7].
 std::shared_ptr<Sensor> start_pose_sensor(const Task& task, const std::string& name,
@@ -26,4 +26,4 @@ struct NamedBody {
 std::shared_ptr<Sensor> body_poses_sensor(const Task& task, const std::string& name,
                                           std::vector<NamedBody> bodies);
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

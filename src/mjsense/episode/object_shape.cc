@@ -11,7 +11,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 namespace {
 
 using std::numbers::pi;
@@ -100,7 +100,7 @@ void sample_geom(const mjModel* model, int geom, double spacing, std::vector<Vec
       return sample_mesh(model, model->geom_dataid[geom], spacing, out);
     default:
       throw ValueError(fmt::format("object '{}': geoms of this type cannot be picked up",
-                                   name_of(model, mjOBJ_BODY, model->geom_bodyid[geom])));
+                                   scene::name_of(model, mjOBJ_BODY, model->geom_bodyid[geom])));
   }
 }
 
@@ -118,7 +118,7 @@ ObjectShape object_shape(const mjModel* model, int body, double spacing) {
   ObjectShape shape;
   for (int g = 0; g < model->ngeom; ++g) {
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    if (!is_descendant_or_self(model, model->geom_bodyid[g], body)) continue;
+    if (!observe::is_descendant_or_self(model, model->geom_bodyid[g], body)) continue;
     const Pose pose = body_in(model, model->geom_bodyid[g], body) *
                       Pose{vec3(model->geom_pos + 3 * g), quat(model->geom_quat + 4 * g)};
     std::vector<Vec3> local;
@@ -127,7 +127,7 @@ ObjectShape object_shape(const mjModel* model, int body, double spacing) {
   }
   if (shape.points.empty()) {
     throw ValueError(
-        fmt::format("object '{}': has no collision geom", name_of(model, mjOBJ_BODY, body)));
+        fmt::format("object '{}': has no collision geom", scene::name_of(model, mjOBJ_BODY, body)));
   }
   shape.low = shape.high = shape.points.front().z;
   for (Vec3 p : shape.points) {
@@ -150,4 +150,4 @@ ObjectShape scaled(const ObjectShape& shape, double size) {
   return out;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -8,7 +8,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 struct ObjectShape {
   std::vector<Vec3> points;  // on the surface of the collision geoms, body frame, m
@@ -24,4 +24,4 @@ ObjectShape object_shape(const mjModel* model, int body, double spacing = 0.004)
 // The same object, scaled by `size`.
 ObjectShape scaled(const ObjectShape& shape, double size);
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -9,16 +9,16 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 namespace {
 
-ModelPtr compile(const std::string& geoms) {
+scene::ModelPtr compile(const std::string& geoms) {
   const std::string xml =
       "<mujoco><worldbody><body><freejoint/>" + geoms + "</body></worldbody></mujoco>";
   char error[500] = "";
-  const SpecPtr spec(mj_parseXMLString(xml.c_str(), nullptr, error, sizeof(error)));
+  const scene::SpecPtr spec(mj_parseXMLString(xml.c_str(), nullptr, error, sizeof(error)));
   if (!spec) throw ValueError(error);
-  return ModelPtr(mj_compile(spec.get(), nullptr));
+  return scene::ModelPtr(mj_compile(spec.get(), nullptr));
 }
 
 // Maximum distance of a point from the surface; `distance` returns the distance of one point.
@@ -86,4 +86,4 @@ TEST(ObjectShape, VisualGeomsAreIgnored) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::episode {
 namespace {
 
 // Control steps: the first one in which the object can be shoved, and the number of such steps.
@@ -55,14 +55,14 @@ double Perturbation::progress(const World& world, int joint) {
   return world.data->qpos[m->jnt_qposadr[joint]] / (limited ? range[1] - range[0] : 1);
 }
 
-void Perturbation::push(const World& world, int joint, const StateRow& state) const {
+void Perturbation::push(const World& world, int joint, const robots::StateRow& state) const {
   double* v = state.qvel + world.model->jnt_dofadr[joint];
   v[0] += speed_ * std::cos(direction_);
   v[1] += speed_ * std::sin(direction_);
 }
 
-void Perturbation::apply(const World& world, const Robot& robot, int object, int step,
-                         Action& action, const StateRow& state) {
+void Perturbation::apply(const World& world, const robots::Robot& robot, int object, int step,
+                         robots::Action& action, const robots::StateRow& state) {
   if (kind_ == Kind::kNone || object < 0) return;
   const mjModel* m = world.model;
   const int joint = joint_of(m, object);
@@ -84,10 +84,10 @@ void Perturbation::apply(const World& world, const Robot& robot, int object, int
   }
   if (step >= happened_at_ + kOpenSteps) return;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const MoveGroup& group = robot.groups()[g];
-    if (group.kind == GroupKind::kGripper && action.commands[g].given)
+    const robots::MoveGroup& group = robot.groups()[g];
+    if (group.kind == robots::GroupKind::kGripper && action.commands[g].given)
       action.commands[g].set({&group.open_command, 1});
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

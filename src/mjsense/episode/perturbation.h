@@ -11,7 +11,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/robots/robot.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 // The perturbation of one world.
 class Perturbation {
@@ -24,15 +24,15 @@ class Perturbation {
   // Call before control step `step` (from 0). May write the velocity of body `object`, if it has a
   // free joint, and the commands of grippers. Perturbs once per episode, and never if no joint
   // moves the object.
-  void apply(const World& world, const Robot& robot, int object, int step, Action& action,
-             const StateRow& state);
+  void apply(const World& world, const robots::Robot& robot, int object, int step,
+             robots::Action& action, const robots::StateRow& state);
   Kind kind() const { return kind_; }
   bool happened() const { return happened_at_ >= 0; }
 
  private:
   static int joint_of(const mjModel* model, int object);
   static double progress(const World& world, int joint);
-  void push(const World& world, int joint, const StateRow& state) const;
+  void push(const World& world, int joint, const robots::StateRow& state) const;
 
   Kind kind_ = Kind::kNone;
   // Control steps: of a shove from the start, of a slip from when the gripper has moved the object.
@@ -43,4 +43,4 @@ class Perturbation {
   int happened_at_ = -1;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

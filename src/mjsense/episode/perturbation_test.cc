@@ -10,7 +10,7 @@
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 namespace {
 
 using Kind = Perturbation::Kind;
@@ -28,17 +28,17 @@ constexpr char kThings[] = R"(
 </mujoco>)";
 
 struct Perturbed : ::testing::Test {
-  static SceneCfg scene_cfg() {
-    SceneCfg cfg;
-    EntityCfg robot, things;
-    robot.model = robot_cfg("franka").model;
+  static scene::SceneCfg scene_cfg() {
+    scene::SceneCfg cfg;
+    scene::EntityCfg robot, things;
+    robot.model = robots::robot_cfg("franka").model;
     things.model.xml = kThings;
     cfg.entities = {{"robot_0", robot}, {"things", things}};
     return cfg;
   }
   void SetUp() override {
     Rng rng(0, 0, 0, 0);
-    robot.write_start(state_row(data.get()), {}, rng);
+    robot.write_start(robots::state_row(data.get()), {}, rng);
     mj_forward(model, data.get());
   }
   int body(const char* name) const { return mj_name2id(model, mjOBJ_BODY, name); }
@@ -53,16 +53,16 @@ struct Perturbed : ::testing::Test {
   }
   // One control step of a policy that closes the gripper. Returns whether the gripper is opened.
   bool apply(int object, int step) {
-    Action action;
+    robots::Action action;
     const int gripper = robot.gripper();
     action.commands[gripper].set({&robot.groups()[gripper].closed_command, 1});
-    perturbation.apply(world, robot, object, step, action, state_row(data.get()));
+    perturbation.apply(world, robot, object, step, action, robots::state_row(data.get()));
     return action.commands[gripper].values[0] == robot.groups()[gripper].open_command;
   }
 
-  Scene scene{scene_cfg()};
+  scene::Scene scene{scene_cfg()};
   const mjModel* model = scene.model();
-  Robot robot{robot_cfg("franka"), model, 1};
+  robots::Robot robot{robots::robot_cfg("franka"), model, 1};
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{mj_makeData(model), mj_deleteData};
   World world{.id = 0, .model = model, .data = data.get()};
   Perturbation perturbation;
@@ -166,4 +166,4 @@ TEST_F(Perturbed, WhatNoJointMovesIsNotPerturbed) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -3,7 +3,7 @@
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/observe/pose_sensor.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 std::vector<std::shared_ptr<Sensor>> PlannerPolicy::create_policy_sensors() const {
   SensorSpec phase, retries;
@@ -13,18 +13,19 @@ std::vector<std::shared_ptr<Sensor>> PlannerPolicy::create_policy_sensors() cons
   retries.low = 0;
   retries.description = "Number of times that the planner has restarted in this episode.";
   std::vector<std::shared_ptr<Sensor>> sensors;
-  sensors.push_back(std::make_shared<FunctionSensor<std::int64_t>>(
+  sensors.push_back(std::make_shared<observe::FunctionSensor<std::int64_t>>(
       "policy_phase", phase,
       [this](const World& world, std::span<std::int64_t> row) { row[0] = this->phase(world.id); }));
-  sensors.push_back(std::make_shared<FunctionSensor<std::int64_t>>(
+  sensors.push_back(std::make_shared<observe::FunctionSensor<std::int64_t>>(
       "policy_num_retries", retries,
       [this](const World& world, std::span<std::int64_t> row) { row[0] = num_retries(world.id); }));
   if (has_grasp_pose()) {
-    sensors.push_back(std::make_shared<FunctionSensor<float>>(
+    sensors.push_back(std::make_shared<observe::FunctionSensor<float>>(
         "grasp_pose",
-        pose_spec("world",
-                  "Pose at which the planner closes the gripper; the identity before the first "
-                  "plan with a grasp."),
+        observe::pose_spec(
+            "world",
+            "Pose at which the planner closes the gripper; the identity before the first "
+            "plan with a grasp."),
         [this](const World& world, std::span<float> row) {
           write_pose(grasp_pose(world.id), row.data());
         }));
@@ -32,4 +33,4 @@ std::vector<std::shared_ptr<Sensor>> PlannerPolicy::create_policy_sensors() cons
   return sensors;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

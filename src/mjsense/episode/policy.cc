@@ -5,9 +5,9 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
-void Policy::act(const World& /*world*/, Action& /*action*/) {
+void Policy::act(const World& /*world*/, robots::Action& /*action*/) {
   throw ValueError(fmt::format("policy '{}' acts for all worlds at once: call act_all()", name()));
 }
 
@@ -15,8 +15,8 @@ void Policy::reset_all(ActiveWorlds& worlds) {
   worlds.for_each([this](const World& world) { reset(world); });
 }
 
-void Policy::act_all(ActiveWorlds& worlds, std::span<Action> actions) {
+void Policy::act_all(ActiveWorlds& worlds, std::span<robots::Action> actions) {
   worlds.for_each([this, all = actions.data()](const World& world) { act(world, all[world.id]); });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -16,9 +16,12 @@
 #include "mjsense/episode/active_worlds.h"
 #include "mjsense/robots/action.h"
 
-namespace mjsense {
-
+namespace mjsense::sim {
 class Simulation;
+}  // namespace mjsense::sim
+
+namespace mjsense::episode {
+
 class Task;
 
 struct Phase {
@@ -32,7 +35,7 @@ class Policy {
   virtual std::string_view name() const = 0;
 
   // The simulation in which the policy acts. Called before initialize(), if there is a simulation.
-  virtual void bind(const std::shared_ptr<Simulation>& /*simulation*/) {}
+  virtual void bind(const std::shared_ptr<sim::Simulation>& /*simulation*/) {}
   // Called once, by Task::register_policy(). Allocates memory for the task's worlds.
   virtual void initialize(Task& task) = 0;
   // Starts an episode; the world's data is current. Must not throw for a task that the policy
@@ -40,12 +43,12 @@ class Policy {
   virtual void reset(const World& /*world*/) {}
   // The action for the next control step. Must access this world's state only, because worlds act
   // in parallel.
-  virtual void act(const World& world, Action& action);
+  virtual void act(const World& world, robots::Action& action);
 
   // For all active worlds at once, on the caller's thread. `actions` has a row for every world of
   // the simulation; the rows of the active worlds are empty and must be filled.
   virtual void reset_all(ActiveWorlds& worlds);
-  virtual void act_all(ActiveWorlds& worlds, std::span<Action> actions);
+  virtual void act_all(ActiveWorlds& worlds, std::span<robots::Action> actions);
 
   // All phases, for policy_phases of obs_scene; empty if the policy has none.
   virtual std::span<const Phase> phases() const { return {}; }
@@ -72,4 +75,4 @@ class PlannerPolicy : public Policy {
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

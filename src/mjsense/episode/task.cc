@@ -11,7 +11,7 @@
 #include "mjsense/observe/env_states.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 Task::Task(TaskCfg cfg) : cfg_(std::move(cfg)) {
   if (cfg_.ctrl_dt_ms == 0) cfg_.ctrl_dt_ms = cfg_.sim_dt_ms;
@@ -27,10 +27,10 @@ Task::Task(TaskCfg cfg) : cfg_(std::move(cfg)) {
     throw ValueError(fmt::format("task: horizon = {} must be positive", cfg_.horizon));
 }
 
-SceneCfg Task::scene_cfg_with_robot() const {
-  SceneCfg scene = scene_cfg();
+scene::SceneCfg Task::scene_cfg_with_robot() const {
+  scene::SceneCfg scene = scene_cfg();
   scene.options.timestep = 0.001 * cfg_.sim_dt_ms;
-  const std::string name(Robot::kPrefix.substr(0, Robot::kPrefix.size() - 1));
+  const std::string name(robots::Robot::kPrefix.substr(0, robots::Robot::kPrefix.size() - 1));
   const auto context =
       std::ranges::find(scene.entities, name, [](const auto& e) { return e.first; });
   const bool reserved = context != scene.entities.end() && context->second.model.empty();
@@ -45,7 +45,7 @@ SceneCfg Task::scene_cfg_with_robot() const {
         "task '{}' already has a robot in its scene (entity '{}'): robot '{}' cannot be added",
         this->name(), name, cfg_.robot.name));
   }
-  EntityCfg robot;
+  scene::EntityCfg robot;
   robot.model = cfg_.robot.model;
   if (reserved) {
     context->second = robot;
@@ -56,7 +56,7 @@ SceneCfg Task::scene_cfg_with_robot() const {
   if (cfg_.robot.edit_spec) {
     scene.spec_fn = [first = scene.spec_fn, edit = cfg_.robot.edit_spec](mjSpec* spec) {
       if (first) first(spec);
-      edit(spec, std::string(Robot::kPrefix));
+      edit(spec, std::string(robots::Robot::kPrefix));
     };
   }
   return scene;
@@ -67,16 +67,18 @@ void Task::initialize(const mjModel* model, int num_worlds) {
     throw ValueError(fmt::format("task: {} worlds; at least 1 is required", num_worlds));
   model_ = model;
   num_worlds_ = num_worlds;
-  const ControlPeriods periods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms};
+  const robots::ControlPeriods periods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms};
   if (whole_) {
     cfg_.robot = whole_->cfg().robot;
   } else if (cfg_.robot.name.empty()) {
     const std::string entity = robot_entity();
-    cfg_.robot = scene_robot(model, entity, robot_groups(), fmt::format("task '{}'", name()));
-    robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds,
-                                     entity.empty() ? "" : entity + "/", periods);
+    cfg_.robot =
+        robots::scene_robot(model, entity, robot_groups(), fmt::format("task '{}'", name()));
+    robot_ = std::make_unique<robots::Robot>(cfg_.robot, model, num_worlds,
+                                             entity.empty() ? "" : entity + "/", periods);
   } else {
-    robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds, Robot::kPrefix, periods);
+    robot_ = std::make_unique<robots::Robot>(cfg_.robot, model, num_worlds, robots::Robot::kPrefix,
+                                             periods);
   }
   episodes_.assign(num_worlds, {});
   initialize_task();
@@ -89,7 +91,7 @@ void Task::register_policy(Policy& policy) {
   policy_ = &policy;
 }
 
-void Task::sample(int world, std::int64_t episode, const StateRow& state, int draw) {
+void Task::sample(int world, std::int64_t episode, const robots::StateRow& state, int draw) {
   episodes_[world] = {.number = episode};
   Rng rng(cfg_.seed, static_cast<std::uint32_t>(draw), stream_of("task/sample"),
           static_cast<std::uint64_t>(episode));
@@ -98,7 +100,7 @@ void Task::sample(int world, std::int64_t episode, const StateRow& state, int dr
   robot_->stand(state, base);
 }
 
-void Task::choose_goal(int /*world*/, Rng& /*rng*/, const StateRow& /*state*/) {
+void Task::choose_goal(int /*world*/, Rng& /*rng*/, const robots::StateRow& /*state*/) {
   throw ValueError(
       fmt::format("task '{}' cannot choose its goal in a scene that another task has sampled: when "
                   "several tasks are combined, it must be the first",
@@ -120,12 +122,12 @@ void Task::begin(const World& world) {
   robot_->reset(world);
 }
 
-void Task::apply(const World& world, const Action& action, const StateRow& state) {
+void Task::apply(const World& world, const robots::Action& action, const robots::StateRow& state) {
   Episode& episode = episodes_[world.id];
   if (episode.perturbation.kind() == Perturbation::Kind::kNone) {
     robot_->command(world, action);
   } else {
-    Action disturbed = action;
+    robots::Action disturbed = action;
     const auto of = objects(world.id);
     episode.perturbation.apply(world, *robot_, of.empty() ? -1 : of[0].body, episode.step,
                                disturbed, state);
@@ -182,10 +184,10 @@ std::string Task::obs_scene(int world) const {
   }
   auto& bodies = scene["objects"] = nlohmann::ordered_json::object();
   const int base = robot().base_body() > 0 ? robot().base_body() : -1;
-  const auto actors = actors_of(model(), base);
+  const auto actors = observe::actors_of(model(), base);
   for (const TaskObject& object : objects(world)) {
     if (object.body < 0) continue;
-    bodies[object.role]["body"] = name_of(model(), mjOBJ_BODY, object.body);
+    bodies[object.role]["body"] = scene::name_of(model(), mjOBJ_BODY, object.body);
     const auto actor = std::ranges::find(actors, object.body, &std::pair<int, std::string>::first);
     if (actor != actors.end()) bodies[object.role]["actor"] = actor->second;
   }
@@ -206,4 +208,4 @@ std::string Task::obs_scene(int world) const {
   return scene.dump();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

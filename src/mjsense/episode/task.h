@@ -39,24 +39,38 @@
 #include "mjsense/robots/scene_robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::observe {
+class SensorSuite;
+}  // namespace mjsense::observe
+
+namespace mjsense::scenes {
+struct SceneFileCfg;
+}  // namespace mjsense::scenes
+
+namespace mjsense::sim {
+class Simulation;
+}  // namespace mjsense::sim
+
+namespace mjsense::tasks {
+class MultiTask;
+}  // namespace mjsense::tasks
+
+namespace mjsense::episode {
 
 class GraspScene;
 class Policy;
-class SensorSuite;
-class Simulation;
-struct SceneFileCfg;
 
 // Sentences of an episode's instruction: paraphrases that differ between episodes, or description().
 enum class Instructions { kVaried, kCanonical };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<Instructions>{"varied", "canonical"};
+constexpr std::array<std::string_view, 2> enum_names(Instructions) {
+  return {"varied", "canonical"};
+}
 
 struct TaskCfg {
-  RobotCfg robot;     // without a name: the robot in the task's scene, if any
-  std::string scene;  // name or file; "": the task's own scene
+  robots::RobotCfg robot;  // without a name: the robot in the task's scene, if any
+  std::string scene;       // name or file; "": the task's own scene
   // Creates a scene that replaces a named one; `scene` is then only a display name.
-  std::function<SceneFileCfg()> make_scene;
+  std::function<scenes::SceneFileCfg()> make_scene;
   std::uint64_t seed = 0;
   int horizon = 500;      // policy steps after which an episode is truncated
   int policy_dt_ms = 66;  // ms, period of the policy's actions
@@ -114,28 +128,28 @@ class Task {
 
   // The scene without the robot of cfg(); the caller adds sensors. If the scene has an entity
   // "robot_0" without a model, the robot takes its place among the entities; else it is added last.
-  virtual SceneCfg scene_cfg() const = 0;
+  virtual scene::SceneCfg scene_cfg() const = 0;
   // The scene with the robot and the timestep of cfg().
-  SceneCfg scene_cfg_with_robot() const;
+  scene::SceneCfg scene_cfg_with_robot() const;
   // The entity of scene_cfg() that is the robot if cfg() names none; "": everything that has
   // actuators.
   virtual std::string robot_entity() const { return "robot_0"; }
   // Name patterns of that robot's actuators for each move group; empty: one group of all actuators.
-  virtual ActuatorGroups robot_groups() const { return {}; }
+  virtual robots::ActuatorGroups robot_groups() const { return {}; }
   // Full names of the scene's cameras that an episode records, in addition to the robot's.
-  virtual std::vector<CameraMount> cameras() const { return {}; }
+  virtual std::vector<robots::CameraMount> cameras() const { return {}; }
   // Keyframe from which episodes start, before sample(); -1: the model's defaults.
   virtual int start_key() const { return -1; }
 
   // The simulation in which the task runs. Called before initialize(), if there is a simulation.
-  virtual void bind(const std::shared_ptr<Simulation>& /*simulation*/) {}
+  virtual void bind(const std::shared_ptr<sim::Simulation>& /*simulation*/) {}
   void initialize(const mjModel* model, int num_worlds);
   // Sets the seed of all further episodes.
   void reseed(std::uint64_t seed) { cfg_.seed = seed; }
   const mjModel* model() const { return model_; }
   int num_worlds() const { return num_worlds_; }
-  Robot& robot() { return whole_ ? whole_->robot() : *robot_; }
-  const Robot& robot() const { return whole_ ? whole_->robot() : *robot_; }
+  robots::Robot& robot() { return whole_ ? whole_->robot() : *robot_; }
+  const robots::Robot& robot() const { return whole_ ? whole_->robot() : *robot_; }
 
   // Throws ValueError "Policy already registered" on a second call. The policy must outlive the
   // task.
@@ -146,13 +160,13 @@ class Task {
   // Writes the start state of episode number `episode`. It is a function of (cfg.seed, episode) and
   // does not depend on the world. `draw` > 0 gives another start state, if the ones before cannot
   // be played.
-  void sample(int world, std::int64_t episode, const StateRow& state, int draw = 0);
+  void sample(int world, std::int64_t episode, const robots::StateRow& state, int draw = 0);
   // Called after forward(). Stores what the episode is evaluated against (start poses), sets the
   // controllers' targets and resets the step count.
   virtual void begin(const World& world);
   // Counts the step, stores the action, sets targets and writes ctrl (with noise keyed by seed,
   // episode and step).
-  void apply(const World& world, const Action& action, const StateRow& state);
+  void apply(const World& world, const robots::Action& action, const robots::StateRow& state);
   virtual Evaluation evaluate(const World& world) const = 0;
 
   // Why the start state in this world, whose data is current, cannot be played; "" if it can. The
@@ -175,7 +189,7 @@ class Task {
   // The perturbation of this world's episode.
   const Perturbation& perturbation(int world) const { return now(world).perturbation; }
   // The action from the policy, before clipping and noise; null before the first action.
-  const Action* last_action(int world) const {
+  const robots::Action* last_action(int world) const {
     return now(world).step > 0 ? &now(world).action : nullptr;
   }
 
@@ -214,20 +228,20 @@ class Task {
   // refer to this task.
   virtual std::vector<std::shared_ptr<Sensor>> create_task_sensors() const = 0;
   // Edits the complete suite before it is bound: a task may remove sensors or change their order.
-  virtual void edit_suite(SensorSuite& /*suite*/) const {}
+  virtual void edit_suite(observe::SensorSuite& /*suite*/) const {}
 
  protected:
   virtual void initialize_task() = 0;  // model() and robot() are valid
   // Writes the start state of everything except the joints of cfg()'s robot, and of these too if
   // samples_robot() is true. Returns the pose of the robot's base, or nothing to use the model's.
-  virtual std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) = 0;
+  virtual std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) = 0;
   virtual bool samples_robot() const { return false; }
   // Draws a sentence that describes the episode, whose start state is that of `world`; "": there is
   // only description().
   virtual std::string paraphrase(const World& /*world*/, Rng& /*rng*/) const { return ""; }
   // In a state that another task has sampled: chooses the goal of the episode without moving
   // anything. Throws ValueError if the task does not support it.
-  virtual void choose_goal(int world, Rng& rng, const StateRow& state);
+  virtual void choose_goal(int world, Rng& rng, const robots::StateRow& state);
   // Further members of obs_scene with text values, in this order.
   virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
     (void)world;
@@ -240,12 +254,12 @@ class Task {
   Evaluation make_evaluation_from(int world, double reward, std::string_view missing) const;
 
  private:
-  friend class MultiTask;  // this task may be a part of one
+  friend class tasks::MultiTask;  // this task may be a part of one
   struct Episode {
     std::int64_t number = 0;
     int step = 0;
     bool done = false;
-    Action action;
+    robots::Action action;
     Perturbation perturbation;
     std::string paraphrase;
   };
@@ -254,11 +268,11 @@ class Task {
   TaskCfg cfg_;
   const mjModel* model_ = nullptr;
   int num_worlds_ = 0;
-  std::unique_ptr<Robot> robot_;
+  std::unique_ptr<robots::Robot> robot_;
   Policy* policy_ = nullptr;
   // If this task is a part of another one: that task. Its robot, policy and episodes are used.
   Task* whole_ = nullptr;
   std::vector<Episode> episodes_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -20,7 +20,7 @@
 #include "mjsense/core/system/os.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 // Sanitisers need their signal handlers, their address space, and stderr for their reports.
@@ -206,4 +206,4 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
       fmt::format("{}: the process that read it ended without a result: it is damaged", what));
 }
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 using ::testing::HasSubstr;
@@ -112,4 +112,4 @@ TEST(InChild, SignalsToTheGroupDoNotReachTheChild) {
 }
 
 }  // namespace
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -13,7 +13,7 @@
 #include "mjsense/hdf5/lzf.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 constexpr std::uint64_t kMaxChunks = 1'000'000;
@@ -55,7 +55,7 @@ class Chunks {
     if (H5Pget_layout(properties_) != H5D_CHUNKED) return;
     const Id type(H5Dget_type(dataset_), H5Tclose, name_);
     std::vector<hsize_t> chunk(size_.size());
-    h5::check(H5Pget_chunk(properties_, static_cast<int>(chunk.size()), chunk.data()), name_);
+    hdf5::check(H5Pget_chunk(properties_, static_cast<int>(chunk.size()), chunk.data()), name_);
     bytes_ = H5Tget_size(type);
     for (const hsize_t n : chunk) bytes_ *= n;  // check_storage() has limited both factors
     if (!read_filters()) return check_plain();
@@ -99,7 +99,7 @@ class Chunks {
   void check_plain() const {
     const Id space(H5Dget_space(dataset_), H5Sclose, name_);
     hsize_t count = 0;
-    h5::check(H5Dget_num_chunks(dataset_, space, &count), name_);
+    hdf5::check(H5Dget_num_chunks(dataset_, space, &count), name_);
     if (count > kMaxPlainChunks)
       refuse(name_, fmt::format("has more than {} uncompressed chunks", kMaxPlainChunks));
     std::vector<hsize_t> at(size_.size());
@@ -107,8 +107,8 @@ class Chunks {
       unsigned without = 0;
       haddr_t address = 0;
       hsize_t stored = 0;
-      h5::check(H5Dget_chunk_info(dataset_, space, n, at.data(), &without, &address, &stored),
-                name_);
+      hdf5::check(H5Dget_chunk_info(dataset_, space, n, at.data(), &without, &address, &stored),
+                  name_);
       if (stored != bytes_)
         refuse(name_, fmt::format("is damaged: one of its chunks has {} bytes, expected {}", stored,
                                   bytes_));
@@ -117,13 +117,13 @@ class Chunks {
 
   void check_chunk(const std::vector<hsize_t>& at) const {
     hsize_t stored = 0;
-    h5::check(H5Dget_chunk_storage_size(dataset_, at.data(), &stored), name_);
+    hdf5::check(H5Dget_chunk_storage_size(dataset_, at.data(), &stored), name_);
     if (stored == 0) return;
     if (stored > kMaxRowBytes + (kMaxRowBytes >> 4))
       refuse(name_, fmt::format("has a compressed chunk of {} bytes, which is too large", stored));
     Bytes bytes(stored);
     std::uint32_t without = 0;  // a bit for each filter that was skipped
-    h5::check(H5Dread_chunk(dataset_, H5P_DEFAULT, at.data(), &without, bytes.data()), name_);
+    hdf5::check(H5Dread_chunk(dataset_, H5P_DEFAULT, at.data(), &without, bytes.data()), name_);
     for (std::size_t i = filters_.size(); i-- > 0;) {
       if (without >> i & 1) continue;
       const std::size_t maximum = bytes_ + kSumBytes * filters_.size();
@@ -149,4 +149,4 @@ class Chunks {
 
 void check_chunks(hid_t dataset, const std::string& name) { Chunks(dataset, name).check(); }
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -7,10 +7,10 @@
 
 #include "mjsense/hdf5/h5.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 
 // Throws RuntimeError unless every stored chunk of `dataset` unpacks to its size. Supported filters
 // are gzip and lzf, with or without shuffle and fletcher32; others are refused.
 void check_chunks(hid_t dataset, const std::string& name);
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -12,7 +12,7 @@
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 using ::testing::HasSubstr;
@@ -123,4 +123,4 @@ TEST_F(Chunks, OtherFiltersAreRefused) {
 }
 
 }  // namespace
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -12,7 +12,7 @@
 #include "mjsense/hdf5/lzf.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 std::recursive_mutex& library() {
@@ -350,4 +350,4 @@ double double_attribute(hid_t object, const char* name, double otherwise) {
   return value;
 }
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -17,7 +17,7 @@
 #include "mjsense/core/array.h"
 #include "mjsense/core/files/file_size_limit.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 
 class H5Lock {
  public:
@@ -98,4 +98,4 @@ std::string text_attribute(hid_t object, const char* name);
 std::int64_t int_attribute(hid_t object, const char* name, std::int64_t otherwise);
 double double_attribute(hid_t object, const char* name, double otherwise);
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

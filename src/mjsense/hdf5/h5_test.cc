@@ -7,7 +7,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 class H5 : public ::testing::Test {
@@ -57,4 +57,4 @@ TEST_F(H5, ExistsFollowsHardLinksOnly) {
 }
 
 }  // namespace
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace mjsense {
+namespace mjsense::hdf5 {
 namespace {
 
 std::size_t filter(unsigned flags, std::size_t count, const unsigned* values, std::size_t bytes,
@@ -67,4 +67,4 @@ void register_lzf() {
   H5Zregister(&kClass);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::hdf5

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::hdf5 {
 
 inline constexpr int kLzfFilter = 32000;  // registered with the HDF Group
 
@@ -17,4 +17,4 @@ std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint
 
 void register_lzf();  // registers the filter with the HDF5 library; hold an H5Lock
 
-}  // namespace mjsense
+}  // namespace mjsense::hdf5

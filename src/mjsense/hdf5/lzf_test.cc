@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::hdf5 {
 namespace {
 
 // What the bytes unpack to; "refused" if they do not.
@@ -44,4 +44,4 @@ TEST(Lzf, TruncatedOrTooLargeDataIsRefused) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::hdf5

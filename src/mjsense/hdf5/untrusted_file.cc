@@ -11,7 +11,7 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/chunk_checks.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 // Deflate's maximum compression ratio is 1032.
@@ -148,4 +148,4 @@ std::string read_bytes(hid_t parent, const std::string& path, std::size_t maximu
   return bytes;
 }
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

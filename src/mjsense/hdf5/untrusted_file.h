@@ -14,7 +14,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/hdf5/h5.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 
 inline constexpr int kMaxDepth = 32;               // maximum depth of nested groups
 inline constexpr std::size_t kMaxNames = 100'000;  // maximum number of names in a group or file
@@ -56,4 +56,4 @@ struct ReaderInterrupted : RuntimeError {
                                    const std::function<std::string()>& read,
                                    std::uint64_t timeout_s = 0, int file = -1);
 
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

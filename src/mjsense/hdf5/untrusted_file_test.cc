@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
 
-namespace mjsense::h5 {
+namespace mjsense::hdf5 {
 namespace {
 
 using ::testing::ElementsAre;
@@ -149,4 +149,4 @@ TEST_F(Guard, ReadsRowsOfBytes) {
 }
 
 }  // namespace
-}  // namespace mjsense::h5
+}  // namespace mjsense::hdf5

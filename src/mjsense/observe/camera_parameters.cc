@@ -11,7 +11,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/render/view/camera_model.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 CameraParameterSensor::CameraParameterSensor(std::string name, std::string camera, int width,
                                              int height)
@@ -63,8 +63,8 @@ void CameraParameterSensor::compute(const World& world) {
     extrinsic[4 * i + 3] = -(axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2]);
   }
   if (world.model->cam_sensorsize[2 * id_ + 1] > 0) {
-    const PixelGrid grid = grid_of_camera(world.model, id_, width_, height_);
-    std::ranges::copy(intrinsic_matrix(grid), intrinsic.begin());
+    const render::PixelGrid grid = render::grid_of_camera(world.model, id_, width_, height_);
+    std::ranges::copy(render::intrinsic_matrix(grid), intrinsic.begin());
     return;
   }
   const double fovy = world.model->cam_fovy[id_] * std::numbers::pi / 180.0;
@@ -73,4 +73,4 @@ void CameraParameterSensor::compute(const World& world) {
   std::ranges::copy(k, intrinsic.begin());
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -6,7 +6,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 // A point p_W (m) is projected to pixel (u, v) = (k0 / k2, k1 / k2) with k = intrinsic_cv *
 // extrinsic_cv * [p_W, 1]. u points to the right and v down; (0, 0) is the outer corner of the top
@@ -33,4 +33,4 @@ class CameraParameterSensor final : public Sensor {
   int id_ = -1;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 namespace {
 
 constexpr const char* kWhileAbsent = " While the body is absent: zeros, and NaN in a recording.";
@@ -184,4 +184,4 @@ void EnvStatesSensor::compute(const World& world) {
   std::fill(row.begin() + n, row.end(), 0.0f);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

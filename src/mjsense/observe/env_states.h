@@ -11,7 +11,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/observe/joint_state.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 // The free bodies that can be absent from an episode, and a function that tells whether one of them
 // is present in a world's episode.
@@ -83,4 +83,4 @@ class EnvStatesSensor final : public Sensor {
   std::vector<Articulation> articulations_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

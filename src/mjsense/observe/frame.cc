@@ -5,7 +5,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 Frame Frame::find(const mjModel* model, std::string_view context, std::string_view type,
                   std::string_view name) {
@@ -67,4 +67,4 @@ int object_id(const mjModel* model, mjtObj type, std::string_view context, std::
   return id;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -11,7 +11,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 struct Frame {
   mjtObj type = mjOBJ_UNKNOWN;  // mjOBJ_BODY (the body frame) or mjOBJ_SITE
@@ -53,4 +53,4 @@ inline bool is_descendant_or_self(const mjModel* model, int body, int root) {
 std::vector<std::string> object_names(const mjModel* model, mjtObj type);
 // Id of the named object. Throws KeyError with `context` and the nearest names.
 int object_id(const mjModel* model, mjtObj type, std::string_view context, std::string_view name);
-}  // namespace mjsense
+}  // namespace mjsense::observe

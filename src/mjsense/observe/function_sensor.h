@@ -10,7 +10,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/observe/json_sensor.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 // A row of T values. spec.dtype is set from T. The function must fill the whole row.
 template <class T>
@@ -49,4 +49,4 @@ class JsonFunctionSensor final : public JsonSensor {
   Fn fn_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -13,7 +13,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 namespace {
 
 // End of the run of pixels that are equal to the one at x. Images consist of long runs, so eight
@@ -213,4 +213,4 @@ void erode_cross(const std::uint16_t* in, int width, int height, int stride, std
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -9,7 +9,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 // Streams, for each object and camera
 //   <name>/<object>/<camera>/points      float32 [10, 2]: (column / W, row / H), rounded to 4
@@ -78,4 +78,4 @@ class ImagePointsSensor final : public Sensor {
 // Rows are `stride` elements apart. `out` must not be `in`.
 void erode_cross(const std::uint16_t* in, int width, int height, int stride, std::uint16_t* out);
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/testing/world.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 namespace {
 
 // Body a has geoms 0 and 1, body b has geom 2, which is invisible.
@@ -234,4 +234,4 @@ TEST(ImagePoints, RefusesAnInvalidSegmentation) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::observe {
 
 JointStateSensor::JointStateSensor(std::string name, What what, std::vector<JointGroup> groups)
     : Sensor(std::move(name)), what_(what), groups_(std::move(groups)) {}
@@ -45,4 +45,4 @@ std::string joint_unit(const mjModel* model, const JointGroup& group, std::strin
   return unit;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 // The joints of a move group, as addresses into MuJoCo's vectors. A fixed base is a group without
 // joints.
@@ -41,4 +41,4 @@ class JointStateSensor final : public Sensor {
 // it has no joints. `per`: "/s" for velocities.
 std::string joint_unit(const mjModel* model, const JointGroup& group, std::string_view per = "");
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace mjsense {
+namespace mjsense::observe {
 
 JsonSensor::JsonSensor(std::string name, int str_max_len, std::string description, std::string unit)
     : Sensor(std::move(name)) {
@@ -36,4 +36,4 @@ void JsonSensor::compute(const World& world) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

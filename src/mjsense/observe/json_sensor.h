@@ -10,7 +10,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/core/text/json.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 class JsonSensor : public Sensor {
  public:
@@ -29,4 +29,4 @@ class JsonSensor : public Sensor {
   SensorSpec spec_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace mjsense {
+namespace mjsense::observe {
 
 SensorSpec pose_spec(std::string frame, std::string description) {
   SensorSpec spec;
@@ -52,4 +52,4 @@ void PoseSensor::reset(const World& world) {
   write_pose(Pose{}, fields()[0].data.row<float>(world.id).data());
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -9,7 +9,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 // `robot_base_pose` is X_WB. `tcp_pose` is X_BT, the tool in the robot's base frame, which is at
 // floor level. Each rotation has two quaternions. The first of an episode has w >= 0; each later one
@@ -37,4 +37,4 @@ class PoseSensor final : public Sensor {
 // Spec of a pose's row of 7 values.
 SensorSpec pose_spec(std::string frame, std::string description);
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

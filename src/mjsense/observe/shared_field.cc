@@ -3,7 +3,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 namespace {
 
 Stage stage_after(const Sensor& source) {
@@ -50,4 +50,4 @@ std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::s
   return std::make_shared<SharedField>(std::move(name), camera, std::move(field), flat);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 class SharedField final : public Sensor {
  public:
@@ -49,4 +49,4 @@ class SharedSensor final : public Sensor {
 // A field of a camera as recordings have it: rgb and depth are videos.
 std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::string field);
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

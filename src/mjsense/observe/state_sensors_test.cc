@@ -12,7 +12,7 @@
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/observe/testing/world.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 namespace {
 
 using testing::ElementsAre;
@@ -317,4 +317,4 @@ TEST(CameraParameters, MatrixOfACameraWithASensor) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 void SensorSuite::add(std::shared_ptr<Sensor> sensor, std::string_view owner) {
   const std::string from = owner.empty() ? "the suite" : std::string(owner);
@@ -70,7 +70,7 @@ const std::string& SensorSuite::owner(std::string_view name) const {
   throw_unknown("suite", "sensor", name, names());
 }
 
-void SensorSuite::bind(Simulation& simulation) {
+void SensorSuite::bind(sim::Simulation& simulation) {
   if (simulation_ && simulation_ != &simulation) {
     throw ValueError("a suite belongs to one simulation; this one is bound to another");
   }
@@ -81,7 +81,7 @@ void SensorSuite::bind(Simulation& simulation) {
   }
 }
 
-void SensorSuite::refresh(WorldIds ids) {
+void SensorSuite::refresh(worlds::WorldIds ids) {
   if (!simulation_ || bound_.size() < sensors_.size()) {
     throw ValueError("the suite has sensors that are not bound to a simulation: call bind()");
   }
@@ -105,4 +105,4 @@ const Field& SensorSuite::stream(std::string_view name) const {
   throw_unknown("suite", "stream", name, names);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -15,9 +15,11 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/worlds/world_ids.h"
 
-namespace mjsense {
-
+namespace mjsense::sim {
 class Simulation;
+}  // namespace mjsense::sim
+
+namespace mjsense::observe {
 
 class SensorSuite {
  public:
@@ -40,9 +42,9 @@ class SensorSuite {
 
   // Adds the sensors to the simulation, each once. Sensors that are added later need another call.
   // The simulation must outlive the suite.
-  void bind(Simulation& simulation);
+  void bind(sim::Simulation& simulation);
   // Updates every row in the worlds `ids`.
-  void refresh(WorldIds ids = all_worlds);
+  void refresh(worlds::WorldIds ids = worlds::all_worlds);
   // Fields of all sensors, in order; a sensor can have several. Valid after bind().
   std::vector<const Field*> streams() const;
   const Field& stream(std::string_view name) const;  // throws KeyError with the nearest names
@@ -53,7 +55,7 @@ class SensorSuite {
   std::vector<std::shared_ptr<Sensor>> sensors_;
   std::vector<std::string> owners_;  // name of each sensor's layer: "task 'pick'"
   std::vector<Sensor*> bound_;       // sensors that are in the simulation, a prefix of sensors_
-  Simulation* simulation_ = nullptr;
+  sim::Simulation* simulation_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

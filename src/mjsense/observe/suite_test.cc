@@ -9,7 +9,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 namespace {
 
 class Picture : public Sensor {
@@ -64,9 +64,10 @@ TEST(Suite, SelectKeepsTheGivenSensorsInOrder) {
 }
 
 TEST(Suite, BelongsToOneSimulation) {
-  SceneCfg cfg;
+  scene::SceneCfg cfg;
   cfg.base.xml = "<mujoco><worldbody><body><geom size='.1'/></body></worldbody></mujoco>";
-  Simulation one(std::make_shared<Scene>(cfg), {}), other(std::make_shared<Scene>(cfg), {});
+  sim::Simulation one(std::make_shared<scene::Scene>(cfg), {}),
+      other(std::make_shared<scene::Scene>(cfg), {});
   SensorSuite suite;
   suite.bind(one);
   EXPECT_EQ(error_of([&] { suite.bind(one); }), "");
@@ -106,4 +107,4 @@ TEST(SharedField, SharesMemoryUnderAnotherNameAndShape) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -5,10 +5,10 @@
 // origin, else the exit (never with `cull`). normal() returns the outward normal at a point of the
 // surface.
 
+#include "mjsense/core/simd.h"
 #include "mjsense/rays/packet.h"
-#include "mjsense/rays/simd.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 struct Interval {
@@ -182,4 +182,4 @@ struct Capsule {
 };
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

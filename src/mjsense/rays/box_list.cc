@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 constexpr int kPad = 16, kBlock = KernelWorld::kBlock;
@@ -115,4 +115,4 @@ void BoxList::surround(int block) {
   stale_[block] = 0;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

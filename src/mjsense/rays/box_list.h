@@ -13,7 +13,7 @@
 
 #include "mjsense/rays/kernels.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 class BoxList {
  public:
@@ -62,4 +62,4 @@ class BoxList {
   KernelBoxes all_{}, around_{};     // views of boxes_ and blocks_, whose memory never moves
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

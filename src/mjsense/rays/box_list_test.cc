@@ -12,7 +12,7 @@
 #include "mjsense/rays/testing/kernels.h"
 #include "mjsense/rays/testing/scene.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 using testing::TestModel;
@@ -145,4 +145,4 @@ TEST(BoxList, FewObjectsHaveNoBlocks) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::rays {
 
 template <typename T>
 class ChangeDetector {
@@ -29,4 +29,4 @@ class ChangeDetector {
   std::vector<T> last_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

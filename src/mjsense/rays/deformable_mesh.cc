@@ -6,7 +6,7 @@
 
 #include "mjsense/rays/mesh_geometry.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 SceneHandle moving_scene(RTCDevice device, RTCGeometry geometry) {
   SceneHandle scene(rtcNewScene(device));
@@ -71,4 +71,4 @@ void DeformableMesh::refit() {
     if (part) refit_scene(part.get());
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -8,7 +8,7 @@
 
 #include "mjsense/rays/shared_geometry.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 class DeformableMesh {
  public:
@@ -42,4 +42,4 @@ void refit_scene(RTCScene scene);
 // Centre and half sizes of the bounding box of points [N, 3].
 void box_around(std::span<const float> points, float box[6]);
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

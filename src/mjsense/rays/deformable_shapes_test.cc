@@ -11,7 +11,7 @@
 #include "mjsense/rays/skin_shapes.h"
 #include "mjsense/rays/testing/scene.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 using testing::TestModel;
@@ -168,4 +168,4 @@ TEST(SkinShapes, BendsOnlyRequestedGroupsThatMoved) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -13,9 +13,9 @@
 #include <embree3/rtcore.h>
 #endif
 
-#include "mjsense/rays/simd.h"
+#include "mjsense/core/simd.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 template <int kLanesOfPacket>
@@ -117,4 +117,4 @@ inline void embree_occluded(const int* valid, RTCScene scene, EmbreeRays* rays, 
 #endif
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 // Unit normal of the triangle a b c.
@@ -169,4 +169,4 @@ void FlexShapes::shade(Flex& flex) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

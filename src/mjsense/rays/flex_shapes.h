@@ -12,7 +12,7 @@
 #include "mjsense/rays/deformable_mesh.h"
 #include "mjsense/rays/flex_surface.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 class FlexShapes {
  public:
@@ -64,4 +64,4 @@ class FlexShapes {
   std::vector<Part> parts_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 // The first element of each material among the elements of flex f. MuJoCo draws all of a flex of
@@ -112,4 +112,4 @@ std::vector<FlexPart> flex_parts(const mjModel* m) {
   return parts;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -11,7 +11,7 @@
 
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::rays {
 
 struct FlexSurface {
   int dim = 0;
@@ -50,4 +50,4 @@ struct FlexPart {
 };
 std::vector<FlexPart> flex_parts(const mjModel* model);
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

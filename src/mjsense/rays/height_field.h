@@ -15,13 +15,13 @@
 
 #include <mujoco/mujoco.h>
 
+#include "mjsense/core/simd.h"
 #include "mjsense/rays/analytic_shapes.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/packet.h"
-#include "mjsense/rays/simd.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 struct FieldHit {
@@ -295,4 +295,4 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

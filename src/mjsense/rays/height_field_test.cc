@@ -15,7 +15,7 @@
 #include "mjsense/rays/testing/reference.h"
 #include "mjsense/rays/testing/scene.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 using testing::disagreement;
@@ -275,4 +275,4 @@ TEST_P(HeightFields, RayFromInsideHitsAFlatTop) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -13,7 +13,7 @@
 
 #include "mjsense/rays/triangle_clusters.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 // Horizons of a mesh in clusters. The mesh may occlude the sky on one side of a face and not on
 // another, so each face has a horizon for every octant of directions in the mesh's frame (bit i of
@@ -101,4 +101,4 @@ class Horizons {
   std::unique_ptr<std::atomic<std::uint8_t>[]> sines_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

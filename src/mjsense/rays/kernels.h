@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-namespace mjsense {
+namespace mjsense::rays {
 
 struct LocalPacket;
 struct RayPacket;
@@ -88,4 +88,4 @@ const RayKernels& portable_kernels();
 const RayKernels& avx2_kernels();
 const RayKernels& avx512_kernels();
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

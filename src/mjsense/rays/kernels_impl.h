@@ -9,6 +9,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include "mjsense/core/simd.h"
 #include "mjsense/rays/analytic_shapes.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/height_field.h"
@@ -17,9 +18,8 @@
 #include "mjsense/rays/packet_culling.h"
 #include "mjsense/rays/ray_geom.h"
 #include "mjsense/rays/ray_outputs.h"
-#include "mjsense/rays/simd.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 // A geom's frame for one packet: p_G = base + R^T o, d_G = R^T d.
@@ -314,4 +314,4 @@ constexpr RayKernels kKernels = {&to_world, &cull,     &gather, &gather_from,
                                  &trace,    &occluded, &rows,   &returns};
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -11,7 +11,7 @@
 #include "mjsense/core/content_cache.h"
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 std::array<float, 6> box_around(std::span<const float> vertices) {
@@ -108,4 +108,4 @@ std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertice
   });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -12,7 +12,7 @@
 #include "mjsense/rays/horizons.h"
 #include "mjsense/rays/triangle_clusters.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 struct DeviceRelease {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
@@ -50,4 +50,4 @@ struct MeshGeometry {
 std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
                                                   std::span<const int> faces, bool clusters);
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -9,7 +9,7 @@
 #include "mjsense/core/content_cache.h"
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 const std::vector<float> kVertices{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -99,4 +99,4 @@ TEST(ContentKey, DistinguishesArrays) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -8,7 +8,7 @@
 #include <limits>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::rays {
 
 inline constexpr int kPacket = 16;
 inline constexpr float kNoHit = std::numeric_limits<float>::infinity();
@@ -88,4 +88,4 @@ struct RayFilter {
   std::span<const std::uint8_t> hidden;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

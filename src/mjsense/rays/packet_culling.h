@@ -5,12 +5,12 @@
 // cross-section at each geom's box decides whether the packet can hit it; 4 to 16 geoms are tested
 // at a time.
 
+#include "mjsense/core/simd.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_geom.h"
-#include "mjsense/rays/simd.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 struct Range {
@@ -235,4 +235,4 @@ inline int cull(const KernelWorld& world, const KernelFilter& filter, const RayP
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

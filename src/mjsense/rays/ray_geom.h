@@ -2,7 +2,7 @@
 #pragma once
 // A geom in the form that the kernels use.
 
-namespace mjsense {
+namespace mjsense::rays {
 
 // One geom (or flex) and its shape. X_WG is in double, so that a query's origin is transformed into
 // the geom's frame without loss of precision.
@@ -19,4 +19,4 @@ struct alignas(64) RayGeom {
 inline constexpr int kFlexType = 1000;
 inline constexpr int kSkinType = 1001;  // hit by cameras only
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

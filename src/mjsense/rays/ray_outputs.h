@@ -3,10 +3,10 @@
 // Converts a packet's hits to sensor outputs. Part of the kernels (kernels_impl.h), because as
 // scalar code it took half of a lidar's time.
 
+#include "mjsense/core/simd.h"
 #include "mjsense/rays/packet.h"
-#include "mjsense/rays/simd.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 void rows(const RayPacket& rays, float nearest, float farthest, const int* bodies,
@@ -52,4 +52,4 @@ void returns(const LocalPacket& local, const RayPacket& rays, const HitPacket& h
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

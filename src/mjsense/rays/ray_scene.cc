@@ -8,7 +8,7 @@
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/shared_geometry.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 const RayKernels& kernels_for(Isa isa) {
@@ -140,4 +140,4 @@ Hit RayScene::trace(int world, const RayFilter& filter, const double origin[3],
           hits.u[0], hits.v[0]};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -28,7 +28,7 @@
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_world.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 struct RayKernels;
 struct SharedGeometry;
@@ -108,4 +108,4 @@ class RayScene {
   std::vector<RayWorld> worlds_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

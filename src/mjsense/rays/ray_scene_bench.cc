@@ -17,7 +17,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/rays/ray_scene.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 constexpr double kHalf[] = {0.1, 0.1, 0.2};  // half sizes of a box, m
@@ -149,4 +149,4 @@ BENCHMARK(among_boxes_update)->Arg(100)->Arg(1000)->Arg(10000);
 BENCHMARK(among_boxes_mj_multiRay)->Arg(100)->Arg(1000)->Arg(10000);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -16,7 +16,7 @@
 #include "mjsense/rays/testing/reference.h"
 #include "mjsense/rays/testing/scene.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 using testing::agree;
@@ -594,4 +594,4 @@ TEST(RayScene, AllocatesNothingAfterTheFirstRay) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

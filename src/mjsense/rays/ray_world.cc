@@ -10,7 +10,7 @@
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 constexpr float kEndless = 1e30f;
@@ -216,4 +216,4 @@ void RayWorld::set_world_box(int i) {
   boxes_->set(i, low, high);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

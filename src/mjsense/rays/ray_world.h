@@ -12,7 +12,7 @@
 
 #include "mjsense/rays/ray_geom.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 // Poses of lights and cameras for rendering (mjData's light_xpos ... cam_xmat), world frame.
 struct RayLight {
@@ -85,4 +85,4 @@ class RayWorld {
   std::vector<RayCamera> cameras_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -13,7 +13,7 @@
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/testing/scene.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 constexpr int kGeoms = 40;  // more than two of update()'s blocks, and not a multiple of their size
@@ -95,4 +95,4 @@ TEST(RayWorld, UpdateDetectsEveryChange) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -8,7 +8,7 @@
 #include <array>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 using testing::agree;
@@ -112,4 +112,4 @@ TEST(Reference, HitBehindASurfaceIsRejected) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

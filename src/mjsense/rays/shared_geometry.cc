@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 struct Triangles {
@@ -106,4 +106,4 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -13,7 +13,7 @@
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/mesh_geometry.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 // Local bounding boxes (centre, half sizes) of the shared shapes, by mesh id and height field id.
 struct ShapeBounds {
@@ -49,4 +49,4 @@ struct SharedGeometry {
   }
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::rays {
 
 SkinShapes::SkinShapes(RTCDevice device, const mjModel* m) : model_(m), skins_(m->nskin) {
   for (int i = 0; i < m->nskin; ++i) {
@@ -115,4 +115,4 @@ void SkinShapes::carry(int id) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

@@ -12,7 +12,7 @@
 #include "mjsense/rays/deformable_mesh.h"
 #include "mjsense/rays/ray_geom.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 
 class SkinShapes {
  public:
@@ -54,4 +54,4 @@ class SkinShapes {
   std::vector<Skin> skins_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

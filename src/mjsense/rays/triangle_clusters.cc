@@ -9,7 +9,7 @@
 #include <numeric>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 struct Box {
@@ -170,4 +170,4 @@ Clusters build_clusters(const float* vertices, const int* faces, int num_faces) 
   return Builder(vertices, faces, num_faces).build();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

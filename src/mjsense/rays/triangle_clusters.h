@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::rays {
 
 constexpr int kClusterSize = 16;
 
@@ -35,4 +35,4 @@ struct Clusters {
 // `vertices` [n, 3], `faces` [num_faces, 3]. The result is the same on every machine.
 Clusters build_clusters(const float* vertices, const int* faces, int num_faces);
 
-}  // namespace mjsense
+}  // namespace mjsense::rays

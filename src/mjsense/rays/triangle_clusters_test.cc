@@ -9,7 +9,7 @@
 
 #include "mjsense/core/rng.h"
 
-namespace mjsense {
+namespace mjsense::rays {
 namespace {
 
 // A bumpy sheet of n x n cells.
@@ -85,4 +85,4 @@ TEST(Clusters, OfNoFacesAreEmpty) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rays

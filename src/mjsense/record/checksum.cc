@@ -19,7 +19,7 @@
 #include "mjsense/record/crc32.h"
 #include "mjsense/record/folder.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr std::size_t kPieceBytes = 1 << 15;  // fits in a core's L1 cache
@@ -87,4 +87,4 @@ Seal check_seal(int fd) {
   return 2 * same > fixed ? Seal::kCorrupt : Seal::kNone;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

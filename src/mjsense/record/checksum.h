@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::record {
 
 class Folder;
 
@@ -37,4 +37,4 @@ void seal_file(const Folder& folder, const std::string& name);
 // kNone: the file has no such line, for example because another program wrote it.
 [[nodiscard]] Seal check_seal(int fd);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -11,7 +11,7 @@
 #include <immintrin.h>
 #endif
 
-namespace mjsense {
+namespace mjsense::record {
 namespace detail {
 
 std::uint32_t crc32_portable(std::uint32_t crc, const std::uint8_t* bytes, std::size_t count) {
@@ -205,4 +205,4 @@ std::uint32_t crc32_of(std::uint32_t crc, const void* bytes, std::size_t count) 
   return best(crc, static_cast<const std::uint8_t*>(bytes), count);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Continues `crc`, the CRC-32 of the preceding bytes (0 if there are none), with `count` more
 // bytes.
@@ -21,4 +21,4 @@ std::uint32_t crc32_portable(std::uint32_t crc, const std::uint8_t* bytes, std::
 std::vector<Crc32> crc32_clmul();
 }  // namespace detail
 
-}  // namespace mjsense
+}  // namespace mjsense::record

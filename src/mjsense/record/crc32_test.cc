@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 std::vector<std::uint8_t> some_bytes(std::size_t count) {
@@ -64,4 +64,4 @@ TEST(Crc32, PiecewiseEqualsOneCall) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

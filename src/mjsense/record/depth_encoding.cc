@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::record {
 
 void encode_depth16(std::span<const float> metres, double unit, std::span<std::uint16_t> out) {
   const auto scale = static_cast<float>(1.0 / unit);
@@ -30,4 +30,4 @@ void encode_depth_red_green(std::span<const float> metres, std::span<std::uint8_
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::record {
 
 constexpr std::uint16_t kDepthInvalid = 0;  // no measurement: NaN, 0 or negative
 constexpr std::uint16_t kDepthFar = 65535;  // at or beyond the maximum range, infinity included
@@ -19,4 +19,4 @@ void encode_depth16(std::span<const float> metres, double unit, std::span<std::u
 // byte, green the low byte, and blue is 0.
 void encode_depth_red_green(std::span<const float> metres, std::span<std::uint8_t> rgb);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -6,7 +6,7 @@
 #include "mjsense/record/process.h"
 #include "mjsense/record/spawn.h"
 
-namespace mjsense {
+namespace mjsense::record {
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video, const std::string& output) {
   // Frames already have the pixel format of the codec, so that ffmpeg does not convert them.
@@ -69,4 +69,4 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -20,7 +20,7 @@
 #include "mjsense/core/system/os.h"
 #include "mjsense/record/process.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 namespace {
 
@@ -391,4 +391,4 @@ double EncoderPool::cpu_s() const {
   return impl_->cpu;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

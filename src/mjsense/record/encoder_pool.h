@@ -22,7 +22,7 @@
 #include "mjsense/record/recording.h"
 #include "mjsense/record/recording_plan.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Command line of ffmpeg: it reads raw frames from stdin and writes the file `output` in its
 // working directory.
@@ -67,4 +67,4 @@ class EncoderPool {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

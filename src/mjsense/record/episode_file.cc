@@ -16,7 +16,7 @@
 #include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/molmospaces.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr std::string_view kVideos = "obs/sensor_data/";  // names of videos
@@ -24,52 +24,53 @@ constexpr std::string_view kVideos = "obs/sensor_data/";  // names of videos
 // Every dataset has these attributes; "" means that it has no unit or no frame.
 void describe(hid_t dataset, std::string_view unit, std::string_view frame,
               std::string_view description) {
-  h5::set_attribute(dataset, "unit", unit);
-  h5::set_attribute(dataset, "frame", frame);
-  h5::set_attribute(dataset, "description", description);
+  hdf5::set_attribute(dataset, "unit", unit);
+  hdf5::set_attribute(dataset, "frame", frame);
+  hdf5::set_attribute(dataset, "description", description);
 }
 
 void describe(hid_t dataset, std::string_view sensor, std::string_view kind,
               const SensorSpec& spec) {
   describe(dataset, spec.unit, spec.frame, spec.description);
-  h5::set_attribute(dataset, "spec", spec_json(sensor, kind, spec));
+  hdf5::set_attribute(dataset, "spec", spec_json(sensor, kind, spec));
 }
 
 void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& video) {
   describe(dataset, video.sensor->name(), video.sensor->kind(), video.field->spec);
-  h5::set_attribute(dataset, "width", std::int64_t{video.width});
-  h5::set_attribute(dataset, "height", std::int64_t{video.height});
-  h5::set_attribute(dataset, "fps", cfg.fps.str());
+  hdf5::set_attribute(dataset, "width", std::int64_t{video.width});
+  hdf5::set_attribute(dataset, "height", std::int64_t{video.height});
+  hdf5::set_attribute(dataset, "fps", cfg.fps.str());
   switch (video.kind) {
     case VideoKind::kRgb:
-      h5::set_attribute(dataset, "encoding", "rgb");
-      h5::set_attribute(dataset, "codec", video.codec());
+      hdf5::set_attribute(dataset, "encoding", "rgb");
+      hdf5::set_attribute(dataset, "codec", video.codec());
       break;
     case VideoKind::kDepth16:
-      h5::set_attribute(dataset, "encoding", "depth16");
-      h5::set_attribute(dataset, "codec", video.codec());
-      h5::set_attribute(dataset, "metres_per_unit", cfg.video.depth_unit);
-      h5::set_attribute(dataset, "invalid_value", std::int64_t{kDepthInvalid});
-      h5::set_attribute(dataset, "far_value", std::int64_t{kDepthFar});
+      hdf5::set_attribute(dataset, "encoding", "depth16");
+      hdf5::set_attribute(dataset, "codec", video.codec());
+      hdf5::set_attribute(dataset, "metres_per_unit", cfg.video.depth_unit);
+      hdf5::set_attribute(dataset, "invalid_value", std::int64_t{kDepthInvalid});
+      hdf5::set_attribute(dataset, "far_value", std::int64_t{kDepthFar});
       break;
     case VideoKind::kDepthRedGreen:
-      h5::set_attribute(dataset, "encoding", "molmospaces_red_green");
-      h5::set_attribute(dataset, "codec", video.codec());
+      hdf5::set_attribute(dataset, "encoding", "molmospaces_red_green");
+      hdf5::set_attribute(dataset, "codec", video.codec());
       break;
   }
 }
 
 void add_file_name(hid_t trajectory, const RecordingCfg& cfg, const VideoStream& video) {
   const hsize_t size = kFileNameBytes;
-  const h5::Id space(H5Screate_simple(1, &size, nullptr), H5Sclose, "HDF5 space");
+  const hdf5::Id space(H5Screate_simple(1, &size, nullptr), H5Sclose, "HDF5 space");
   const std::string path = std::string(kVideos) + video.key;
-  const h5::Id dataset(H5Dcreate2(trajectory, path.c_str(), H5T_STD_U8LE, space,
-                                  h5::link_properties(), h5::dataset_properties(), H5P_DEFAULT),
-                       H5Dclose, path);
+  const hdf5::Id dataset(
+      H5Dcreate2(trajectory, path.c_str(), H5T_STD_U8LE, space, hdf5::link_properties(),
+                 hdf5::dataset_properties(), H5P_DEFAULT),
+      H5Dclose, path);
   char name[kFileNameBytes] = {};
   const std::string file = video.stem + video.extension;
   std::memcpy(name, file.data(), std::min(file.size(), kFileNameBytes));
-  h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), path);
+  hdf5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), path);
   describe_video(dataset, cfg, video);
 }
 
@@ -98,19 +99,19 @@ EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string
                          const RecordingCfg& cfg, const RecordingPlan& plan,
                          const EpisodeMeta& meta)
     : folder_(std::move(folder)), name_(name), gzip_(cfg.gzip), plan_(plan) {
-  const h5::H5Lock lock;
-  file_ = h5::create_file(folder_->fd_path(name), folder_->display_path(name));
-  h5::set_attribute(file_, "format", "mjsense 1");
-  h5::set_attribute(file_, "recording", plan.fingerprint);
-  trajectory_ = h5::create_group(file_, "traj_0");
-  h5::set_attribute(trajectory_, "episode", meta.episode);
-  h5::set_attribute(trajectory_, "seed", meta.seed);
-  for (const char* group : standard_groups()) h5::create_group(trajectory_, group);
+  const hdf5::H5Lock lock;
+  file_ = hdf5::create_file(folder_->fd_path(name), folder_->display_path(name));
+  hdf5::set_attribute(file_, "format", "mjsense 1");
+  hdf5::set_attribute(file_, "recording", plan.fingerprint);
+  trajectory_ = hdf5::create_group(file_, "traj_0");
+  hdf5::set_attribute(trajectory_, "episode", meta.episode);
+  hdf5::set_attribute(trajectory_, "seed", meta.seed);
+  for (const char* group : standard_groups()) hdf5::create_group(trajectory_, group);
   datasets_.reserve(plan.arrays.size() + kOwnStreams);
   for (const ArrayStream& stream : plan.arrays) {
     add_dataset(stream.path, stream.spec.dtype, stream.spec.shape, stream.chunk_rows);
     describe(datasets_.back().id, stream.sensor->name(), stream.kind(), stream.spec);
-    if (stream.spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
+    if (stream.spec.is_dict) hdf5::set_attribute(datasets_.back().id, "encoding", "json");
   }
   for (int i = 0; i < kOwnStreams; ++i) {
     add_dataset(own_path(i), own_dtype(i), Shape{}, chunk_rows(dtype_size(own_dtype(i))));
@@ -120,7 +121,7 @@ EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string
 }
 
 EpisodeFile::~EpisodeFile() {
-  const h5::H5Lock lock;
+  const hdf5::H5Lock lock;
   datasets_.clear();
   trajectory_.reset();
   file_.reset();
@@ -142,17 +143,17 @@ void EpisodeFile::add_dataset(std::string_view path, DType dtype, const Shape& r
   }
 
   const std::string name(path);
-  const h5::Id space(H5Screate_simple(dataset.rank, dataset.dims, maximum), H5Sclose, name);
-  const h5::Id properties = h5::dataset_properties();
-  h5::check(H5Pset_chunk(properties, dataset.rank, chunk), name);
-  if (gzip_ > 0) h5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), name);
+  const hdf5::Id space(H5Screate_simple(dataset.rank, dataset.dims, maximum), H5Sclose, name);
+  const hdf5::Id properties = hdf5::dataset_properties();
+  hdf5::check(H5Pset_chunk(properties, dataset.rank, chunk), name);
+  if (gzip_ > 0) hdf5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), name);
 
   const auto slash = name.rfind('/');
-  if (slash != std::string::npos) h5::create_group(trajectory_, name.substr(0, slash));
-  dataset.id = h5::Id(H5Dcreate2(trajectory_, name.c_str(), h5::memory_type(dtype), space,
-                                 h5::link_properties(), properties, H5P_DEFAULT),
-                      H5Dclose, name);
-  dataset.crc = h5::create_text_attribute(dataset.id, kChecksumAttribute);
+  if (slash != std::string::npos) hdf5::create_group(trajectory_, name.substr(0, slash));
+  dataset.id = hdf5::Id(H5Dcreate2(trajectory_, name.c_str(), hdf5::memory_type(dtype), space,
+                                   hdf5::link_properties(), properties, H5P_DEFAULT),
+                        H5Dclose, name);
+  dataset.crc = hdf5::create_text_attribute(dataset.id, kChecksumAttribute);
   datasets_.push_back(std::move(dataset));
 }
 
@@ -184,73 +185,73 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   if (!chunk.empty())
     datasets_[index].sum.add(chunk.data(),
                              static_cast<std::size_t>(rows) * datasets_[index].row_bytes);
-  const h5::H5Lock lock;
+  const hdf5::H5Lock lock;
   Dataset& dataset = datasets_[stream];
   hsize_t offset[Shape::kMaxRank + 1] = {dataset.dims[0]};
   dataset.dims[0] += static_cast<hsize_t>(rows);
   const std::string what = fmt::format("cannot write '{}'", folder_->display_path(name_));
-  h5::check(H5Dset_extent(dataset.id, dataset.dims), what);
+  hdf5::check(H5Dset_extent(dataset.id, dataset.dims), what);
   if (chunk.empty()) return;
-  h5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
+  hdf5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
 }
 
 void EpisodeFile::write_scene(std::string_view obs_scene, std::string_view outcome,
                               std::int64_t steps) {
   Checksum sum;
   sum.add(obs_scene.data(), obs_scene.size());
-  const h5::H5Lock lock;
-  const h5::Id dataset = h5::write_text(trajectory_, "obs_scene", obs_scene);
+  const hdf5::H5Lock lock;
+  const hdf5::Id dataset = hdf5::write_text(trajectory_, "obs_scene", obs_scene);
   describe(dataset, "", "", "The episode's task, instruction, objects and cameras as JSON text.");
-  h5::set_attribute(dataset, kChecksumAttribute, sum.text());
-  h5::set_attribute(trajectory_, "outcome", outcome);
-  h5::set_attribute(trajectory_, "steps", steps);
+  hdf5::set_attribute(dataset, kChecksumAttribute, sum.text());
+  hdf5::set_attribute(trajectory_, "outcome", outcome);
+  hdf5::set_attribute(trajectory_, "steps", steps);
 }
 
 void EpisodeFile::write_array(const EpisodeArray& array) {
   Checksum sum;
   sum.add(array.values.data(), array.values.size());
   const std::string path = fmt::format("{}{}", kReplayGroup, array.path);
-  const h5::H5Lock lock;
+  const hdf5::H5Lock lock;
   std::vector<hsize_t> dims(array.shape.dims().begin(), array.shape.dims().end());
-  const h5::Id space(H5Screate_simple(array.shape.rank(), dims.data(), nullptr), H5Sclose, path);
-  const h5::Id properties = h5::dataset_properties();
+  const hdf5::Id space(H5Screate_simple(array.shape.rank(), dims.data(), nullptr), H5Sclose, path);
+  const hdf5::Id properties = hdf5::dataset_properties();
   if (gzip_ > 0) {
-    h5::check(H5Pset_chunk(properties, array.shape.rank(), dims.data()), path);
-    h5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), path);
+    hdf5::check(H5Pset_chunk(properties, array.shape.rank(), dims.data()), path);
+    hdf5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), path);
   }
-  const h5::Id dataset(H5Dcreate2(trajectory_, path.c_str(), h5::memory_type(array.dtype), space,
-                                  h5::link_properties(), properties, H5P_DEFAULT),
-                       H5Dclose, path);
-  h5::check(H5Dwrite(dataset, h5::memory_type(array.dtype), H5S_ALL, H5S_ALL, H5P_DEFAULT,
-                     array.values.data()),
-            path);
+  const hdf5::Id dataset(H5Dcreate2(trajectory_, path.c_str(), hdf5::memory_type(array.dtype),
+                                    space, hdf5::link_properties(), properties, H5P_DEFAULT),
+                         H5Dclose, path);
+  hdf5::check(H5Dwrite(dataset, hdf5::memory_type(array.dtype), H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                       array.values.data()),
+              path);
   describe(dataset, array.unit, array.frame, array.description);
-  h5::set_attribute(dataset, kChecksumAttribute, sum.text());
+  hdf5::set_attribute(dataset, kChecksumAttribute, sum.text());
 }
 
 void EpisodeFile::carry_over(const EpisodeSource& source) {
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(source.file);
-  const h5::Id from = h5::open_group(file, source.trajectory);
-  h5::each_dataset(from, [&](const std::string& path) {
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(source.file);
+  const hdf5::Id from = hdf5::open_group(file, source.trajectory);
+  hdf5::each_dataset(from, [&](const std::string& path) {
     const auto is_inside = [&](std::string_view group) {
       return path.starts_with(group) && (path.size() == group.size() || path[group.size()] == '/');
     };
     if (path == "obs_scene" || std::ranges::any_of(source.skip, is_inside)) return;
-    if (h5::exists(trajectory_, path)) return;
-    const h5::Id dataset = h5::open_dataset(from, path);
+    if (hdf5::exists(trajectory_, path)) return;
+    const hdf5::Id dataset = hdf5::open_dataset(from, path);
     // The HDF5 library copies chunks that cannot be unpacked, and frees them twice.
-    h5::check_storage(dataset, path);
-    h5::check_chunks(dataset, path);
-    h5::check(
-        H5Ocopy(from, path.c_str(), trajectory_, path.c_str(), H5P_DEFAULT, h5::link_properties()),
-        fmt::format("cannot copy '{}' of '{}'", path, source.file.string()));
+    hdf5::check_storage(dataset, path);
+    hdf5::check_chunks(dataset, path);
+    hdf5::check(H5Ocopy(from, path.c_str(), trajectory_, path.c_str(), H5P_DEFAULT,
+                        hdf5::link_properties()),
+                fmt::format("cannot copy '{}' of '{}'", path, source.file.string()));
     if (path.starts_with(kVideos)) carry_video(source.file.parent_path(), path);
   });
 }
 
 void EpisodeFile::carry_video(const std::filesystem::path& folder, const std::string& path) {
-  std::string name = h5::read_bytes(trajectory_, path, kFileNameBytes);
+  std::string name = hdf5::read_bytes(trajectory_, path, kFileNameBytes);
   name.resize(name.find_last_not_of('\0') + 1);
   const Fd file = open_plain(folder, name);
   std::string bytes(static_cast<std::size_t>(size_of(file)), '\0');
@@ -258,8 +259,8 @@ void EpisodeFile::carry_video(const std::filesystem::path& folder, const std::st
       .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   Checksum sum;
   sum.add(bytes.data(), bytes.size());
-  const h5::Id dataset = h5::open_dataset(trajectory_, path);
-  const std::string stated = h5::text_attribute(dataset, kChecksumAttribute);
+  const hdf5::Id dataset = hdf5::open_dataset(trajectory_, path);
+  const std::string stated = hdf5::text_attribute(dataset, kChecksumAttribute);
   if (!stated.empty() && stated != sum.text())
     throw RuntimeError(
         fmt::format("'{}' is damaged: its checksum is wrong", (folder / name).string()));
@@ -268,18 +269,18 @@ void EpisodeFile::carry_video(const std::filesystem::path& folder, const std::st
   folder_->write(copy, bytes);
   char padded[kFileNameBytes] = {};
   std::memcpy(padded, copy.data(), std::min(copy.size(), kFileNameBytes));
-  h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded), path);
+  hdf5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded), path);
 }
 
 void EpisodeFile::finish(std::span<const VideoSum> videos) {
-  const h5::H5Lock lock;
+  const hdf5::H5Lock lock;
   for (const Dataset& dataset : datasets_)
-    h5::write_text_attribute(dataset.crc, dataset.sum.text());
+    hdf5::write_text_attribute(dataset.crc, dataset.sum.text());
   for (std::size_t v = 0; v < videos.size(); ++v) {
-    const h5::Id dataset =
-        h5::open_dataset(trajectory_, std::string(kVideos) + plan_.videos[v].key);
-    h5::set_attribute(dataset, kChecksumAttribute, videos[v].crc);
-    h5::set_attribute(dataset, kBytesAttribute, videos[v].bytes);
+    const hdf5::Id dataset =
+        hdf5::open_dataset(trajectory_, std::string(kVideos) + plan_.videos[v].key);
+    hdf5::set_attribute(dataset, kChecksumAttribute, videos[v].crc);
+    hdf5::set_attribute(dataset, kBytesAttribute, videos[v].bytes);
   }
   datasets_.clear();
   trajectory_.reset();
@@ -287,4 +288,4 @@ void EpisodeFile::finish(std::span<const VideoSum> videos) {
   seal_file(*folder_, name_);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -15,7 +15,7 @@
 #include "mjsense/record/folder.h"
 #include "mjsense/record/recording_plan.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Streams that the recorder adds to those of the suite.
 enum OwnStream { kRewards, kSuccess, kFail, kTerminated, kTruncated, kOwnStreams };
@@ -52,7 +52,7 @@ class EpisodeFile {
 
  private:
   struct Dataset {
-    h5::Id id, crc;  // the dataset and its checksum attribute
+    hdf5::Id id, crc;  // the dataset and its checksum attribute
     int rank = 0;
     std::size_t row_bytes = 0;
     Checksum sum;  // of all rows
@@ -69,9 +69,9 @@ class EpisodeFile {
   std::string name_;
   int gzip_;
   const RecordingPlan& plan_;
-  h5::Id file_, trajectory_;
+  hdf5::Id file_, trajectory_;
   std::vector<Dataset> datasets_;
   std::vector<std::uint8_t> texts_, packed_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

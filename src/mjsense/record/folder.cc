@@ -21,7 +21,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr int kFolderFlags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
@@ -186,4 +186,4 @@ bool Folder::remove(const std::string& name, const Folder& inner) const {
   return contains(name, inner) && unlinkat(fd(), name.c_str(), AT_REMOVEDIR) == 0;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -12,7 +12,7 @@
 
 #include "mjsense/core/files/file_descriptor.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 class Folder {
  public:
@@ -69,4 +69,4 @@ class Folder {
 
 [[noreturn]] void throw_file(std::string_view action, const std::filesystem::path& path, int error);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

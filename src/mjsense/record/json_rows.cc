@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/text/json.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr std::string_view kGiven = "given/";
@@ -156,4 +156,4 @@ void JsonRows::write(const std::uint8_t* row, std::span<std::uint8_t> text) cons
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -11,7 +11,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Writes the fields of a sensor as the members of one JSON object. The name of a field is a path:
 // "arm" is a member of the object, "gripper/held" is a member of its object "gripper". A scalar
@@ -45,4 +45,4 @@ class JsonRows {
   std::size_t row_bytes_ = 0;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

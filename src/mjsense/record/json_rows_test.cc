@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/testing/tools.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using testing::error_of;
@@ -100,4 +100,4 @@ TEST(JsonRows, ArraysCannotContainFields) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -7,7 +7,7 @@
 
 #include "mjsense/record/checksum.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 std::map<std::string, std::string> model_checksums(const mjModel& model) {
   std::map<std::string, Checksum> sums;
@@ -47,4 +47,4 @@ std::map<std::string, std::string> model_checksums(const mjModel& model) {
   return texts;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

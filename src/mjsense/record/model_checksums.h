@@ -8,10 +8,10 @@
 #include <map>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::record {
 
 // The key of an array is its name up to the first '_'. "size", "option", "statistic" and "visual"
 // are the structs of mjModel. File paths are excluded, so that a model may be moved.
 [[nodiscard]] std::map<std::string, std::string> model_checksums(const mjModel& model);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

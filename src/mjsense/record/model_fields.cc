@@ -7,7 +7,7 @@
 #include <limits>
 #include <type_traits>
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 template <class T>
@@ -54,4 +54,4 @@ std::vector<EpisodeArray> differing_fields(const mjModel& world, const mjModel& 
   return out;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -9,11 +9,11 @@
 
 #include "mjsense/record/recording.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Copies of the arrays of `world` that differ from those of `scene`, with mjModel's names and
 // shapes. Numbers of floating point that are equal in both are NaN, so that a large array with few
 // changes compresses well. Both models have the same sizes.
 std::vector<EpisodeArray> differing_fields(const mjModel& world, const mjModel& scene);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -7,7 +7,7 @@
 
 #include "mjsense/record/json_rows.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr int kTextBytes = 2000;
@@ -85,4 +85,4 @@ std::optional<SensorSpec> text_of(const Sensor& sensor) {
   return spec;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

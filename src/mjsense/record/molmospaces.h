@@ -10,7 +10,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // "qpos" -> "obs/agent/qpos", "feet/force" -> "obs/extra/feet/force" ...
 std::string path_of(std::string_view stream);
@@ -28,4 +28,4 @@ std::span<const char* const> standard_groups();
 // text for MolmoSpaces' readers, and each field at its numbers_path().
 std::optional<SensorSpec> text_of(const Sensor& sensor);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

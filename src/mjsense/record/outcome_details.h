@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-namespace mjsense {
+namespace mjsense::record {
 
 // The outcome without the details of the episode, so that equal reasons are counted together: the
 // planners append them in parentheses, "the policy gave up: found no plan (256 grasps: 200 out of
@@ -21,4 +21,4 @@ inline std::string_view outcome_without_details(std::string_view outcome) {
   return outcome;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

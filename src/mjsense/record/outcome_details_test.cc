@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 TEST(Outcome, DetailsOfPlannersAreLeftOut) {
@@ -20,4 +20,4 @@ TEST(Outcome, OtherParenthesesAreKept) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

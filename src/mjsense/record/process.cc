@@ -19,7 +19,7 @@
 #include "mjsense/core/system/os.h"
 #include "mjsense/record/spawn.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 std::string last_words(int log) {
@@ -171,4 +171,4 @@ std::string ffmpeg_program(const std::string& wanted) {
   return from_environment && *from_environment ? from_environment : "ffmpeg";
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

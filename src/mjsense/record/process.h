@@ -14,7 +14,7 @@
 
 #include "mjsense/core/files/file_descriptor.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 struct Child {
   pid_t pid = -1;
@@ -59,4 +59,4 @@ std::string run_process(const std::vector<std::string>& argv, const ProcessLimit
 // ffmpeg program: `wanted`, otherwise $MJSENSE_FFMPEG, otherwise "ffmpeg".
 std::string ffmpeg_program(const std::string& wanted);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -13,7 +13,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using ::testing::HasSubstr;
@@ -118,4 +118,4 @@ TEST(Process, SignalsToTheParentsGroupReachNoChild) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

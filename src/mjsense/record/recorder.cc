@@ -11,7 +11,7 @@
 #include "mjsense/core/system/process_state.h"
 #include "mjsense/record/recorder_impl.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 void validate(const RecordingCfg& cfg) {
@@ -407,4 +407,4 @@ std::size_t Recorder::bytes_per_world() const {
   return bytes;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -31,7 +31,7 @@
 
 #include "mjsense/record/recording.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Time and bytes that a recording has used so far.
 struct RecordStats {
@@ -104,4 +104,4 @@ class Recorder {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -9,7 +9,7 @@
 #include "mjsense/record/recorder_impl.h"
 #include "mjsense/record/yuv.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 template <class T>
@@ -145,4 +145,4 @@ void Recorder::Impl::hand_over(const EpisodePtr& episode, int s) {
   post(std::move(job));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

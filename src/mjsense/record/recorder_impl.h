@@ -21,7 +21,7 @@
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/recording_plan.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 struct Recorder::Impl {
   using Clock = std::chrono::steady_clock;
@@ -140,4 +140,4 @@ struct Recorder::Impl {
   std::vector<EpisodeFile::VideoSum> check_videos(const Episode& episode) const;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

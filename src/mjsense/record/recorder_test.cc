@@ -21,7 +21,7 @@
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/recording_tools.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using namespace testing;
@@ -34,9 +34,9 @@ FakeSuiteCfg without_video(int worlds) { return {worlds, 16, 12, false, false}; 
 
 TEST(Recorder, BytesDoNotDependOnWorldsOrOrder) {
   TempDir one, three, discards;
-  const std::string bytes = record(one.path, 5, {.worlds = 1});
-  EXPECT_EQ(bytes, record(three.path, 5, {.worlds = 3}));
-  EXPECT_NE(bytes, record(discards.path, 5, {.worlds = 3, .discard_every = 2}));
+  const std::string bytes = write_recording(one.path, 5, {.worlds = 1});
+  EXPECT_EQ(bytes, write_recording(three.path, 5, {.worlds = 3}));
+  EXPECT_NE(bytes, write_recording(discards.path, 5, {.worlds = 3, .discard_every = 2}));
 }
 
 TEST(Recorder, StoresTheArchiveAndTheArraysOfAnEpisode) {
@@ -64,10 +64,10 @@ TEST(Recorder, StoresTheArchiveAndTheArraysOfAnEpisode) {
                             {2, 3},
                             {bytes.begin(), bytes.end()}}});
   recorder.complete();
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(out.path / "house_0/trajectories_batch_1_of_1.h5");
-  const h5::Id array = h5::open_dataset(file, "traj_0/replay/model/geom_size");
-  EXPECT_EQ(h5::dims(array), (std::vector<hsize_t>{2, 3}));
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(out.path / "house_0/trajectories_batch_1_of_1.h5");
+  const hdf5::Id array = hdf5::open_dataset(file, "traj_0/replay/model/geom_size");
+  EXPECT_EQ(hdf5::dims(array), (std::vector<hsize_t>{2, 3}));
   std::vector<double> read(6);
   ASSERT_GE(H5Dread(array, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()), 0);
   EXPECT_EQ(read, sizes);
@@ -75,7 +75,7 @@ TEST(Recorder, StoresTheArchiveAndTheArraysOfAnEpisode) {
 
 TEST(Recorder, WorldsMayAppendFromDifferentThreads) {
   TempDir one, four;
-  const std::string bytes = record(one.path, 4, {.worlds = 1, .steps = 40});
+  const std::string bytes = write_recording(one.path, 4, {.worlds = 1, .steps = 40});
   {
     FakeSuite suite(without_video(4));
     Recorder recorder(fake_recording(four.path, suite, 4, 4));
@@ -100,39 +100,39 @@ TEST(Recorder, WorldsMayAppendFromDifferentThreads) {
 
 TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
   TempDir whole, broken;
-  const std::string bytes = record(whole.path, 6, {.worlds = 2, .discard_every = 3}, true);
+  const std::string bytes = write_recording(whole.path, 6, {.worlds = 2, .discard_every = 3}, true);
   for (const int count : {1, 3}) {  // episodes that are added before the recorder is destroyed
-    record(broken.path, 6, {.worlds = 2, .discard_every = 3, .stop_after = count}, true,
-           [&](RecordingCfg& c) { c.resume = true; });
+    write_recording(broken.path, 6, {.worlds = 2, .discard_every = 3, .stop_after = count}, true,
+                    [&](RecordingCfg& c) { c.resume = true; });
     EXPECT_TRUE(fs::exists(broken.path / "house_0/.recording"));
   }
-  EXPECT_EQ(bytes, record(broken.path, 6, {.worlds = 3, .discard_every = 3}, true,
-                          [&](RecordingCfg& c) { c.resume = true; }));
+  EXPECT_EQ(bytes, write_recording(broken.path, 6, {.worlds = 3, .discard_every = 3}, true,
+                                   [&](RecordingCfg& c) { c.resume = true; }));
   EXPECT_EQ(tree(whole.path), tree(broken.path));
   // Resuming a complete recording changes nothing and records nothing.
-  EXPECT_EQ(bytes,
-            record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
+  EXPECT_EQ(bytes, write_recording(broken.path, 6, {.worlds = 2}, true,
+                                   [&](RecordingCfg& c) { c.resume = true; }));
 }
 
 // The contents of each episode by its number: attributes, datasets by their checksums, and videos.
 std::map<std::int64_t, std::string> episodes_of(const fs::path& house) {
   std::map<std::int64_t, std::string> episodes;
-  const h5::H5Lock lock;
+  const hdf5::H5Lock lock;
   for (const std::string& name : tree(house)) {
     if (!name.ends_with(".h5")) continue;
-    const h5::Id file = h5::open_file(house / name);
-    for (const std::string& trajectory : h5::children(file)) {
-      const h5::Id group = h5::open_group(file, trajectory);
-      std::string text = h5::text_attribute(group, "outcome");
-      h5::each_dataset(group, [&](const std::string& path) {
-        const h5::Id dataset = h5::open_dataset(group, path);
-        text += fmt::format("\n{} {}", path, h5::text_attribute(dataset, kChecksumAttribute));
+    const hdf5::Id file = hdf5::open_file(house / name);
+    for (const std::string& trajectory : hdf5::children(file)) {
+      const hdf5::Id group = hdf5::open_group(file, trajectory);
+      std::string text = hdf5::text_attribute(group, "outcome");
+      hdf5::each_dataset(group, [&](const std::string& path) {
+        const hdf5::Id dataset = hdf5::open_dataset(group, path);
+        text += fmt::format("\n{} {}", path, hdf5::text_attribute(dataset, kChecksumAttribute));
         if (!path.starts_with("obs/sensor_data/")) return;
-        std::string video = h5::read_bytes(group, path, kFileNameBytes);
+        std::string video = hdf5::read_bytes(group, path, kFileNameBytes);
         video.resize(video.find('\0'));
         text += " " + video + " " + read_file(house / video);
       });
-      const std::int64_t number = h5::int_attribute(group, "episode", -1);
+      const std::int64_t number = hdf5::int_attribute(group, "episode", -1);
       EXPECT_TRUE(episodes.emplace(number, text).second) << number;
     }
   }
@@ -142,19 +142,19 @@ std::map<std::int64_t, std::string> episodes_of(const fs::path& house) {
 // Recordings of attempts [a, b) have together the episodes of a recording of all attempts.
 TEST(Recorder, RangesOfAttemptsHaveTheEpisodesOfTheWhole) {
   TempDir whole, parts;
-  record(whole.path, 6, {.worlds = 2}, true);
+  write_recording(whole.path, 6, {.worlds = 2}, true);
   std::map<std::int64_t, std::string> together;
   struct Range {
     int first, count;
   };
   for (const Range range : {Range{0, 4}, Range{4, 2}}) {
     const fs::path out = parts.path / fmt::format("{}", range.first);
-    record(out, range.count, {.worlds = 1}, true, [&](RecordingCfg& c) {
+    write_recording(out, range.count, {.worlds = 1}, true, [&](RecordingCfg& c) {
       c.first_attempt = range.first;
       c.num_attempts = range.count;
     });
     together.merge(episodes_of(out / "house_0"));
-    EXPECT_TRUE(verify(out).ok()) << verify(out).text();
+    EXPECT_TRUE(replay::verify(out).ok()) << replay::verify(out).text();
   }
   EXPECT_EQ(together.size(), 6u);
   EXPECT_EQ(together, episodes_of(whole.path / "house_0"));
@@ -174,72 +174,74 @@ TEST(Recorder, AppendContinuesACompletedRecording) {
     c.settings = R"({"seed":8})";
   };
   TempDir whole, dir;
-  record(whole.path, 9, {.discard_every = 3}, true);
-  record(dir.path, 4, {.discard_every = 3}, true, append);  // there is nothing to continue yet
-  EXPECT_THAT(error_of([&] { record(dir.path, 2, {}, true); }),
+  write_recording(whole.path, 9, {.discard_every = 3}, true);
+  write_recording(dir.path, 4, {.discard_every = 3}, true,
+                  append);  // there is nothing to continue yet
+  EXPECT_THAT(error_of([&] { write_recording(dir.path, 2, {}, true); }),
               HasSubstr("already contains recorded trajectories; resume it, append to it"));
-  EXPECT_THAT(error_of([&] { record(dir.path, 2, {}, true, other); }),
+  EXPECT_THAT(error_of([&] { write_recording(dir.path, 2, {}, true, other); }),
               HasSubstr("different recording: 'settings/seed' was 7 and is now 8"));
-  record(dir.path, 2, {.discard_every = 3}, true, append);
-  record(dir.path, 3, {.discard_every = 3, .stop_after = 2}, true, append);
-  EXPECT_THAT(error_of([&] { record(dir.path, 3, {}, true, append); }),
+  write_recording(dir.path, 2, {.discard_every = 3}, true, append);
+  write_recording(dir.path, 3, {.discard_every = 3, .stop_after = 2}, true, append);
+  EXPECT_THAT(error_of([&] { write_recording(dir.path, 3, {}, true, append); }),
               HasSubstr("contains an unfinished recording; resume it"));
-  record(dir.path, 3, {.discard_every = 3}, true, resume);
+  write_recording(dir.path, 3, {.discard_every = 3}, true, resume);
   EXPECT_EQ(episodes_of(dir.path / "house_0"), episodes_of(whole.path / "house_0"));
   for (const char* name : {"1_of_1", "2_of_2", "3_of_3"}) {
     EXPECT_TRUE(fs::exists(dir.path / fmt::format("house_0/trajectories_batch_{}.h5", name)));
   }
-  EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
+  EXPECT_TRUE(replay::verify(dir.path).ok()) << replay::verify(dir.path).text();
   // A complete recording can be resumed, which changes nothing.
   const std::vector<std::string> files = tree(dir.path);
-  record(dir.path, 3, {}, true, resume);
+  write_recording(dir.path, 3, {}, true, resume);
   EXPECT_EQ(tree(dir.path), files);
 }
 
 // `repair` publishes the finished episodes of an interrupted recording that continues another one.
 TEST(Recorder, AppendedEpisodesCanBeRepaired) {
   TempDir whole, dir;
-  record(whole.path, 4, {.worlds = 1}, true);
-  record(dir.path, 2, {.worlds = 1}, true);
-  record(dir.path, 3, {.worlds = 1, .stop_after = 2}, true, [](auto& c) { c.append = true; });
-  EXPECT_THAT(repair(dir.path).text(), HasSubstr("published 2 finished episodes"));
+  write_recording(whole.path, 4, {.worlds = 1}, true);
+  write_recording(dir.path, 2, {.worlds = 1}, true);
+  write_recording(dir.path, 3, {.worlds = 1, .stop_after = 2}, true,
+                  [](auto& c) { c.append = true; });
+  EXPECT_THAT(replay::repair(dir.path).text(), HasSubstr("published 2 finished episodes"));
   EXPECT_EQ(episodes_of(dir.path / "house_0"), episodes_of(whole.path / "house_0"));
 }
 
 TEST(Recorder, OverwriteRemovesTheRecordingOnly) {
   TempDir fresh, dir;
   const auto overwrite = [](RecordingCfg& c) { c.overwrite = true; };
-  const std::string bytes = record(fresh.path, 2, {}, true);
+  const std::string bytes = write_recording(fresh.path, 2, {}, true);
   const fs::path notes = dir.path / "house_0/notes.txt";
-  record(dir.path, 5, {}, true);
+  write_recording(dir.path, 5, {}, true);
   std::ofstream(notes) << "mine";
-  record(dir.path, 4, {.stop_after = 1}, true, overwrite);
-  record(dir.path, 2, {}, true, overwrite);
+  write_recording(dir.path, 4, {.stop_after = 1}, true, overwrite);
+  write_recording(dir.path, 2, {}, true, overwrite);
   EXPECT_EQ(read_file(notes), "mine");
   fs::remove(notes);
   std::string again;
   for (const std::string& name : tree(dir.path)) again += read_file(dir.path / name);
   EXPECT_EQ(again, bytes);
   const auto both = [](RecordingCfg& c) { c.overwrite = c.resume = true; };
-  EXPECT_THAT(error_of([&] { record(dir.path, 2, {}, true, both); }),
+  EXPECT_THAT(error_of([&] { write_recording(dir.path, 2, {}, true, both); }),
               HasSubstr("choose one of resume, append and overwrite"));
 }
 
 // A reader knows what a dataset contains without the program that wrote it.
 TEST(Recorder, EveryDatasetHasUnitFrameAndDescription) {
   TempDir dir;
-  record(dir.path, 1, {.worlds = 1}, true);
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
-  const h5::Id trajectory = h5::open_group(file, "traj_0");
-  EXPECT_EQ(h5::int_attribute(trajectory, "steps", -1), length_of(0, 6) - 1);
-  h5::each_dataset(trajectory, [&](const std::string& path) {
-    const h5::Id dataset = h5::open_dataset(trajectory, path);
+  write_recording(dir.path, 1, {.worlds = 1}, true);
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
+  const hdf5::Id trajectory = hdf5::open_group(file, "traj_0");
+  EXPECT_EQ(hdf5::int_attribute(trajectory, "steps", -1), length_of(0, 6) - 1);
+  hdf5::each_dataset(trajectory, [&](const std::string& path) {
+    const hdf5::Id dataset = hdf5::open_dataset(trajectory, path);
     for (const char* name : {"unit", "frame", "description"})
-      EXPECT_TRUE(h5::has_attribute(dataset, name)) << path << " " << name;
+      EXPECT_TRUE(hdf5::has_attribute(dataset, name)) << path << " " << name;
     const bool own = path.find('/') == std::string::npos;
     if (own) {
-      EXPECT_NE(h5::text_attribute(dataset, "description"), "") << path;
+      EXPECT_NE(hdf5::text_attribute(dataset, "description"), "") << path;
     }
   });
 }
@@ -284,7 +286,7 @@ TEST(Recorder, InterruptedPublicationIsCompleted) {
   for (const bool by_repair : {false, true}) {
     for (const int moved : {0, 2}) {
       TempDir broken;
-      record(broken.path, 8, {.worlds = 2, .stop_after = 3}, true);
+      write_recording(broken.path, 8, {.worlds = 2, .stop_after = 3}, true);
       const fs::path house = broken.path / "house_0", staging = house / ".recording";
       std::ofstream(staging / "ending").flush();
       for (int e = 0; e < moved; ++e) {
@@ -294,7 +296,7 @@ TEST(Recorder, InterruptedPublicationIsCompleted) {
         fs::rename(episode / "wrist_camera.mp4", house / name);
       }
       if (by_repair) {
-        repair(broken.path);
+        replay::repair(broken.path);
       } else {
         FakeSuite suite({2, 16, 12, true, true});
         RecordingCfg cfg = fake_recording(broken.path, suite, 2, 8);
@@ -305,7 +307,7 @@ TEST(Recorder, InterruptedPublicationIsCompleted) {
       }
       EXPECT_EQ(tree(broken.path), tree(whole.path)) << moved;
       EXPECT_EQ(read_file(broken.path / h5_name), read_file(whole.path / h5_name)) << moved;
-      EXPECT_TRUE(verify(broken.path).ok()) << verify(broken.path).text();
+      EXPECT_TRUE(replay::verify(broken.path).ok()) << replay::verify(broken.path).text();
     }
   }
 }
@@ -361,13 +363,13 @@ TEST(Recorder, SavedEpisodesAreOnDisk) {
 TEST(Recorder, FewEncodersGiveTheSameVideos) {
   TempDir many, few;
   const Attempts attempts{.worlds = 4, .steps = 12};
-  const std::string bytes = record(many.path, 5, attempts, true);
+  const std::string bytes = write_recording(many.path, 5, attempts, true);
   for (const int encoders : {1, 3}) {
-    EXPECT_EQ(bytes,
-              record(few.path / std::to_string(encoders), 5, attempts, true, [&](RecordingCfg& c) {
-                c.video.max_encoders = encoders;
-                c.video.queue_frames = 1;
-              }));
+    EXPECT_EQ(bytes, write_recording(few.path / std::to_string(encoders), 5, attempts, true,
+                                     [&](RecordingCfg& c) {
+                                       c.video.max_encoders = encoders;
+                                       c.video.queue_frames = 1;
+                                     }));
   }
 }
 
@@ -423,12 +425,13 @@ void expect_nothing_published(const fs::path& out) {
 TEST(RecorderFaults, FfmpegIsAbsent) {
   TempDir dir;
   const std::string error = error_of([&] {
-    record(dir.path, 1, {}, true, [](RecordingCfg& c) { c.video.ffmpeg = "/nonexistent/ffmpeg"; });
+    write_recording(dir.path, 1, {}, true,
+                    [](RecordingCfg& c) { c.video.ffmpeg = "/nonexistent/ffmpeg"; });
   });
   EXPECT_THAT(error, AllOf(HasSubstr("needs ffmpeg"), HasSubstr("/nonexistent/ffmpeg"),
                            HasSubstr("apt-get install ffmpeg")));
   EXPECT_THAT(tree(dir.path), IsEmpty());
-  record(dir.path, 1, {}, false, [](RecordingCfg& c) {
+  write_recording(dir.path, 1, {}, false, [](RecordingCfg& c) {
     c.video.ffmpeg = "/nonexistent/ffmpeg";
   });  // without video ffmpeg is not needed
 }
@@ -438,8 +441,8 @@ TEST(RecorderFaults, FfmpegDies) {
                            "head -c 2000 > /dev/null; kill -9 $$"}) {
     TempDir dir, tools;
     const std::string error = error_of([&] {
-      record(dir.path, 2, {.worlds = 2, .steps = 4000}, true,
-             [&](RecordingCfg& c) { c.video.ffmpeg = fake_ffmpeg(tools.path, body); });
+      write_recording(dir.path, 2, {.worlds = 2, .steps = 4000}, true,
+                      [&](RecordingCfg& c) { c.video.ffmpeg = fake_ffmpeg(tools.path, body); });
     });
     EXPECT_THAT(error,
                 AllOf(HasSubstr("cannot be recorded: video 'wrist_camera"), HasSubstr("ffmpeg: ")));
@@ -453,7 +456,7 @@ TEST(RecorderFaults, FfmpegDies) {
 TEST(RecorderFaults, FfmpegFailsAtTheEnd) {
   TempDir dir, tools;
   const std::string error = error_of([&] {
-    record(dir.path, 1, {.worlds = 1}, true, [&](RecordingCfg& c) {
+    write_recording(dir.path, 1, {.worlds = 1}, true, [&](RecordingCfg& c) {
       c.video.ffmpeg = fake_ffmpeg(tools.path, "cat > $out; echo 'no trailer' >&2; exit 1");
     });
   });
@@ -522,7 +525,7 @@ TEST(RecorderFaults, SigchldIsIgnored) {
     if (pid == 0) {
       signal(SIGCHLD, SIG_IGN);
       const std::string error = error_of([&] {
-        record(dir.path, 2, {.worlds = 1}, true, [&](RecordingCfg& c) {
+        write_recording(dir.path, 2, {.worlds = 1}, true, [&](RecordingCfg& c) {
           if (fails) c.video.ffmpeg = fake_ffmpeg(tools.path, "cat >/dev/null; echo lost >&2");
         });
       });
@@ -543,15 +546,16 @@ TEST(RecorderFaults, SigchldIsIgnored) {
 
 TEST(RecorderFaults, ExistingOutput) {
   TempDir dir;
-  record(dir.path, 1, {});
-  EXPECT_THAT(error_of([&] { record(dir.path, 1, {}); }),
+  write_recording(dir.path, 1, {});
+  EXPECT_THAT(error_of([&] { write_recording(dir.path, 1, {}); }),
               AllOf(HasSubstr("already contains recorded trajectories"), HasSubstr("house_0")));
-  EXPECT_THAT(
-      error_of([&] { record(dir.path, 2, {}, false, [](RecordingCfg& c) { c.resume = true; }); }),
-      HasSubstr("different recording: 'episodes' was 1 and is now 2"));
+  EXPECT_THAT(error_of([&] {
+                write_recording(dir.path, 2, {}, false, [](RecordingCfg& c) { c.resume = true; });
+              }),
+              HasSubstr("different recording: 'episodes' was 1 and is now 2"));
   TempDir other;
-  record(other.path, 8, {.stop_after = 1});
-  EXPECT_THAT(error_of([&] { record(other.path, 8, {}); }),
+  write_recording(other.path, 8, {.stop_after = 1});
+  EXPECT_THAT(error_of([&] { write_recording(other.path, 8, {}); }),
               HasSubstr("already contains an unfinished recording"));
 }
 
@@ -568,7 +572,7 @@ TEST(RecorderFaults, TwoProcessesDoNotShareAHouse) {
 TEST(RecorderFaults, UnwritableDirectory) {
   TempDir dir;
   std::ofstream(dir.path / "file") << "x";
-  const std::string error = error_of([&] { record(dir.path / "file", 1, {}); });
+  const std::string error = error_of([&] { write_recording(dir.path / "file", 1, {}); });
   EXPECT_THAT(error, AllOf(HasSubstr("cannot create the directory"), HasSubstr("Not a directory")));
 }
 
@@ -661,7 +665,7 @@ TEST(RecorderFaults, InvalidCallsThrow) {
 TEST(RecorderFaults, InvalidConfigurationsThrow) {
   TempDir dir;
   const auto error = [&](const std::function<void(RecordingCfg&)>& change) {
-    return error_of([&] { record(dir.path, 1, {}, false, change); });
+    return error_of([&] { write_recording(dir.path, 1, {}, false, change); });
   };
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir.clear(); }), HasSubstr("no output directory"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir = c.out_dir / std::string(300, 'x'); }),
@@ -680,4 +684,4 @@ TEST(RecorderFaults, InvalidConfigurationsThrow) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -7,7 +7,7 @@
 #include "mjsense/record/recorder_impl.h"
 #include "mjsense/record/video_file.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 void Recorder::Impl::video_done(const EpisodePtr& episode, const EncoderPool::Result& result) {
   if (!result.ok && !result.why.empty()) {
@@ -146,4 +146,4 @@ void Recorder::Impl::settle(Episode& episode, bool failed) {
   published_bytes = house->published_bytes();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

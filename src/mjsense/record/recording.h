@@ -14,8 +14,10 @@
 #include "mjsense/core/array.h"
 
 namespace mjsense {
-
 class Sensor;
+}  // namespace mjsense
+
+namespace mjsense::record {
 
 // Frames per second as an exact fraction: a policy period of 66 ms is 500/33 frames per second,
 // which has no finite decimal representation.
@@ -153,4 +155,4 @@ struct StepRow {
   bool success = false;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

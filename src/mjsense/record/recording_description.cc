@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace mjsense {
+namespace mjsense::record {
 
 nlohmann::json parse_description(const std::string& text) {
   using Json = nlohmann::json;
@@ -22,4 +22,4 @@ nlohmann::json parse_description(const std::string& text) {
   return deep ? none : json;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -6,11 +6,11 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Returns a discarded value (is_discarded()) if the text is not JSON, is longer than 4 MiB or is
 // nested deeper than 64 levels. The depth is limited because later functions recurse once per
 // level.
 nlohmann::json parse_description(const std::string& text);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

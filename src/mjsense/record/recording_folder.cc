@@ -25,7 +25,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr const char* kEndingFile = "ending";  // publish_all() has begun
@@ -97,13 +97,14 @@ struct Move {
 
 // Describes a published file: {"recording": text, "episodes": [0, 1 ...]}.
 std::string describe_published(const Fd& published, const std::string& shown) {
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(os::path_of(published.get()), false, shown);
-  nlohmann::json out{{"recording", h5::text_attribute(file, "recording")},
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(os::path_of(published.get()), false, shown);
+  nlohmann::json out{{"recording", hdf5::text_attribute(file, "recording")},
                      {"episodes", nlohmann::json::array()}};
-  for (const std::string& trajectory : h5::children(file)) {
+  for (const std::string& trajectory : hdf5::children(file)) {
     if (trajectory.starts_with("traj_"))
-      out["episodes"].push_back(h5::int_attribute(h5::open_group(file, trajectory), "episode", -1));
+      out["episodes"].push_back(
+          hdf5::int_attribute(hdf5::open_group(file, trajectory), "episode", -1));
   }
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
@@ -127,7 +128,7 @@ Published read_published(const Folder& house, const std::string& name) {
   const Fd file = open_plain(house.fd(), name);
   const std::string shown = house.display_path(name);
   const auto found =
-      nlohmann::json::parse(h5::in_child(
+      nlohmann::json::parse(hdf5::in_child(
                                 shown, static_cast<std::uint64_t>(size_of(file)),
                                 [&] { return describe_published(file, shown); }, 0, file.get()),
                             nullptr, false);
@@ -167,17 +168,17 @@ std::string settings_of(const std::string& description) {
 // Writes the final names of an episode's videos into the file, and appends the moves that this
 // requires.
 void name_videos(hid_t trajectory, std::int64_t number, std::vector<Move>& moves) {
-  const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
+  const hdf5::Id names = hdf5::open_group(trajectory, "obs/sensor_data");
   for (const StagedVideo& video : staged_videos(trajectory)) {
     const std::string final_name = video_file(number, video.name);
     std::array<char, kFileNameBytes> bytes{};
     std::memcpy(bytes.data(), final_name.data(), std::min(final_name.size(), bytes.size()));
-    const h5::Id dataset = h5::open_dataset(names, video.key);
-    if (h5::dims(dataset) != std::vector<hsize_t>{kFileNameBytes})
+    const hdf5::Id dataset = hdf5::open_dataset(names, video.key);
+    if (hdf5::dims(dataset) != std::vector<hsize_t>{kFileNameBytes})
       throw RuntimeError(fmt::format("'{}' is not a one-dimensional array of {} bytes", video.key,
                                      kFileNameBytes));
-    h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()),
-              video.key);
+    hdf5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()),
+                video.key);
     moves.push_back({episode_name(number), video.name, final_name});
   }
 }
@@ -346,7 +347,7 @@ void RecordingFolder::load_staged() {
         if (!difference.empty())
           throw RuntimeError("belongs to a different recording: " + difference);
         staged.emplace(*finished, std::move(episode));
-      } catch (const h5::ReaderInterrupted&) {
+      } catch (const hdf5::ReaderInterrupted&) {
         throw;
       } catch (const Error& e) {
         set_aside(name, e.what());
@@ -452,24 +453,25 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   } const removed{staging_, part};
   std::vector<Move> moves;
   {
-    const h5::H5Lock lock;
-    h5::Id file = h5::create_file(staging_.fd_path(part), staging_.display_path(part));
+    const hdf5::H5Lock lock;
+    hdf5::Id file = hdf5::create_file(staging_.fd_path(part), staging_.display_path(part));
     std::int64_t maximum =
         1 << 17;  // margin for the file's contents apart from its episodes, bytes
     for (const std::int64_t episode : episodes)
       maximum += staging_.open_dir(episode_name(episode)).size_of(kEpisodeFile) * 9 / 8;
     staging_.reserve_space(part, maximum);
-    h5::set_attribute(file, "format", "mjsense 1");
-    h5::set_attribute(file, "recording", fingerprint_);
+    hdf5::set_attribute(file, "format", "mjsense 1");
+    hdf5::set_attribute(file, "recording", fingerprint_);
     for (std::size_t i = 0; i < episodes.size(); ++i) {
       const std::string name = fmt::format("traj_{}", i);
       const Folder staged = staging_.open_dir(episode_name(episodes[i]));
       const Fd bytes = open_plain(staged.fd(), kEpisodeFile);
-      h5::Id source =
-          h5::open_file(os::path_of(bytes.get()), false, staged.display_path(kEpisodeFile));
-      h5::check(H5Ocopy(source, "traj_0", file, name.c_str(), H5P_DEFAULT, h5::link_properties()),
-                what);
-      const h5::Id trajectory = h5::open_group(file, name);
+      hdf5::Id source =
+          hdf5::open_file(os::path_of(bytes.get()), false, staged.display_path(kEpisodeFile));
+      hdf5::check(
+          H5Ocopy(source, "traj_0", file, name.c_str(), H5P_DEFAULT, hdf5::link_properties()),
+          what);
+      const hdf5::Id trajectory = hdf5::open_group(file, name);
       name_videos(trajectory, episodes[i], moves);
     }
     file.close(what);
@@ -606,4 +608,4 @@ void remove_recordings(const fs::path& house) {
   folder.sync();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -30,7 +30,7 @@
 #include "mjsense/record/recording_plan.h"
 #include "mjsense/record/staged_episode.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Set of the attempts that were kept or discarded.
 class Decisions {
@@ -147,4 +147,4 @@ std::string unfinished_recording(const Folder& staging);
 // Directories of finished, unpublished episodes, in order.
 std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

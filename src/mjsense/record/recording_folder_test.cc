@@ -21,7 +21,7 @@
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/recording_tools.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using namespace testing;
@@ -30,10 +30,12 @@ using ::testing::HasSubstr;
 
 // Records `decided` of six episodes in three batches.
 void begin(const fs::path& out, int decided) {
-  record(out, 6, {.worlds = 1, .stop_after = decided}, false, [](auto& c) { c.batches = 3; });
+  write_recording(out, 6, {.worlds = 1, .stop_after = decided}, false,
+                  [](auto& c) { c.batches = 3; });
 }
 std::string go_on(const fs::path& out) {
-  return record(out, 6, {.worlds = 1}, false, [](auto& c) { c.batches = 3, c.resume = true; });
+  return write_recording(out, 6, {.worlds = 1}, false,
+                         [](auto& c) { c.batches = 3, c.resume = true; });
 }
 
 // The lock must be tested before anything is read. Otherwise files that the other process publishes
@@ -48,7 +50,7 @@ TEST(RecordingFolder, LockIsTestedBeforeReading) {
     const Fd other = lock_recording(Folder::open(house), false);
     EXPECT_TRUE(is_locked(house));
     EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process is recording into"));
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is recording into"));
+    EXPECT_THAT(replay::repair(dir.path).text(), HasSubstr("another process is recording into"));
   }
   EXPECT_FALSE(is_locked(house));
   EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("trajectories_batch_2_of_3.h5"));
@@ -61,10 +63,10 @@ TEST(RecordingFolder, RepairIgnoresAStartingRecording) {
   fs::create_directories(house / kStagingDir);
   {
     const Fd other = lock_recording(Folder::open(house), true);
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is recording into"));
+    EXPECT_THAT(replay::repair(dir.path).text(), HasSubstr("another process is recording into"));
     EXPECT_TRUE(is_locked(house));
   }
-  EXPECT_THAT(repair(dir.path).text(), HasSubstr("removed the remains"));
+  EXPECT_THAT(replay::repair(dir.path).text(), HasSubstr("removed the remains"));
   EXPECT_FALSE(fs::exists(house / kStagingDir));
 }
 
@@ -212,4 +214,4 @@ TEST(RecordingFolder, DescriptionOnAFullDiskThrows) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -15,7 +15,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 // Readers and programs that are being started hold the lock only for a moment.
@@ -45,4 +45,4 @@ bool is_locked(const fs::path& house) {
   return lock && flock(lock.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

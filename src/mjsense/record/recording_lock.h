@@ -7,7 +7,7 @@
 #include "mjsense/core/files/file_descriptor.h"
 #include "mjsense/record/folder.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 inline constexpr const char* kLockFile = "lock";
 
@@ -18,4 +18,4 @@ inline constexpr const char* kLockFile = "lock";
 // True while a process records into this house or repairs it.
 [[nodiscard]] bool is_locked(const std::filesystem::path& house);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

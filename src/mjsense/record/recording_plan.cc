@@ -15,7 +15,7 @@
 #include "mjsense/record/recording_description.h"
 #include "mjsense/record/yuv.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 // About 128 KiB: large enough for gzip and the file system to be efficient, small enough for the
@@ -339,4 +339,4 @@ std::string fingerprint_difference(const std::string& was, const std::string& no
                      text(b));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

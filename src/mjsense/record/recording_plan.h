@@ -14,7 +14,7 @@
 #include "mjsense/record/json_rows.h"
 #include "mjsense/record/recording.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // One dataset with one row per step: one field of a sensor, all its fields as JSON text, or the
 // constant `true`.
@@ -88,4 +88,4 @@ std::string spec_json(std::string_view sensor, std::string_view kind, const Sens
 // Describes how two fingerprints differ: "'episodes' was 8 and is now 10". "" if they are equal.
 std::string fingerprint_difference(const std::string& was, const std::string& now);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -14,7 +14,7 @@
 #include "mjsense/record/molmospaces.h"
 #include "mjsense/record/testing/tools.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using ::testing::ElementsAre;
@@ -277,4 +277,4 @@ TEST(Fingerprint, InvalidTextIsNeverEqual) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -14,7 +14,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/os.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr int kFirstOther = 3;  // first descriptor after the standard streams
@@ -99,4 +99,4 @@ pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int 
   return pid;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

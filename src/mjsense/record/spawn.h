@@ -11,7 +11,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 // The program does not exist or is not executable on this machine.
 struct CannotStart : RuntimeError {
@@ -24,4 +24,4 @@ struct CannotStart : RuntimeError {
 // open directory used as its working directory; -1: the current one. Throws CannotStart.
 pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int folder = -1);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

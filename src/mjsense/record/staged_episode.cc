@@ -15,33 +15,34 @@
 #include "mjsense/record/recording_plan.h"
 #include "mjsense/record/video_file.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using Json = nlohmann::json;
 
 // Copies in memory only: data that the library cannot copy must not reach an output file.
 void try_copy(hid_t file) {
-  const h5::Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "HDF5 property list");
-  h5::check(H5Pset_fapl_core(access, std::size_t{1} << 20, false), "HDF5 memory file");
-  const h5::Id copy(H5Fcreate("copy", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose,
-                    "HDF5 memory file");
-  h5::check(H5Ocopy(file, "traj_0", copy, "traj_0", H5P_DEFAULT, H5P_DEFAULT), "cannot be copied");
+  const hdf5::Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "HDF5 property list");
+  hdf5::check(H5Pset_fapl_core(access, std::size_t{1} << 20, false), "HDF5 memory file");
+  const hdf5::Id copy(H5Fcreate("copy", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose,
+                      "HDF5 memory file");
+  hdf5::check(H5Ocopy(file, "traj_0", copy, "traj_0", H5P_DEFAULT, H5P_DEFAULT),
+              "cannot be copied");
 }
 
 std::string describe(const Fd& traj) {
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(os::path_of(traj.get()), false, kEpisodeFile);
-  const h5::Id trajectory = h5::open_group(file, "traj_0");
-  h5::each_dataset(trajectory, [&](const std::string& name) {
-    const h5::Id dataset = h5::open_dataset(trajectory, name);
-    h5::check_storage(dataset, name);
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(os::path_of(traj.get()), false, kEpisodeFile);
+  const hdf5::Id trajectory = hdf5::open_group(file, "traj_0");
+  hdf5::each_dataset(trajectory, [&](const std::string& name) {
+    const hdf5::Id dataset = hdf5::open_dataset(trajectory, name);
+    hdf5::check_storage(dataset, name);
     // The HDF5 library copies chunks that cannot be unpacked, and frees them twice.
-    h5::check_chunks(dataset, name);
+    hdf5::check_chunks(dataset, name);
   });
   try_copy(file);
-  const std::vector<hsize_t> rows = h5::dims(h5::open_dataset(trajectory, "success"));
-  Json out{{"recording", h5::text_attribute(file, "recording")},
+  const std::vector<hsize_t> rows = hdf5::dims(hdf5::open_dataset(trajectory, "success"));
+  Json out{{"recording", hdf5::text_attribute(file, "recording")},
            {"steps", rows.empty() ? 0 : rows[0]},
            {"videos", Json::array()}};
   for (const StagedVideo& video : staged_videos(trajectory))
@@ -53,15 +54,15 @@ std::string describe(const Fd& traj) {
 
 std::vector<StagedVideo> staged_videos(hid_t trajectory) {
   std::vector<StagedVideo> videos;
-  const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
-  for (const std::string& key : h5::children(names)) {
-    std::string name = h5::read_bytes(names, key, kFileNameBytes);
+  const hdf5::Id names = hdf5::open_group(trajectory, "obs/sensor_data");
+  for (const std::string& key : hdf5::children(names)) {
+    std::string name = hdf5::read_bytes(names, key, kFileNameBytes);
     name.resize(name.find_last_not_of('\0') + 1);
     if (!is_plain_name(name))
       throw RuntimeError(fmt::format(
           "names a video '{}', which is not a plain file name in its folder", printable(name)));
-    const h5::Id dataset = h5::open_dataset(names, key);
-    videos.push_back({key, name, h5::text_attribute(dataset, kChecksumAttribute)});
+    const hdf5::Id dataset = hdf5::open_dataset(names, key);
+    videos.push_back({key, name, hdf5::text_attribute(dataset, kChecksumAttribute)});
   }
   return videos;
 }
@@ -72,7 +73,7 @@ StagedEpisode read_staged(const Folder& folder) {
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", kEpisodeFile));
   StagedEpisode episode;
   try {
-    const Json found = Json::parse(h5::in_child(
+    const Json found = Json::parse(hdf5::in_child(
         kEpisodeFile, static_cast<std::uint64_t>(size_of(file)), [&] { return describe(file); }, 0,
         file.get()));
     episode.recording = found.at("recording");
@@ -101,4 +102,4 @@ void check_staged_videos(const Folder& folder, const StagedEpisode& episode) {
   for (const StagedVideo& video : episode.videos) check_staged_video(folder, video, episode.steps);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -10,7 +10,7 @@
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/folder.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 struct StagedVideo {
   std::string key;   // dataset in obs/sensor_data
@@ -36,4 +36,4 @@ void check_staged_video(const Folder& folder, const StagedVideo& video, std::int
 // Videos named in traj/obs/sensor_data. Throws RuntimeError unless all are plain file names.
 std::vector<StagedVideo> staged_videos(hid_t trajectory);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr std::uint64_t kMaxTableBytes = 1 << 26;
@@ -322,4 +322,4 @@ VideoFacts read_video_facts(int fd) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

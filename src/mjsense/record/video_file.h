@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::record {
 
 struct VideoFacts {
   std::int64_t frames = 0;
@@ -20,4 +20,4 @@ struct VideoFacts {
 // Reads only the tables of the file, at most 64 MiB, and validates all sizes in them.
 [[nodiscard]] VideoFacts read_video_facts(int fd);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -13,7 +13,7 @@
 #include "mjsense/record/folder.h"
 #include "mjsense/record/testing/tools.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using namespace testing;
@@ -30,7 +30,7 @@ VideoFacts facts_of(const fs::path& path) {
 class Containers : public ::testing::Test {
  protected:
   void SetUp() override {
-    record(dir.path, 1, {.worlds = 1}, true);
+    write_recording(dir.path, 1, {.worlds = 1}, true);
     for (const std::string& name : tree(dir.path)) {
       if (!name.ends_with(".h5")) videos.push_back(dir.path / name);
     }
@@ -110,4 +110,4 @@ TEST(Checksum, SealIsAppendedToTheFile) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

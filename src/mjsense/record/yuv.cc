@@ -5,7 +5,7 @@
 
 #include "mjsense/core/system/cpu.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 Yuv420Kernel best_kernel() {
@@ -40,4 +40,4 @@ void encode_yuv420(std::span<const std::uint8_t> rgb, int width, int height,
   kernel(rgb.data(), width, height, out.data(), scratch.data());
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::record {
 
 // Bytes of a frame: Y [H, W], U [H/2, W/2], V [H/2, W/2], with H and W rounded up to even numbers.
 std::size_t yuv420_bytes(int width, int height);
@@ -33,4 +33,4 @@ void yuv420_avx2(const std::uint8_t* rgb, int width, int height, std::uint8_t* o
 void yuv420_avx512(const std::uint8_t* rgb, int width, int height, std::uint8_t* out,
                    std::int16_t* scratch);
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -9,7 +9,7 @@
 
 #include "mjsense/record/yuv.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 constexpr int kTaps = 8;
@@ -125,4 +125,4 @@ inline void convert(const std::uint8_t* rgb, int width, int height, std::uint8_t
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

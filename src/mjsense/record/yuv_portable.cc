@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/record/yuv_impl.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 void yuv420_portable(const std::uint8_t* rgb, int width, int height, std::uint8_t* out,
                      std::int16_t* scratch) {
   convert(rgb, width, height, out, scratch);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -15,7 +15,7 @@
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/record/process.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -153,4 +153,4 @@ TEST(Yuv, EqualsFfmpeg) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::record

@@ -13,7 +13,7 @@
 #include "mjsense/rays/box_list.h"
 #include "mjsense/render/testing/test_renderer.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 using testing::kFlat;
@@ -201,4 +201,4 @@ TEST(Frustum, GeomsThatMoveIntoTheImageAreVisible) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -9,7 +9,7 @@
 #include "mjsense/render/kernels/shading.h"
 #include "mjsense/render/view/view_builder.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 TEST(Highlight, IsZeroBelowTheThreshold) {
@@ -27,4 +27,4 @@ TEST(Highlight, IsZeroBelowTheThreshold) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -11,7 +11,7 @@
 #include "mjsense/rays/mesh_geometry.h"
 #include "mjsense/render/kernels/mesh_horizons.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 struct Mesh {
@@ -28,7 +28,7 @@ struct Mesh {
 
 // Sine of the horizon of a face; Horizons::kNever if no ray is known to be clear.
 float sine(const Mesh& mesh, int face, int octant) {
-  const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
+  const auto geometry = rays::mesh_geometry(mesh.vertices, mesh.faces, true);
   const float* h = geometry->box.data() + 3;
   return find_horizon(geometry->clusters, geometry->horizons->slot(face), octant,
                       std::hypot(h[0], h[1], h[2]));
@@ -52,13 +52,13 @@ TEST(Horizon, OfAWallIsItsHeightOverItsDistance) {
   mesh.add({-0.01f, -9, 0, -0.01f, 9, 0, -0.01f, 9, 1});
   mesh.add({-0.01f, -9, 0, -0.01f, 9, 1, -0.01f, -9, 1});
   // Geometry just behind the face still counts, because rays start slightly off the face.
-  EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
+  EXPECT_EQ(sine(mesh, 0, kPlusX), rays::Horizons::kNever);
   for (std::size_t i = mesh.vertices.size() - 18; i < mesh.vertices.size(); i += 3)
     mesh.vertices[i] = -0.1f;
   EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
-  EXPECT_EQ(sine(mesh, 0, kMinusX), Horizons::kNever);
+  EXPECT_EQ(sine(mesh, 0, kMinusX), rays::Horizons::kNever);
   mesh.add({0.3f, 0.2f, 1, 0.5f, 0.2f, 1, 0.3f, 0.4f, 1});  // above the face
-  EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
+  EXPECT_EQ(sine(mesh, 0, kPlusX), rays::Horizons::kNever);
 }
 
 // Two faces that share an edge, and a third that touches only their common corner.
@@ -71,7 +71,7 @@ TEST(Horizon, OfANeighbourIsTheAngleBetweenTheFaces) {
     const double expected = std::max(0.0, std::sin(angle)) + 2e-3;
     EXPECT_NEAR(sine(mesh, 0, kMinusX), expected, 1e-5) << angle;
     mesh.add({0, 0, 0, -c, -1, s, -1e-3f * c, -1, 1e-3f * s});
-    for (int octant = 0; octant < Horizons::kOctants; ++octant)
+    for (int octant = 0; octant < rays::Horizons::kOctants; ++octant)
       EXPECT_LE(sine(mesh, 0, octant), expected + 1e-4) << angle << ", octant " << octant;
   }
 }
@@ -81,9 +81,10 @@ TEST(Horizon, IsComputedOnceAndNotForTheFirstRays) {
   Mesh mesh;
   mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
   mesh.add({0, 0, 2, 0, 1, 2, 0, 0, 3});
-  const Horizons horizons(build_clusters(mesh.vertices.data(), mesh.faces.data(), mesh.size()));
+  const rays::Horizons horizons(
+      rays::build_clusters(mesh.vertices.data(), mesh.faces.data(), mesh.size()));
   int found = 0;
-  for (const float sine : {0.0f, 0.3f, 1.0f, Horizons::kNever}) {
+  for (const float sine : {0.0f, 0.3f, 1.0f, rays::Horizons::kNever}) {
     const int face = found % 2, octant = found;
     const auto ask = [&] {
       return horizons.ask(face, octant, [&] {
@@ -92,7 +93,7 @@ TEST(Horizon, IsComputedOnceAndNotForTheFirstRays) {
       });
     };
     const int before = found;
-    for (int i = 0; i < Horizons::kMaxRequests; ++i) EXPECT_EQ(ask(), Horizons::kNever);
+    for (int i = 0; i < rays::Horizons::kMaxRequests; ++i) EXPECT_EQ(ask(), rays::Horizons::kNever);
     EXPECT_EQ(found, before);
     for (int i = 0; i < 5; ++i) {
       const float known = ask();
@@ -160,10 +161,10 @@ TEST(Horizon, RaysAboveItAreClear) {
       mesh.add({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]});
     }
     for (int face = 0; face < mesh.size(); face += 5) {
-      const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
+      const auto geometry = rays::mesh_geometry(mesh.vertices, mesh.faces, true);
       const float* normal = geometry->horizons->plane(face);
-      float sines[Horizons::kOctants];
-      for (int i = 0; i < Horizons::kOctants; ++i) sines[i] = sine(mesh, face, i);
+      float sines[rays::Horizons::kOctants];
+      for (int i = 0; i < rays::Horizons::kOctants; ++i) sines[i] = sine(mesh, face, i);
       for (int ray = 0; ray < 40; ++ray) {
         double u = rng.uniform(), v = rng.uniform();
         if (u + v > 1) u = 1 - u, v = 1 - v;
@@ -189,7 +190,7 @@ TEST(Horizon, RaysAboveItAreClear) {
           return false;
         };
         // Rays at the lowest elevation that counts as clear.
-        for (int octant = 0; octant < Horizons::kOctants; ++octant) {
+        for (int octant = 0; octant < rays::Horizons::kOctants; ++octant) {
           if (sines[octant] > 1) continue;
           double up[3];
           direction(sines[octant], up);
@@ -207,4 +208,4 @@ TEST(Horizon, RaysAboveItAreClear) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -6,7 +6,7 @@
 
 #include "mjsense/render/testing/test_renderer.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 using testing::expect_pixel;
@@ -192,4 +192,4 @@ TEST(Shadow, DoesNotAffectOtherLights) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

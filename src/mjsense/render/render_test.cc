@@ -13,7 +13,7 @@
 #include "mjsense/render/view/camera_model.h"
 #include "mjsense/render/view/view_builder.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 using testing::expect_pixel;
@@ -263,4 +263,4 @@ TEST(Grid, ImageIsACropOfTheSensor) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

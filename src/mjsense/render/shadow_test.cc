@@ -10,7 +10,7 @@
 #include "mjsense/core/system/cpu.h"
 #include "mjsense/render/testing/test_renderer.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 using testing::kDark;
@@ -150,4 +150,4 @@ TEST(Shadow, AgreesWithMuJoCosRays) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -10,7 +10,7 @@
 #include "mjsense/render/testing/test_renderer.h"
 #include "mjsense/render/view/fixed_layer.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 using testing::expect_pixel;
@@ -451,4 +451,4 @@ TEST(FixedLayer, NeedsAFixedCameraAndFixedLights) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <iterator>
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 constexpr int kScale = 2, kColumns = 5, kRows = 9;
@@ -70,4 +70,4 @@ void draw_text(std::span<std::uint8_t> rgb, int width, int x, int y, std::string
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-namespace mjsense {
+namespace mjsense::replay {
 
 inline constexpr int kTextHeight = 18, kTextAdvance = 12;  // pixels
 
@@ -19,4 +19,4 @@ inline int label_width(std::string_view text) {
 // the image are clipped.
 void draw_text(std::span<std::uint8_t> rgb, int width, int x, int y, std::string_view text);
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 // Renders one character as text: one # or space per pixel of the glyph.
@@ -70,4 +70,4 @@ TEST(SmallText, TextIsClipped) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::replay

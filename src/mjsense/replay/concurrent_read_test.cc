@@ -13,22 +13,22 @@
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/recording_tools.h"
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 using namespace testing;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-FakeSuiteCfg without_video() { return {1, 16, 12, false, false}; }
+record::FakeSuiteCfg without_video() { return {1, 16, 12, false, false}; }
 
 TEST(Live, ActiveRecordingIsReportedAsSuch) {
   TempDir dir;
-  FakeSuite suite(without_video());
-  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 4);
+  record::FakeSuite suite(without_video());
+  record::RecordingCfg cfg = fake_recording(dir.path, suite, 1, 4);
   cfg.batches = 2;
   {
-    Recorder recorder(cfg);
+    record::Recorder recorder(cfg);
     const auto play = [&](std::int64_t episode) {
       recorder.begin_episode(0, {episode, 7});
       suite.fill(0, episode, 0, 1);
@@ -60,10 +60,11 @@ TEST(Live, RecordingMayContinueDuringVerify) {
   std::atomic<bool> ended = false;
   std::thread recording([&] {
     for (int stop = 1; stop <= 12; ++stop) {  // started, stopped and resumed
-      record(dir.path, 12, {.worlds = 1, .stop_after = stop == 12 ? -1 : 1}, false, [](auto& c) {
-        c.resume = true;
-        c.batches = 6;
-      });
+      write_recording(dir.path, 12, {.worlds = 1, .stop_after = stop == 12 ? -1 : 1}, false,
+                      [](auto& c) {
+                        c.resume = true;
+                        c.batches = 6;
+                      });
     }
     ended = true;
   });
@@ -86,8 +87,8 @@ TEST(Live, RecordingMayContinueDuringVerify) {
 // Two versions of a file; one has data beyond the end of the other.
 TEST(Live, ReplacedFileIsReportedAsChanged) {
   TempDir dir, other;
-  record(dir.path, 2, {.worlds = 1});
-  record(other.path, 2, {.worlds = 1, .steps = 90});
+  write_recording(dir.path, 2, {.worlds = 1});
+  write_recording(other.path, 2, {.worlds = 1, .steps = 90});
   const std::string name = "house_0/trajectories_batch_1_of_1.h5";
   fs::copy_file(dir.path / name, other.path / "first");
   for (const fs::path& path : {other.path / "first", other.path / name})
@@ -110,7 +111,7 @@ TEST(Live, ReplacedFileIsReportedAsChanged) {
 
 TEST(Live, ReplacedVideoIsReportedAsChanged) {
   TempDir dir;
-  record(dir.path, 1, {.worlds = 1}, true);
+  write_recording(dir.path, 1, {.worlds = 1}, true);
   const fs::path video = dir.path / "house_0/episode_00000000_wrist_camera.mp4";
   ASSERT_TRUE(fs::exists(video));
   const std::string ffmpeg = fake_ffmpeg(
@@ -124,16 +125,16 @@ TEST(Inspect, IgnoresClaimedRowsWithoutData) {
   TempDir dir;
   const fs::path path = dir.path / "trajectories_batch_1_of_1.h5";
   {
-    const h5::H5Lock lock;
-    h5::Id file = h5::create_file(path);
+    const hdf5::H5Lock lock;
+    hdf5::Id file = hdf5::create_file(path);
     for (const char* name : {"traj_0", "traj_1"}) {
-      const h5::Id trajectory = h5::create_group(file, name);
+      const hdf5::Id trajectory = hdf5::create_group(file, name);
       const hsize_t rows[] = {2147483647, 0}, wide[] = {3, hsize_t{1} << 62, 8, 0};
       const auto add = [&](const char* context, int rank, const hsize_t* dims) {
-        const h5::Id space(H5Screate_simple(rank, dims, nullptr), H5Sclose, "space");
-        const h5::Id made(H5Dcreate2(trajectory, context, H5T_STD_I8LE, space, H5P_DEFAULT,
-                                     H5P_DEFAULT, H5P_DEFAULT),
-                          H5Dclose, context);
+        const hdf5::Id space(H5Screate_simple(rank, dims, nullptr), H5Sclose, "space");
+        const hdf5::Id made(H5Dcreate2(trajectory, context, H5T_STD_I8LE, space, H5P_DEFAULT,
+                                       H5P_DEFAULT, H5P_DEFAULT),
+                            H5Dclose, context);
       };
       add("success", 2, rows);
       add("wide", 4, wide);
@@ -146,4 +147,4 @@ TEST(Inspect, IgnoresClaimedRowsWithoutData) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -20,7 +20,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap, kApart = 14;
@@ -32,14 +32,14 @@ constexpr std::size_t kMaxStrips = 128, kMaxText = 200;
 // The episode's task description and its outcome: "Pick up the red block: success".
 std::string story(hid_t trajectory) {
   std::string text;
-  if (h5::exists(trajectory, "obs_scene")) {
+  if (hdf5::exists(trajectory, "obs_scene")) {
     const auto scene =
-        nlohmann::json::parse(h5::read_text(trajectory, "obs_scene"), nullptr, false);
+        nlohmann::json::parse(hdf5::read_text(trajectory, "obs_scene"), nullptr, false);
     if (scene.is_object() && scene.contains("task_description") &&
         scene["task_description"].is_string())
       text = scene["task_description"];
   }
-  const std::string outcome = h5::text_attribute(trajectory, "outcome");
+  const std::string outcome = hdf5::text_attribute(trajectory, "outcome");
   if (!text.empty() && !outcome.empty()) text += ": ";
   return text + outcome;
 }
@@ -75,28 +75,29 @@ using Json = nlohmann::json;
 // ...]}.
 std::string describe(const fs::path& path, int shown) {
   Json out{{"episodes", 0}, {"strips", Json::array()}};
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(path);
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(path);
   const std::vector<std::string> names = trajectory_names(file);
   out["episodes"] = names.size();
   for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), std::max(0, shown)); ++i) {
-    const h5::Id trajectory = h5::open_group(file, names[i]);
-    if (!h5::exists(trajectory, "obs/sensor_data")) continue;
+    const hdf5::Id trajectory = hdf5::open_group(file, names[i]);
+    if (!hdf5::exists(trajectory, "obs/sensor_data")) continue;
     const std::string told = story(trajectory).substr(0, kMaxText);
-    const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");
-    for (const std::string& key : h5::children(videos)) {
-      const h5::Id dataset = h5::open_dataset(videos, key);
+    const hdf5::Id videos = hdf5::open_group(trajectory, "obs/sensor_data");
+    for (const std::string& key : hdf5::children(videos)) {
+      const hdf5::Id dataset = hdf5::open_dataset(videos, key);
       out["strips"].push_back({names[i], told, key.substr(0, kMaxText), read_file_name(videos, key),
-                               h5::text_attribute(dataset, "encoding"),
-                               h5::double_attribute(dataset, "metres_per_unit", 0)});
+                               hdf5::text_attribute(dataset, "encoding"),
+                               hdf5::double_attribute(dataset, "metres_per_unit", 0)});
     }
   }
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-VideoFacts facts_of(const fs::path& folder, const std::string& video, const std::string& ffmpeg) {
+record::VideoFacts facts_of(const fs::path& folder, const std::string& video,
+                            const std::string& ffmpeg) {
   const Fd file = open_plain(folder, video);
-  VideoFacts facts = read_video_facts(file.get());
+  record::VideoFacts facts = record::read_video_facts(file.get());
   if (!facts.error.empty()) {  // a format that only ffmpeg may be able to read
     const VideoProbe probe = probe_video(folder / video, false, kMaxFrames, ffmpeg);
     facts = {probe.frames, probe.width, probe.height, probe.error};
@@ -117,8 +118,8 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
     const auto bytes =
         static_cast<std::uint64_t>(size_of(open_plain(folder, recorded.path.filename().string())));
     const Json found =
-        Json::parse(h5::in_child(recorded.name, bytes,
-                                 [&] { return describe(recorded.path, shown - episodes); }),
+        Json::parse(hdf5::in_child(recorded.name, bytes,
+                                   [&] { return describe(recorded.path, shown - episodes); }),
                     nullptr, false);
     if (found.is_discarded())
       throw RuntimeError(recorded.name + ": the process that read it returned nothing");
@@ -127,7 +128,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
       // each strip starts an ffmpeg process, so only the first ones are shown
       if (strips.size() == kMaxStrips) break;
       const std::string trajectory = s.at(0), told = s.at(1), key = s.at(2), video = s.at(3);
-      const VideoFacts facts = facts_of(folder, video, ffmpeg);
+      const record::VideoFacts facts = facts_of(folder, video, ffmpeg);
       Strip strip;
       strip.video = folder / video;
       strip.depth16 = s.at(4) == "depth16";
@@ -160,9 +161,9 @@ std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw, dou
                                        std::string& label) {
   std::vector<std::uint16_t> depth(raw.size() / 2);
   std::memcpy(depth.data(), raw.data(), depth.size() * 2);
-  std::uint16_t near = kDepthFar, far = kDepthInvalid;
+  std::uint16_t near = record::kDepthFar, far = record::kDepthInvalid;
   for (const std::uint16_t d : depth) {
-    if (d == kDepthInvalid || d == kDepthFar) continue;
+    if (d == record::kDepthInvalid || d == record::kDepthFar) continue;
     near = std::min(near, d);
     far = std::max(far, d);
   }
@@ -171,8 +172,8 @@ std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw, dou
   std::vector<std::uint8_t> rgb(depth.size() * 3);
   for (std::size_t i = 0; i < depth.size(); ++i) {
     const double span = std::max(1, far - near);
-    if (depth[i] != kDepthInvalid)
-      colour(depth[i] == kDepthFar ? 1.0 : (depth[i] - near) / span, &rgb[3 * i]);
+    if (depth[i] != record::kDepthInvalid)
+      colour(depth[i] == record::kDepthFar ? 1.0 : (depth[i] - near) / span, &rgb[3 * i]);
   }
   return rgb;
 }
@@ -260,4 +261,4 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   return title;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

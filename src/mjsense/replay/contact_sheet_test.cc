@@ -19,7 +19,7 @@
 #include "mjsense/replay/bitmap_font.h"
 #include "mjsense/replay/recording_tools.h"
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 using namespace testing;
@@ -33,8 +33,8 @@ constexpr Rgb kGround = {24, 24, 24};
 // Records `episodes` episodes with images of 32 x 24 pixels (a red ball that moves 2 pixels to the
 // right per frame) and depth.
 void record_ball(const fs::path& out, int episodes) {
-  FakeSuite suite({1, 32, 24, true, true});
-  Recorder recorder(fake_recording(out, suite, 1, episodes));
+  record::FakeSuite suite({1, 32, 24, true, true});
+  record::Recorder recorder(fake_recording(out, suite, 1, episodes));
   record_all(recorder, suite, {.worlds = 1});
 }
 
@@ -170,7 +170,7 @@ TEST(ContactSheet, DepthIsColouredFromNearToFar) {
   for (int t = 0; t < 6; ++t)
     for (int y = 0; y < 24; ++y)
       for (int x = 0; x < 32; ++x) {
-        const double z = FakeSuite::depth(x, y, t);
+        const double z = record::FakeSuite::depth(x, y, t);
         if (z <= 0 || (x == 31 && y == 0)) continue;
         near = std::min(near, z);
         far = std::max(far, z);
@@ -200,7 +200,7 @@ TEST(ContactSheet, DepthIsColouredFromNearToFar) {
 
 TEST(ContactSheet, ErrorsAreReported) {
   TempDir dir;
-  record(dir.path, 1, {.worlds = 1});
+  write_recording(dir.path, 1, {.worlds = 1});
   const fs::path png = dir.path / "sheet.png";
   EXPECT_THAT(error_of([&] { contact_sheet(dir.path, png); }),
               ::testing::HasSubstr("contains no videos"));
@@ -210,4 +210,4 @@ TEST(ContactSheet, ErrorsAreReported) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::replay

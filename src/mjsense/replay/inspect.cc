@@ -21,7 +21,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 // A file whose rows are more than this many times its own size is taken for a decompression bomb.
@@ -82,26 +82,26 @@ class Inspector {
   void add_file(const RecordedFile& recorded) {
     InspectResult::File entry{recorded.name,
                               static_cast<std::int64_t>(fs::file_size(recorded.path))};
-    const h5::H5Lock lock;
-    const h5::Id file = h5::open_file(recorded.path);
-    if (result_.settings.empty()) result_.settings = h5::text_attribute(file, "recording");
+    const hdf5::H5Lock lock;
+    const hdf5::Id file = hdf5::open_file(recorded.path);
+    if (result_.settings.empty()) result_.settings = hdf5::text_attribute(file, "recording");
     for (const std::string& name : trajectory_names(file)) {
-      const h5::Id trajectory = h5::open_group(file, name);
+      const hdf5::Id trajectory = hdf5::open_group(file, name);
       ++entry.episodes;
-      const std::string outcome = h5::text_attribute(trajectory, "outcome");
+      const std::string outcome = hdf5::text_attribute(trajectory, "outcome");
       if (!outcome.empty())
-        entry.outcomes[std::string(outcome_without_details(outcome))].push_back(name);
+        entry.outcomes[std::string(record::outcome_without_details(outcome))].push_back(name);
       add_trajectory(trajectory, entry);
-      if (!h5::exists(trajectory, "obs/sensor_data")) continue;
-      const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");
-      for (const std::string& key : h5::children(videos))
+      if (!hdf5::exists(trajectory, "obs/sensor_data")) continue;
+      const hdf5::Id videos = hdf5::open_group(trajectory, "obs/sensor_data");
+      for (const std::string& key : hdf5::children(videos))
         result_.videos.push_back(read_file_name(videos, key));
     }
     result_.files.push_back(std::move(entry));
   }
 
   void add_trajectory(hid_t trajectory, InspectResult::File& entry) {
-    h5::each_dataset(trajectory, [&](const std::string& name) {
+    hdf5::each_dataset(trajectory, [&](const std::string& name) {
       if (name.starts_with("obs/sensor_data/")) return;
       const RowDataset dataset(trajectory, name);
       unpacked_ += dataset.bytes();
@@ -136,9 +136,9 @@ class Inspector {
       stream.stats.name = name;
       stream.stats.dtype = dataset.dtype();
       stream.stats.shape = dataset.shape();
-      stream.stats.unit = h5::text_attribute(dataset.id(), "unit");
-      stream.stats.frame = h5::text_attribute(dataset.id(), "frame");
-      stream.stats.description = h5::text_attribute(dataset.id(), "description");
+      stream.stats.unit = hdf5::text_attribute(dataset.id(), "unit");
+      stream.stats.frame = hdf5::text_attribute(dataset.id(), "frame");
+      stream.stats.description = hdf5::text_attribute(dataset.id(), "description");
     }
     return stream;
   }
@@ -239,14 +239,14 @@ std::string line_of(const StreamStats& s, const std::string& name, int indent) {
 InspectResult inspect(const fs::path& path) {
   std::uint64_t bytes = 0;
   const std::vector<RecordedFile> files = recorded_files(path);
-  if (files.empty() && std::ranges::any_of(recorded_houses(path), is_locked))
+  if (files.empty() && std::ranges::any_of(recorded_houses(path), record::is_locked))
     throw ValueError(
         fmt::format("'{}' is being recorded: none of its files is published yet", path.string()));
   for (const RecordedFile& file : files)
     bytes += static_cast<std::uint64_t>(
         size_of(open_plain(file.path.parent_path(), file.path.filename().string())));
   return from_json(
-      h5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(files)); }));
+      hdf5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(files)); }));
 }
 
 std::string InspectResult::text() const {
@@ -276,7 +276,7 @@ std::string InspectResult::text() const {
 }
 
 std::string InspectResult::json() const {
-  nlohmann::json j{{"videos", videos}, {"recording", parse_description(settings)}};
+  nlohmann::json j{{"videos", videos}, {"recording", record::parse_description(settings)}};
   if (j["recording"].is_discarded()) j["recording"] = nullptr;
   for (const File& f : files) {
     j["files"].push_back({{"path", f.path},
@@ -296,4 +296,4 @@ std::string InspectResult::json() const {
   return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

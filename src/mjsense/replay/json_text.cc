@@ -6,7 +6,7 @@
 #include <charconv>
 #include <limits>
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 constexpr int kMaxDepth = 64;
@@ -195,4 +195,4 @@ std::string_view trim_row(std::string_view row) {
   return end == std::string_view::npos ? std::string_view{} : row.substr(0, end + 1);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace mjsense {
+namespace mjsense::replay {
 
 // Called for every number (true and false count as 1 and 0). `path` holds the keys of the enclosing
 // objects, joined by '/'. The elements of a list have the path of the list.
@@ -20,4 +20,4 @@ std::string parse_json(std::string_view text, const OnNumber& on_number = nullpt
 // Removes the padding of a row.
 std::string_view trim_row(std::string_view row);
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -10,7 +10,7 @@
 
 #include "mjsense/hdf5/lzf.h"
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 TEST(JsonText, AcceptsWhatPythonWrites) {
@@ -70,23 +70,23 @@ TEST(Lzf, UnpacksRunsAndReferences) {
   // "abc", then 7 bytes from offset -3 (overlapping), then "!".
   const std::vector<std::uint8_t> packed = {2, 'a', 'b', 'c', 5 << 5, 2, 0, '!'};
   std::vector<std::uint8_t> out(32);
-  ASSERT_EQ(lzf_unpack(packed, out), 11u);
+  ASSERT_EQ(hdf5::lzf_unpack(packed, out), 11u);
   EXPECT_EQ(std::string(out.begin(), out.begin() + 11), "abcabcabca!");
   // A long back reference: 7 + 20 + 2 bytes.
   const std::vector<std::uint8_t> lengthy = {0, 'z', 7 << 5, 20, 0};
-  EXPECT_EQ(lzf_unpack(lengthy, out), 30u);
+  EXPECT_EQ(hdf5::lzf_unpack(lengthy, out), 30u);
 }
 
 TEST(Lzf, RejectsCorruptInput) {
   std::vector<std::uint8_t> out(8);
   // literal run beyond the end of the input
-  EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{5, 'a'}, out), 0u);
-  EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{0, 'a', 1 << 5, 9}, out),
+  EXPECT_EQ(hdf5::lzf_unpack(std::vector<std::uint8_t>{5, 'a'}, out), 0u);
+  EXPECT_EQ(hdf5::lzf_unpack(std::vector<std::uint8_t>{0, 'a', 1 << 5, 9}, out),
             0u);  // reference before the beginning of the output
-  EXPECT_EQ(
-      lzf_unpack(std::vector<std::uint8_t>{0, 'a', 6 << 5, 0, 0, 'b'}, std::span(out).first(4)),
-      0u);  // output buffer too small
+  EXPECT_EQ(hdf5::lzf_unpack(std::vector<std::uint8_t>{0, 'a', 6 << 5, 0, 0, 'b'},
+                             std::span(out).first(4)),
+            0u);  // output buffer too small
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::replay

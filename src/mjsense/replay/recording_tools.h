@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::replay {
 
 struct Finding {
   bool error = true;    // false: a note, not a fault
@@ -81,4 +81,4 @@ struct InspectResult {
 std::string contact_sheet(const std::filesystem::path& path, const std::filesystem::path& png,
                           int episodes = 4, int columns = 8, const std::string& ffmpeg = "");
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -21,7 +21,7 @@
 #include "mjsense/replay/recording_tools.h"
 #include "mjsense/replay/trajectory.h"
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 using namespace testing;
@@ -30,27 +30,29 @@ using ::testing::SizeIs;
 
 TEST(Replay, EpisodesReadBackAsWritten) {
   TempDir dir;
-  record(dir.path, 3, {.worlds = 2, .steps = 70});  // more rows than one chunk of dict rows
+  write_recording(dir.path, 3,
+                  {.worlds = 2, .steps = 70});  // more rows than one chunk of dict rows
   EXPECT_THAT(tree(dir.path), ::testing::ElementsAre("house_0/trajectories_batch_1_of_1.h5"));
-  const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
+  const hdf5::H5Lock lock;
+  const hdf5::Id file = hdf5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
   ASSERT_THAT(trajectory_names(file), SizeIs(3));
   for (int e = 0; e < 3; ++e) {
-    const h5::Id traj(H5Gopen2(file, fmt::format("traj_{}", e).c_str(), H5P_DEFAULT), H5Gclose,
-                      "traj");
+    const hdf5::Id traj(H5Gopen2(file, fmt::format("traj_{}", e).c_str(), H5P_DEFAULT), H5Gclose,
+                        "traj");
     const int T = length_of(e, 70);
-    EXPECT_EQ(h5::int_attribute(traj, "episode", -1), e);
-    EXPECT_EQ(h5::text_attribute(traj, "outcome"), "success");
-    EXPECT_EQ(h5::read_text(traj, "obs_scene"), FakeSuite::obs_scene(e));
+    EXPECT_EQ(hdf5::int_attribute(traj, "episode", -1), e);
+    EXPECT_EQ(hdf5::text_attribute(traj, "outcome"), "success");
+    EXPECT_EQ(hdf5::read_text(traj, "obs_scene"), record::FakeSuite::obs_scene(e));
     const RowDataset qpos(traj, "obs/agent/qpos"), tcp(traj, "obs/extra/tcp_pose"),
         fail(traj, "fail");
     EXPECT_EQ(qpos.rows(), T);
     EXPECT_TRUE(qpos.is_json());
     EXPECT_EQ(qpos.shape(), "(T, 2000)");
     qpos.each_text([&](std::int64_t t, std::string_view text) {
-      EXPECT_THAT(std::string(text),
-                  HasSubstr(fmt::format("{{\"arm\":[{}", static_cast<double>(FakeSuite::joint(
-                                                             e, static_cast<int>(t), 0)))));
+      EXPECT_THAT(
+          std::string(text),
+          HasSubstr(fmt::format("{{\"arm\":[{}", static_cast<double>(record::FakeSuite::joint(
+                                                     e, static_cast<int>(t), 0)))));
     });
     std::vector<double> values;
     tcp.each_number([&](auto piece) { values.insert(values.end(), piece.begin(), piece.end()); });
@@ -65,7 +67,7 @@ TEST(Replay, EpisodesReadBackAsWritten) {
 
 TEST(Replay, DiscardedAttemptsAreNotStored) {
   TempDir dir;
-  record(dir.path, 4, {.worlds = 3, .discard_every = 2}, true);
+  write_recording(dir.path, 4, {.worlds = 3, .discard_every = 2}, true);
   const InspectResult result = inspect(dir.path);
   ASSERT_THAT(result.files, SizeIs(1));
   EXPECT_EQ(result.files[0].episodes, 4);
@@ -75,7 +77,7 @@ TEST(Replay, DiscardedAttemptsAreNotStored) {
 
 TEST(Replay, UnfinishedRecordingIsReadableAndRepairable) {
   TempDir dir;
-  record(dir.path, 8, {.worlds = 2, .stop_after = 3}, true);
+  write_recording(dir.path, 8, {.worlds = 2, .stop_after = 3}, true);
   const VerifyResult before = verify(dir.path);
   EXPECT_EQ(before.unpublished, 3);
   EXPECT_EQ(before.episodes, 3);
@@ -92,7 +94,7 @@ TEST(Replay, UnfinishedRecordingIsReadableAndRepairable) {
 // A video must have as many frames as its episode has steps, of the stated size.
 TEST(Verify, CountsTheFramesOfEveryVideo) {
   TempDir dir, other;
-  record(dir.path, 3, {.worlds = 1}, true);
+  write_recording(dir.path, 3, {.worlds = 1}, true);
   ASSERT_TRUE(verify(dir.path).ok());
   const auto video = [](const fs::path& out, int e) {
     return out / fmt::format("house_0/episode_{:08d}_wrist_camera.mp4", e);
@@ -111,8 +113,8 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
   EXPECT_THAT(replaced(video(dir.path, 0), video(dir.path, 1)),
               HasSubstr("has 6 frames, expected 7"));
   {
-    FakeSuite suite({1, 20, 12, true, true});
-    Recorder recorder(fake_recording(other.path, suite, 1, 1));
+    record::FakeSuite suite({1, 20, 12, true, true});
+    record::Recorder recorder(fake_recording(other.path, suite, 1, 1));
     record_all(recorder, suite, {.worlds = 1});
   }
   EXPECT_THAT(replaced(video(other.path, 0), video(dir.path, 0)),
@@ -125,19 +127,19 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
 TEST(Verify, FailIsTheNegationOfSuccess) {
   for (const std::int8_t wrong : {0, 1}) {
     TempDir dir;
-    record(dir.path, 1, {.worlds = 1});
+    write_recording(dir.path, 1, {.worlds = 1});
     const fs::path path = dir.path / "house_0/trajectories_batch_1_of_1.h5";
     {
-      const h5::H5Lock lock;
-      h5::Id file = h5::open_file(path, true);
+      const hdf5::H5Lock lock;
+      hdf5::Id file = hdf5::open_file(path, true);
       {
-        const h5::Id fail(H5Dopen2(file, "traj_0/fail", H5P_DEFAULT), H5Dclose, "fail");
-        const h5::Id type(H5Dget_type(fail), H5Tclose, "type");
+        const hdf5::Id fail(H5Dopen2(file, "traj_0/fail", H5P_DEFAULT), H5Dclose, "fail");
+        const hdf5::Id type(H5Dget_type(fail), H5Tclose, "type");
         std::vector<std::int8_t> rows(6);
-        h5::check(H5Dread(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "read");
+        hdf5::check(H5Dread(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "read");
         EXPECT_EQ(rows, (std::vector<std::int8_t>{1, 1, 1, 1, 1, 0}));
         rows[wrong ? 5 : 2] = wrong;  // both true, or both false
-        h5::check(H5Dwrite(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "write");
+        hdf5::check(H5Dwrite(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "write");
       }
       file.close("close");
     }
@@ -152,18 +154,18 @@ TEST(Verify, FailIsTheNegationOfSuccess) {
 class RepairNames : public ::testing::Test {
  protected:
   RepairNames() {
-    record(dir.path, 6, {.worlds = 1}, true);
+    write_recording(dir.path, 6, {.worlds = 1}, true);
     in_videos(true, [&](hid_t videos) {
       was = read_file_name(videos, "wrist_camera");
-      h5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
+      hdf5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
     });
   }
   void in_videos(bool write, auto&& act) const {
-    const h5::H5Lock lock;
-    h5::Id file = h5::open_file(path, write);
+    const hdf5::H5Lock lock;
+    hdf5::Id file = hdf5::open_file(path, write);
     {
-      const h5::Id videos(H5Gopen2(file, "traj_1/obs/sensor_data", H5P_DEFAULT), H5Gclose,
-                          "videos");
+      const hdf5::Id videos(H5Gopen2(file, "traj_1/obs/sensor_data", H5P_DEFAULT), H5Gclose,
+                            "videos");
       act(videos);
     }
     file.close("close");
@@ -213,7 +215,7 @@ TEST_F(RepairNames, KeepThePermissionsOfTheFile) {
     EXPECT_EQ(fs::status(path).permissions(), mode);
     fs::permissions(path, fs::perms(0600));
     in_videos(true, [&](hid_t videos) {
-      h5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
+      hdf5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
     });
   }
 }
@@ -246,11 +248,11 @@ TEST_F(RepairNames, OnlyInTrajectoryFiles) {
 
 TEST(Replay, ImagesOfOddSizeArePadded) {
   TempDir dir;
-  FakeSuite suite({1, 17, 13});
-  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+  record::FakeSuite suite({1, 17, 13});
+  record::RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
   cfg.video.molmospaces_depth = true;
   {
-    Recorder recorder(cfg);
+    record::Recorder recorder(cfg);
     record_all(recorder, suite, {.worlds = 1});
   }
   const VerifyResult result = verify(dir.path, {.decode = true});
@@ -259,4 +261,4 @@ TEST(Replay, ImagesOfOddSizeArePadded) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -16,7 +16,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 constexpr std::size_t kPieceBytes = 1 << 22;
@@ -53,7 +53,7 @@ std::vector<RecordedFile> recorded_files(const fs::path& path) {
   require_exists(path);
   std::vector<RecordedFile> files;
   if (fs::is_regular_file(path)) {
-    files.push_back({path, path.filename().string(), path.filename() != kEpisodeFile});
+    files.push_back({path, path.filename().string(), path.filename() != record::kEpisodeFile});
     return files;
   }
   for (const fs::path& house : recorded_houses(path)) {
@@ -70,8 +70,9 @@ std::vector<RecordedFile> recorded_files(const fs::path& path) {
     });
     std::sort(published.begin(), published.end());
     for (const fs::path& file : published) add(file, true);
-    if (is_locked(house)) continue;
-    for (const fs::path& episode : finished_episodes(house)) add(episode / kEpisodeFile, false);
+    if (record::is_locked(house)) continue;
+    for (const fs::path& episode : record::finished_episodes(house))
+      add(episode / record::kEpisodeFile, false);
   }
   return files;
 }
@@ -80,7 +81,7 @@ std::vector<fs::path> recorded_houses(const fs::path& path) {
   require_exists(path);
   if (fs::is_regular_file(path)) return {path.parent_path()};
   const auto is_house = [](const fs::path& dir) {
-    if (is_plain_folder(dir / kStagingDir)) return true;
+    if (is_plain_folder(dir / record::kStagingDir)) return true;
     return std::any_of(fs::directory_iterator(dir), fs::directory_iterator(),
                        [](const fs::directory_entry& e) { return is_trajectory_file(e.path()); });
   };
@@ -90,7 +91,7 @@ std::vector<fs::path> recorded_houses(const fs::path& path) {
     for (auto it = fs::recursive_directory_iterator(path); it != fs::recursive_directory_iterator();
          ++it) {
       if (!it->is_directory()) continue;
-      if (it->path().filename() == kStagingDir) {
+      if (it->path().filename() == record::kStagingDir) {
         it.disable_recursion_pending();
       } else if (is_house(it->path())) {
         houses.push_back(it->path());
@@ -107,7 +108,7 @@ std::vector<fs::path> recorded_houses(const fs::path& path) {
 
 std::vector<std::string> trajectory_names(hid_t file) {
   std::vector<std::string> names;
-  for (std::string& name : h5::children(file)) {
+  for (std::string& name : hdf5::children(file)) {
     if (name.starts_with("traj_")) names.push_back(std::move(name));
   }
   const auto number = [](const std::string& name) { return std::atol(name.c_str() + 5); };
@@ -118,14 +119,14 @@ std::vector<std::string> trajectory_names(hid_t file) {
 
 RowDataset::RowDataset(hid_t parent, const std::string& path)
     : path_(path),
-      id_(h5::open_dataset(parent, path)),
+      id_(hdf5::open_dataset(parent, path)),
       type_(H5Dget_type(id_), H5Tclose, path),
-      dims_(h5::dims(id_)),
-      bytes_(h5::check_storage(id_, path)) {
+      dims_(hdf5::dims(id_)),
+      bytes_(hdf5::check_storage(id_, path)) {
   const bool bytes = H5Tequal(type_, H5T_STD_U8LE) > 0 && dims_.size() == 2;
-  const bool described = h5::has_attribute(id_, "spec");
+  const bool described = hdf5::has_attribute(id_, "spec");
   json_ = bytes &&
-          (described ? h5::text_attribute(id_, "encoding") == "json" : dims_[1] >= kMinTextWidth);
+          (described ? hdf5::text_attribute(id_, "encoding") == "json" : dims_[1] >= kMinTextWidth);
 }
 
 std::int64_t RowDataset::row_size() const {
@@ -177,18 +178,19 @@ std::int64_t RowDataset::rows_at_once(std::size_t element_bytes) const {
 }
 
 void RowDataset::read(std::int64_t first, std::int64_t count, hid_t memory, void* out) const {
-  if (!std::exchange(checked_, true)) h5::check_chunks(id_, path_);
+  if (!std::exchange(checked_, true)) hdf5::check_chunks(id_, path_);
   if (dims_.empty())
-    return h5::check(H5Dread(id_, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out), path_);
+    return hdf5::check(H5Dread(id_, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out), path_);
   std::vector<hsize_t> start(dims_.size(), 0), size = dims_;
   start[0] = static_cast<hsize_t>(first);
   size[0] = static_cast<hsize_t>(count);
-  const h5::Id file(H5Dget_space(id_), H5Sclose, path_);
-  h5::check(H5Sselect_hyperslab(file, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr),
-            path_);
-  const h5::Id buffer(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
-                      H5Sclose, path_);
-  h5::check(H5Dread(id_, memory, buffer, file, H5P_DEFAULT, out), path_);
+  const hdf5::Id file(H5Dget_space(id_), H5Sclose, path_);
+  hdf5::check(
+      H5Sselect_hyperslab(file, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr),
+      path_);
+  const hdf5::Id buffer(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
+                        H5Sclose, path_);
+  hdf5::check(H5Dread(id_, memory, buffer, file, H5P_DEFAULT, out), path_);
 }
 
 void RowDataset::each_text(const std::function<void(std::int64_t, std::string_view)>& visit) const {
@@ -238,7 +240,7 @@ void RowDataset::each_number(const std::function<void(std::span<const double>)>&
 }
 
 std::string read_file_name(hid_t sensor_data, const std::string& key) {
-  const std::string bytes = h5::read_bytes(sensor_data, key, kMaxNameBytes);
+  const std::string bytes = hdf5::read_bytes(sensor_data, key, kMaxNameBytes);
   std::string name(trim_row(bytes));
   if (!is_plain_name(name) || printable(name) != name)
     throw RuntimeError(fmt::format(
@@ -246,4 +248,4 @@ std::string read_file_name(hid_t sensor_data, const std::string& key) {
   return name;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

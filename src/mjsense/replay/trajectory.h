@@ -12,7 +12,7 @@
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
-namespace mjsense {
+namespace mjsense::replay {
 
 struct RecordedFile {
   std::filesystem::path path;
@@ -57,7 +57,7 @@ class RowDataset {
   std::int64_t rows_at_once(std::size_t element_bytes) const;
 
   std::string path_;
-  h5::Id id_, type_;
+  hdf5::Id id_, type_;
   std::vector<hsize_t> dims_;
   std::uint64_t bytes_ = 0;  // of all rows
   bool json_ = false;
@@ -68,4 +68,4 @@ class RowDataset {
 // Reads the name of a video from obs/sensor_data. Throws RuntimeError unless it is a plain name.
 std::string read_file_name(hid_t sensor_data, const std::string& key);
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

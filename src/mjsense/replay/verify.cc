@@ -22,7 +22,7 @@
 
 namespace fs = std::filesystem;
 
-namespace mjsense {
+namespace mjsense::replay {
 namespace {
 
 using Json = nlohmann::json;
@@ -72,13 +72,13 @@ class FileVerifier {
   void note(const std::string& context, const std::string& text) { add(false, context, text); }
 
   void check_file() {
-    const h5::H5Lock lock;
-    const h5::Id file = h5::open_file(recorded_.path);
+    const hdf5::H5Lock lock;
+    const hdf5::Id file = hdf5::open_file(recorded_.path);
     haddr_t end = 0;
     if (!sealed_ && H5Fget_eoa(file, &end) >= 0 && end < bytes_)
       error(recorded_.name, fmt::format("has {} bytes after its end", bytes_ - end));
-    ours_ = h5::has_attribute(file, "recording");
-    if (ours_) check_description(h5::text_attribute(file, "recording"));
+    ours_ = hdf5::has_attribute(file, "recording");
+    if (ours_) check_description(hdf5::text_attribute(file, "recording"));
     const std::vector<std::string> names = trajectory_names(file);
     if (names.empty()) error(recorded_.name, "contains no trajectory");
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -88,7 +88,7 @@ class FileVerifier {
               fmt::format("trajectory {} is named '{}', expected 'traj_{}'", i, names[i], i));
       }
       try {
-        check_trajectory(h5::open_group(file, names[i]), context);
+        check_trajectory(hdf5::open_group(file, names[i]), context);
       } catch (const Error& e) {
         error(context, e.what());
       }
@@ -105,7 +105,7 @@ class FileVerifier {
   }
 
   void check_description(const std::string& text) {
-    const Json description = parse_description(text);
+    const Json description = record::parse_description(text);
     if (!description.is_object())
       return error(recorded_.name, "has a description of the recording that cannot be read");
     const auto archive = description.find("model_archive");
@@ -117,7 +117,7 @@ class FileVerifier {
 
   void check_trajectory(hid_t trajectory, const std::string& context) {
     ++episodes_;
-    if (!h5::exists(trajectory, "success"))
+    if (!hdf5::exists(trajectory, "success"))
       return error(context, "has no 'success': its length is unknown");
     const RowDataset success(trajectory, "success");
     if (!success.is_number() || success.row_size() != 1)
@@ -127,9 +127,9 @@ class FileVerifier {
     steps_ += T;
     if (T == 0) error(context, "has no steps");
     for (const char* name : {"rewards", "fail", "terminated", "truncated", "obs_scene"}) {
-      if (!h5::exists(trajectory, name)) error(context, fmt::format("has no '{}'", name));
+      if (!hdf5::exists(trajectory, name)) error(context, fmt::format("has no '{}'", name));
     }
-    h5::each_dataset(trajectory, [&](const std::string& name) {
+    hdf5::each_dataset(trajectory, [&](const std::string& name) {
       if (name.starts_with("obs/sensor_data/")) return;
       try {
         check_dataset(trajectory, name, T, context + "/" + name);
@@ -139,15 +139,15 @@ class FileVerifier {
     });
     check_success(trajectory, context);
     for (const char* name : {"obs/agent/qpos", "obs/agent/qvel"}) {
-      if (!h5::exists(trajectory, name))
+      if (!hdf5::exists(trajectory, name))
         note(context, fmt::format("has no '{}', which MolmoSpaces' tools require", name));
     }
     check_sensor_data(trajectory, T, context);
   }
 
   // Compares with the checksum stored in the object's attribute.
-  void compare(hid_t object, const std::string& context, const Checksum& sum) {
-    const std::string stated = h5::text_attribute(object, kChecksumAttribute);
+  void compare(hid_t object, const std::string& context, const record::Checksum& sum) {
+    const std::string stated = hdf5::text_attribute(object, record::kChecksumAttribute);
     ++(stated.empty() ? without_sum_ : with_sum_);
     if (!stated.empty() && stated != sum.text())
       error(context, fmt::format("differs from what was recorded: its checksum is {}, expected {}",
@@ -160,9 +160,9 @@ class FileVerifier {
     unpacked_ += dataset.bytes();
     if (unpacked_ > kFreeBytes + kMaxUnpacked * bytes_)
       return error(context, "is not read: the file declares far more data than it contains");
-    Checksum sum;
+    record::Checksum sum;
     if (name == "obs_scene") {
-      const std::string text = h5::read_text(trajectory, name);
+      const std::string text = hdf5::read_text(trajectory, name);
       if (const auto wrong = parse_json(text); !wrong.empty())
         error(context, "is not JSON text: " + wrong);
       sum.add(text.data(), text.size());
@@ -193,7 +193,7 @@ class FileVerifier {
 
   // A stream may hold NaN if its description says what that means.
   void check_nan(const RowDataset& dataset, const std::string& context) {
-    if (h5::text_attribute(dataset.id(), "description").find("NaN") != std::string::npos) return;
+    if (hdf5::text_attribute(dataset.id(), "description").find("NaN") != std::string::npos) return;
     std::int64_t at = 0, first = -1, count = 0;
     dataset.each_number([&](std::span<const double> values) {
       for (const double x : values) {
@@ -209,7 +209,7 @@ class FileVerifier {
   }
 
   void check_success(hid_t trajectory, const std::string& context) {
-    if (!h5::exists(trajectory, "fail")) return;
+    if (!hdf5::exists(trajectory, "fail")) return;
     std::vector<std::int8_t> success, fail;
     const auto read = [&](const char* name, std::vector<std::int8_t>& out) {
       const RowDataset dataset(trajectory, name);
@@ -230,30 +230,31 @@ class FileVerifier {
 
   void check_sensor_data(hid_t trajectory, std::int64_t T, const std::string& context) {
     std::set<std::string> named;
-    if (h5::exists(trajectory, "obs/sensor_data")) {
-      const h5::Id group = h5::open_group(trajectory, "obs/sensor_data");
-      for (const std::string& key : h5::children(group)) {
+    if (hdf5::exists(trajectory, "obs/sensor_data")) {
+      const hdf5::Id group = hdf5::open_group(trajectory, "obs/sensor_data");
+      for (const std::string& key : hdf5::children(group)) {
         named.insert(key);
         const std::string video_place = context + "/obs/sensor_data/" + key;
         try {
-          const h5::Id dataset = h5::open_dataset(group, key);
-          const std::string crc = h5::text_attribute(dataset, kChecksumAttribute);
+          const hdf5::Id dataset = hdf5::open_dataset(group, key);
+          const std::string crc = hdf5::text_attribute(dataset, record::kChecksumAttribute);
           ++(crc.empty() ? without_sum_ : with_sum_);
           out_["videos"].push_back({{"place", printable(video_place)},
                                     {"name", read_file_name(group, key)},
                                     {"frames", T},
-                                    {"width", h5::int_attribute(dataset, "width", 0)},
-                                    {"height", h5::int_attribute(dataset, "height", 0)},
+                                    {"width", hdf5::int_attribute(dataset, "width", 0)},
+                                    {"height", hdf5::int_attribute(dataset, "height", 0)},
                                     {"crc", crc}});
         } catch (const Error& e) {
           error(video_place, e.what());
         }
       }
     }
-    if (!h5::text_attribute(trajectory, "outcome").empty() ||
-        !h5::exists(trajectory, "obs/sensor_param"))
+    if (!hdf5::text_attribute(trajectory, "outcome").empty() ||
+        !hdf5::exists(trajectory, "obs/sensor_param"))
       return;
-    for (const std::string& camera : h5::children(h5::open_group(trajectory, "obs/sensor_param"))) {
+    for (const std::string& camera :
+         hdf5::children(hdf5::open_group(trajectory, "obs/sensor_param"))) {
       if (!named.contains(camera))
         note(context, fmt::format("names no video of camera '{}' (repair adds the names)", camera));
     }
@@ -302,17 +303,17 @@ class Verifier {
       const Fd file = open_plain(folder, recorded.path.filename().string());
       const FileState before = state_of(file);
       const auto bytes = static_cast<std::uint64_t>(size_of(file));
-      const Seal seal = check_seal(file.get());
+      const record::Seal seal = record::check_seal(file.get());
       std::string answer, failure;
       try {
-        answer = h5::in_child(recorded.name, bytes, [&] {
-          return FileVerifier(recorded, bytes, seal != Seal::kNone).run();
+        answer = hdf5::in_child(recorded.name, bytes, [&] {
+          return FileVerifier(recorded, bytes, seal != record::Seal::kNone).run();
         });
       } catch (const Error& e) {
         failure = e.what();
       }
       if (state_of(recorded.path) != before) return error(recorded.name, kChanged);
-      if (seal == Seal::kCorrupt) error(recorded.name, "is damaged: its checksum is wrong");
+      if (seal == record::Seal::kCorrupt) error(recorded.name, "is damaged: its checksum is wrong");
       if (!failure.empty()) return error(recorded.name, failure);
       take(recorded, Json::parse(answer));
     } catch (const Json::exception&) {
@@ -350,7 +351,7 @@ class Verifier {
       return error(context,
                    fmt::format("names a model archive '{}', which is not a plain file name", name));
     try {
-      const std::string crc = checksum_of(open_plain(folder, name).get());
+      const std::string crc = record::checksum_of(open_plain(folder, name).get());
       if (name != fmt::format("model_{}.zip", crc))
         error(context, fmt::format("'{}' is damaged: its checksum is {}", name, crc));
     } catch (const Error& e) {
@@ -384,7 +385,7 @@ class Verifier {
   }
 
   std::string check_video(const VideoCheck& video, const Fd& file) const {
-    VideoFacts facts = read_video_facts(file.get());
+    record::VideoFacts facts = record::read_video_facts(file.get());
     // Video containers written by other programs may have a format that only ffmpeg can read.
     if (!facts.error.empty() || options_.decode) {
       const VideoProbe probe =
@@ -403,7 +404,7 @@ class Verifier {
       return fmt::format("'{}' is {} x {} pixels, expected {} x {}", video.name, facts.width,
                          facts.height, video.width, video.height);
     if (video.crc.empty()) return "";
-    if (const std::string crc = checksum_of(file.get()); crc != video.crc)
+    if (const std::string crc = record::checksum_of(file.get()); crc != video.crc)
       return fmt::format("'{}' is damaged: its checksum is {}, expected {}", video.name, crc,
                          video.crc);
     return "";
@@ -415,7 +416,7 @@ class Verifier {
       std::vector<fs::path> paths;
       for (const RecordedFile& file : files) {
         const fs::path folder = file.path.parent_path();
-        if (folder / "" == house / "" || folder.parent_path() == house / kStagingDir)
+        if (folder / "" == house / "" || folder.parent_path() == house / record::kStagingDir)
           paths.push_back(file.path);
       }
       return paths;
@@ -430,7 +431,8 @@ class Verifier {
   // Removes the findings of unpublished episodes, because they may have been moved since.
   void forget_waiting(const fs::path& house) {
     for (const RecordedFile& file : listed_) {
-      if (file.published || file.path.parent_path().parent_path() != house / kStagingDir) continue;
+      if (file.published || file.path.parent_path().parent_path() != house / record::kStagingDir)
+        continue;
       std::erase_if(result_.findings,
                     [&](const Finding& f) { return f.context.starts_with(printable(file.name)); });
     }
@@ -438,17 +440,17 @@ class Verifier {
 
   void check_leftovers(const fs::path& house) {
     const std::string context = house.filename().string();
-    if (fs::is_symlink(house / kStagingDir))
-      return error(context,
-                   fmt::format("'{}' is a symbolic link, which is not followed", kStagingDir));
-    if (const bool locked = is_locked(house); locked || has_moved(house)) {
+    if (fs::is_symlink(house / record::kStagingDir))
+      return error(context, fmt::format("'{}' is a symbolic link, which is not followed",
+                                        record::kStagingDir));
+    if (const bool locked = record::is_locked(house); locked || has_moved(house)) {
       forget_waiting(house);
       return error(context, locked
                                 ? "is being recorded: verify it again after the recording has ended"
                                 : kChanged);
     }
-    if (fs::exists(house / kStagingDir)) {
-      const std::size_t waiting = finished_episodes(house).size();
+    if (fs::exists(house / record::kStagingDir)) {
+      const std::size_t waiting = record::finished_episodes(house).size();
       error(context, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
                                  "the recording, or repair",
                                  waiting));
@@ -456,8 +458,8 @@ class Verifier {
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
       const fs::path& path = entry.path();
-      if (path.filename() == kDamagedDir)
-        note(context + "/" + kDamagedDir, "contains damaged episodes that were set aside");
+      if (path.filename() == record::kDamagedDir)
+        note(context + "/" + record::kDamagedDir, "contains damaged episodes that were set aside");
       const bool video = path.extension() == ".mp4" || path.extension() == ".mkv";
       if (video && !used_.contains(path))
         note(context + "/" + path.filename().string(), "does not belong to an episode");
@@ -501,4 +503,4 @@ std::string VerifyResult::json() const {
   return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

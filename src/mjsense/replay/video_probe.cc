@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/process.h"
 
-namespace mjsense {
+namespace mjsense::replay {
 
 namespace {
 
@@ -21,8 +21,8 @@ constexpr std::size_t kLineBytes = 96;
 constexpr std::uint64_t kMinSeconds = 60, kBytesPerSecond = 50'000;
 constexpr std::uint64_t kMemory = std::uint64_t{4} << 30;
 
-ProcessLimits process_limits(const std::filesystem::path& path, double silence_s,
-                             std::size_t max_bytes) {
+record::ProcessLimits process_limits(const std::filesystem::path& path, double silence_s,
+                                     std::size_t max_bytes) {
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(path, ignored);
   return {silence_s, kMinSeconds + (ignored ? 0 : bytes / kBytesPerSecond), kMemory, max_bytes};
@@ -48,7 +48,7 @@ std::vector<std::string> input_of(const std::filesystem::path& path) {
 
 std::vector<std::string> command_of(const std::filesystem::path& path, const std::string& ffmpeg,
                                     std::initializer_list<std::string> options) {
-  std::vector<std::string> command = {ffmpeg_program(ffmpeg), "-nostdin", "-hide_banner",
+  std::vector<std::string> command = {record::ffmpeg_program(ffmpeg), "-nostdin", "-hide_banner",
                                       "-loglevel", "error"};
   command.insert(command.end(), options);
   const auto input = input_of(path);
@@ -70,8 +70,8 @@ VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int6
   try {
     const auto maximum = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
     std::string stderr_tail;
-    listing = run_process(command, process_limits(path, kSilenceLimit, maximum * kLineBytes),
-                          &stderr_tail);
+    listing = record::run_process(
+        command, process_limits(path, kSilenceLimit, maximum * kLineBytes), &stderr_tail);
     // ffmpeg only prints a message about damaged FFV1 slices and exits with success.
     if (decode && !stderr_tail.empty()) probe.error = stderr_tail;
   } catch (const Error& error) {
@@ -105,8 +105,9 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                  {"-vf", filters, "-frames:v", fmt::format("{}", frames.size()), "-f", "rawvideo",
                   "-pix_fmt", grey16 ? "gray16le" : "rgb24", "pipe:1"});
   const std::size_t maximum = frames.size() * width * height * 3 + 1;
-  const std::string raw = run_process(command, process_limits(path, 2 * kSilenceLimit, maximum));
+  const std::string raw =
+      record::run_process(command, process_limits(path, 2 * kSilenceLimit, maximum));
   return {raw.begin(), raw.end()};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

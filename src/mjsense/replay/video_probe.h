@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::replay {
 
 struct VideoProbe {
   int frames = 0, width = 0, height = 0;
@@ -29,4 +29,4 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                                       std::span<const int> frames, int width, int height,
                                       bool grey16, const std::string& ffmpeg);
 
-}  // namespace mjsense
+}  // namespace mjsense::replay

@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Values of one move group: joint positions (qpos; a free joint has 7), or a command.
 struct GroupValues {
@@ -46,4 +46,4 @@ struct Action {
   std::optional<bool> success;  // the policy's own verdict; {done, success: false} means it gave up
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

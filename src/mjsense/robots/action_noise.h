@@ -6,7 +6,7 @@
 
 #include "mjsense/core/rng.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Normal distribution with standard deviation `deviation`, truncated to +-limit.
 inline double truncated_normal(Rng& rng, double deviation, double limit) {
@@ -19,4 +19,4 @@ inline double truncated_normal(Rng& rng, double deviation, double limit) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

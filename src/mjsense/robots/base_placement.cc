@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 // m and rad; two poses that are closer than this are the same.
@@ -27,7 +27,7 @@ double distance(const Pose& a, const Pose& b) {
 
 BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const int> joints,
                              std::string context)
-    : context_(std::move(context)), base_name_(name_of(m, mjOBJ_BODY, base_body)) {
+    : context_(std::move(context)), base_name_(scene::name_of(m, mjOBJ_BODY, base_body)) {
   std::vector<int> path;
   for (int b = base_body; b != 0; b = m->body_parentid[b]) {
     const int joint = m->body_jntnum[b] > 0 ? m->body_jntadr[b] : -1;
@@ -52,12 +52,12 @@ BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const in
       const int type = m->jnt_type[j];
       if (type != mjJNT_SLIDE && type != mjJNT_HINGE) {
         fault_ = fmt::format("the joint '{}' that moves it is neither a slide nor a hinge",
-                             name_of(m, mjOBJ_JOINT, j));
+                             scene::name_of(m, mjOBJ_JOINT, j));
         return;
       }
       if (std::ranges::find(joints, j) == joints.end()) {
         fault_ = fmt::format("the joint '{}' that moves it belongs to no move group of kind 'base'",
-                             name_of(m, mjOBJ_JOINT, j));
+                             scene::name_of(m, mjOBJ_JOINT, j));
         return;
       }
       links_.emplace_back(m, j, fixed);
@@ -145,4 +145,4 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

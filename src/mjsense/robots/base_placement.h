@@ -12,7 +12,7 @@
 #include "mjsense/robots/link.h"
 #include "mjsense/robots/state_row.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // The base is moved by the first of these that the model has:
 //   1. its free joint;
@@ -44,4 +44,4 @@ class BasePlacement {
   std::vector<int> qpos_, dofs_;  // addresses, per link
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -5,7 +5,7 @@
 
 #include "mjsense/observe/function_sensor.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 bool fingers_touch(const World& world, const MoveGroup& gripper, int body) {
   if (body < 0 || gripper.pad_sites[0] < 0 || gripper.pad_sites[1] < 0) return false;
@@ -15,10 +15,10 @@ bool fingers_touch(const World& world, const MoveGroup& gripper, int body) {
     const mjContact& contact = world.data->contact[c];
     if (contact.exclude != 0 || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
     const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-    const bool first = is_descendant_or_self(m, a, body);
-    if (first == is_descendant_or_self(m, b, body)) continue;
+    const bool first = observe::is_descendant_or_self(m, a, body);
+    if (first == observe::is_descendant_or_self(m, b, body)) continue;
     for (int f = 0; f < 2; ++f) {
-      if (is_descendant_or_self(m, first ? b : a, m->site_bodyid[gripper.pad_sites[f]]))
+      if (observe::is_descendant_or_self(m, first ? b : a, m->site_bodyid[gripper.pad_sites[f]]))
         touches[f] = true;
     }
   }
@@ -26,7 +26,7 @@ bool fingers_touch(const World& world, const MoveGroup& gripper, int body) {
 }
 
 std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
-                                                          const BodyRef& object) {
+                                                          const observe::BodyRef& object) {
   std::vector<const MoveGroup*> grippers;
   for (const MoveGroup& group : robot.groups()) {
     if (group.kind == GroupKind::kGripper) grippers.push_back(&group);
@@ -39,7 +39,7 @@ std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
     spec.low = 0;
     spec.high = 1;
     spec.description = fmt::format("Both fingers of '{}' touch the task's object.", gripper->name);
-    sensors.push_back(std::make_shared<FunctionSensor<std::uint8_t>>(
+    sensors.push_back(std::make_shared<observe::FunctionSensor<std::uint8_t>>(
         fmt::format("{}_{}_grasp_state", robot.name(),
                     gripper->name.substr(0, gripper->name.find('_'))),
         spec, [gripper, object](const World& world, std::span<std::uint8_t> row) {
@@ -49,4 +49,4 @@ std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
   return sensors;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -10,7 +10,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/robots/robot.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // True if both fingers of the gripper touch `body` or a body below it. A finger is the body of a
 // pad site with the bodies below it. False for a gripper without pads and for body < 0.
@@ -21,6 +21,6 @@ bool fingers_touch(const World& world, const MoveGroup& gripper, int body);
 // first '_'. Empty for a robot with one gripper. The sensors refer to `robot`, which must outlive
 // them.
 std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
-                                                          const BodyRef& object);
+                                                          const observe::BodyRef& object);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

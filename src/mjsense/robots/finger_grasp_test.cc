@@ -7,7 +7,7 @@
 
 #include "mjsense/observe/testing/world.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 // Two fingers with pads that face each other along y, 4 cm apart; a box with a child body, the
@@ -41,7 +41,7 @@ struct Fingers : testing::Test {
     mj_forward(w.model, w.data);
     return fingers_touch(w.world(), gripper, body(what));
   }
-  TestWorld w{kScene};
+  observe::TestWorld w{kScene};
   MoveGroup gripper;
 };
 
@@ -70,4 +70,4 @@ TEST_F(Fingers, OtherContactsDoNotCount) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -5,9 +5,10 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
-GraspStateSensor::GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers)
+GraspStateSensor::GraspStateSensor(std::string name, observe::BodyRef object,
+                                   std::vector<Gripper> grippers)
     : Sensor(std::move(name)), object_(std::move(object)), grippers_(std::move(grippers)) {
   if (grippers_.size() > kMaxGrippers) {
     throw ValueError(fmt::format("sensor '{}': {} grippers: the maximum is {}", this->name(),
@@ -22,9 +23,9 @@ void GraspStateSensor::initialize(const SensorInit& init) {
   gripper_bits_.assign(m->ngeom, 0);
   clear_fields();
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
-    const int root = object_id(m, mjOBJ_BODY, context, grippers_[i].body);
+    const int root = observe::object_id(m, mjOBJ_BODY, context, grippers_[i].body);
     for (int g = 0; g < m->ngeom; ++g) {
-      if (is_descendant_or_self(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
+      if (observe::is_descendant_or_self(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
     }
     SensorSpec spec;
     spec.dtype = DType::kBool;
@@ -43,7 +44,7 @@ void GraspStateSensor::compute(const World& world) {
   const mjData* d = world.data;
   const int root = object_(world.id);
   const auto in_object = [&](int geom) {
-    return is_descendant_or_self(m, m->geom_bodyid[geom], root);
+    return observe::is_descendant_or_self(m, m->geom_bodyid[geom], root);
   };
   for (int c = 0; root >= 0 && c < d->ncon; ++c) {
     const mjContact& contact = d->contact[c];
@@ -60,4 +61,4 @@ void GraspStateSensor::compute(const World& world) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -8,7 +8,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Streams <name>/<gripper>/held and <name>/<gripper>/touching: bool []. Only contacts with exactly
 // one geom in the object count. touching: the other geom is in this gripper. held: touching, and no
@@ -20,7 +20,7 @@ class GraspStateSensor final : public Sensor {
     std::string name;  // move group, e.g. "gripper"
     std::string body;  // root body; the gripper consists of the geoms of its subtree
   };
-  GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers);
+  GraspStateSensor(std::string name, observe::BodyRef object, std::vector<Gripper> grippers);
   std::string_view kind() const override { return "grasp_state"; }
   mjtStage needs() const override { return mjSTAGE_POS; }
   void initialize(const SensorInit& init) override;
@@ -28,9 +28,9 @@ class GraspStateSensor final : public Sensor {
 
  private:
   static constexpr int kMaxGrippers = 30;
-  BodyRef object_;
+  observe::BodyRef object_;
   std::vector<Gripper> grippers_;            // gripper i has fields 2 i and 2 i + 1
   std::vector<std::uint32_t> gripper_bits_;  // [ngeom]; bit i is set if the geom is in gripper i
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

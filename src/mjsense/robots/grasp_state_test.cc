@@ -5,7 +5,7 @@
 
 #include "mjsense/observe/testing/world.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 // A gripper that is one sphere at (1, 0, .58), and a cube on the floor.
@@ -21,10 +21,12 @@ constexpr char kScene[] = R"(
 </mujoco>)";
 
 TEST(GraspState, TouchingIsNotHolding) {
-  TestWorld w(kScene);
+  observe::TestWorld w(kScene);
   GraspStateSensor grasp("grasp_state_pickup_obj", "thing/cube", {{"gripper", "robot/base"}});
-  const auto held = [&]() -> bool { return values<bool>(grasp, "gripper/held")[0]; };
-  const auto touching = [&]() -> bool { return values<bool>(grasp, "gripper/touching")[0]; };
+  const auto held = [&]() -> bool { return observe::values<bool>(grasp, "gripper/held")[0]; };
+  const auto touching = [&]() -> bool {
+    return observe::values<bool>(grasp, "gripper/touching")[0];
+  };
   w.compute(grasp);  // the cube rests on the floor; the gripper is far away
   EXPECT_FALSE(held());
   EXPECT_FALSE(touching());
@@ -47,4 +49,4 @@ TEST(GraspState, TouchingIsNotHolding) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 // kDamping: eps of damped_step(). kAttempt: iterations from each restart; a solution is usually
@@ -267,4 +267,4 @@ bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations, doub
   return false;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

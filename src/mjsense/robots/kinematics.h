@@ -11,7 +11,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/robots/link.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // The hinge and slide joints from body `base` (excluded) to site `leaf`; J = joints().size().
 class Chain {
@@ -63,4 +63,4 @@ class Chain {
   std::vector<double> low_, high_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -9,7 +9,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/robots/load_robot.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 struct Fr3 : testing::Test {
@@ -189,4 +189,4 @@ TEST_F(Fr3, FixedJointsDoNotMove) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

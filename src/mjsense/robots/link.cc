@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/robots/link.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 Link::Link(const mjModel* model, int joint, const Pose& before)
     : fixed(before),
@@ -20,4 +20,4 @@ void Link::move(Pose& pose, double q) const {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

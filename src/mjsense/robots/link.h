@@ -6,7 +6,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 struct Link {
   Pose fixed;         // from the moved frame of the previous link
@@ -20,4 +20,4 @@ struct Link {
   void move(Pose& pose, double q) const;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -16,7 +16,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_parts.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 namespace fs = std::filesystem;
@@ -36,7 +36,7 @@ void check_unique(std::string_view context, const char* what, const std::string&
 // Throws KeyError unless the model has every element that `cfg` names.
 void check_references(const RobotCfg& cfg, const mjSpec* spec, const std::string& path) {
   const auto check = [&](mjtObj type, const std::string& name, const std::string& context) {
-    find_in_spec(spec, type, name, context);
+    scene::find_in_spec(spec, type, name, context);
   };
   check(mjOBJ_BODY, cfg.base_body, path + ": base");
   for (const MoveGroupCfg& group : cfg.groups) {
@@ -116,13 +116,13 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
   cfg.model.path = resolve_relative(path, cfg.mjcf);
   const std::string context = fmt::format("robot '{}'", cfg.name);
   if (cfg.parts.empty()) {
-    check_references(cfg, parse_model(cfg.model, context).get(), path);
+    check_references(cfg, scene::parse_model(cfg.model, context).get(), path);
   } else {
-    std::vector<ModelPart> parts;
+    std::vector<scene::ModelPart> parts;
     for (const PartCfg& part : cfg.parts)
       parts.push_back(
           {resolve_relative(path, part.model), part.to, part.prefix, part.pos, part.quat});
-    const std::shared_ptr<mjSpec> spec = compose_model(cfg.model, parts, context);
+    const std::shared_ptr<mjSpec> spec = scene::compose_model(cfg.model, parts, context);
     check_references(cfg, spec.get(), path);
     cfg.model = {.spec = spec.get(), .owner = spec};
   }
@@ -132,12 +132,12 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
 
 std::string robot_xml(const RobotCfg& cfg) {
   const std::string context = fmt::format("robot '{}'", cfg.name);
-  const SpecPtr spec = parse_model(cfg.model, context);
+  const scene::SpecPtr spec = scene::parse_model(cfg.model, context);
   if (cfg.edit_spec) cfg.edit_spec(spec.get(), "");
-  const Vfs vfs;
+  const scene::Vfs vfs;
   if (!compile(spec.get(), vfs))
-    throw ValueError(fmt::format("{}: {}", context, one_line(mjs_getError(spec.get()))));
-  return save_xml(spec.get());
+    throw ValueError(fmt::format("{}: {}", context, scene::one_line(mjs_getError(spec.get()))));
+  return scene::save_xml(spec.get());
 }
 
 std::vector<std::string> robot_names() { return kRobots.names(); }
@@ -147,4 +147,4 @@ RobotCfg robot_cfg(std::string_view name) {
   return parse_robot(file.text, file.path);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -9,7 +9,7 @@
 
 #include "mjsense/robots/robot_cfg.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Names of the built-in robots.
 std::vector<std::string> robot_names();
@@ -27,4 +27,4 @@ std::string robot_xml(const RobotCfg& cfg);
 // folder.
 RobotCfg parse_robot(std::string_view text, const std::string& path);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -13,7 +13,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 using ::testing::ElementsAre;
@@ -96,11 +96,11 @@ TEST_F(RobotFile, DefinesARobot) {
 
 TEST_F(RobotFile, PartsAreAttachedAtTheirPoses) {
   const RobotCfg cfg = load(kToml);
-  SceneCfg scene_cfg;
-  EntityCfg entity;
+  scene::SceneCfg scene_cfg;
+  scene::EntityCfg entity;
   entity.model = cfg.model;
   scene_cfg.entities = {{"robot_0", entity}};
-  const Scene scene(scene_cfg);
+  const scene::Scene scene(scene_cfg);
   const mjModel* m = scene.model();
   const int tool = mj_name2id(m, mjOBJ_BODY, "robot_0/tool/tool");
   ASSERT_GE(tool, 0);
@@ -180,4 +180,4 @@ TEST(RobotNames, AreFoundOrTheNearestIsSuggested) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -8,7 +8,7 @@
 #include "mjsense/robots/action.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 int qpos_width(int joint_type) {
@@ -32,7 +32,7 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
                         const std::string& context) {
   validate(cfg, context);
   const auto find = [&](mjtObj type, const std::string& name) {
-    return resolve(model, type, prefix + name, context);
+    return scene::resolve(model, type, prefix + name, context);
   };
   MoveGroup group;
   group.name = cfg.name;
@@ -77,4 +77,4 @@ bool gripper_is_open(const MoveGroup& gripper, const World& world) {
   return gripper_opening(gripper, world) > 0.5 * gripper.max_opening;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -8,7 +8,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/robots/robot_cfg.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 struct MoveGroup {
   std::string name;
@@ -49,4 +49,4 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
 double gripper_opening(const MoveGroup& gripper, const World& world);
 bool gripper_is_open(const MoveGroup& gripper, const World& world);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

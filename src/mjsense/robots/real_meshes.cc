@@ -11,7 +11,7 @@
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 namespace fs = std::filesystem;
@@ -20,8 +20,8 @@ void replace(const MeshesCfg& cfg, const fs::path& folder, mjSpec* spec,
              const std::string& prefix) {
   const Regex pattern(cfg.replace, "meshes.replace");
   std::vector<mjsElement*> shapes;
-  for (mjsElement* geom : spec_elements(spec, mjOBJ_GEOM)) {
-    const std::string name = element_name(geom);
+  for (mjsElement* geom : scene::spec_elements(spec, mjOBJ_GEOM)) {
+    const std::string name = scene::element_name(geom);
     if (name.starts_with(prefix) && pattern.fullmatch(name.substr(prefix.size())))
       shapes.push_back(geom);
   }
@@ -31,7 +31,7 @@ void replace(const MeshesCfg& cfg, const fs::path& folder, mjSpec* spec,
     mjsMesh* mesh = mjs_addMesh(spec, nullptr);
     mjs_setName(mesh->element, name.c_str());
     mjs_setString(mesh->file, (folder / file).c_str());
-    mjsBody* body = mjs_asBody(find_in_spec(spec, mjOBJ_BODY, name, "meshes"));
+    mjsBody* body = mjs_asBody(scene::find_in_spec(spec, mjOBJ_BODY, name, "meshes"));
     mjsGeom* geom = mjs_addGeom(body, nullptr);
     mjs_setName(geom->element, (name + "_mesh").c_str());
     geom->type = mjGEOM_MESH;
@@ -72,4 +72,4 @@ std::function<void(mjSpec* spec, const std::string& prefix)> use_meshes(
   };
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -9,7 +9,7 @@
 
 #include "mjsense/robots/robot_cfg.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Returns a function that replaces the shapes in a scene's spec, for a robot whose names have
 // `prefix`; an empty function if there is no folder with meshes. Collision geoms, masses and joints
@@ -18,4 +18,4 @@ namespace mjsense {
 std::function<void(mjSpec* spec, const std::string& prefix)> use_meshes(
     const MeshesCfg& cfg, const std::string& robot_file);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -15,7 +15,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 namespace fs = std::filesystem;
@@ -44,13 +44,13 @@ struct Meshes {
   testing::TempDir folder;
 };
 
-std::unique_ptr<Scene> scene_of(const RobotCfg& robot) {
-  SceneCfg cfg;
-  EntityCfg entity;
+std::unique_ptr<scene::Scene> scene_of(const RobotCfg& robot) {
+  scene::SceneCfg cfg;
+  scene::EntityCfg entity;
   entity.model = robot.model;
   cfg.entities = {{"robot_0", entity}};
   if (robot.edit_spec) cfg.spec_fn = [&](mjSpec* spec) { robot.edit_spec(spec, "robot_0/"); };
-  return std::make_unique<Scene>(cfg);
+  return std::make_unique<scene::Scene>(cfg);
 }
 
 TEST(FrankaMeshes, ReplaceTheShapesAndNothingElse) {
@@ -65,7 +65,7 @@ TEST(FrankaMeshes, ReplaceTheShapesAndNothingElse) {
   for (int g = 0; g < a->ngeom; ++g) touched_a += a->geom_contype[g] || a->geom_conaffinity[g];
   for (int g = 0; g < b->ngeom; ++g) {
     touched_b += b->geom_contype[g] || b->geom_conaffinity[g];
-    EXPECT_EQ(name_of(b, mjOBJ_GEOM, g).find("shape_"), std::string::npos);
+    EXPECT_EQ(scene::name_of(b, mjOBJ_GEOM, g).find("shape_"), std::string::npos);
   }
   EXPECT_EQ(touched_a, touched_b);
   for (int i = 0; i < a->nbody; ++i) {
@@ -109,9 +109,9 @@ TEST(FrankaModel, CamerasHaveTheirPosesAndFieldsOfView) {
        {0.95394, 0, 0.29998}},
   };
   for (const auto& want : cameras) {
-    const int camera = resolve(m, mjOBJ_CAMERA, std::string("robot_0/") + want.name, "test");
+    const int camera = scene::resolve(m, mjOBJ_CAMERA, std::string("robot_0/") + want.name, "test");
     EXPECT_EQ(m->cam_bodyid[camera],
-              resolve(m, mjOBJ_BODY, std::string("robot_0/") + want.body, "test"));
+              scene::resolve(m, mjOBJ_BODY, std::string("robot_0/") + want.body, "test"));
     EXPECT_NEAR(m->cam_fovy[camera], want.fovy, 1e-5) << want.name;
     double r[9];
     mju_quat2Mat(r, m->cam_quat + 4 * camera);
@@ -136,10 +136,10 @@ TEST(FrankaModel, MassesAreThePublishedOnes) {
   const double masses[] = {2.3966,       2.9274653454, 2.9355370338, 2.2449013699,
                            2.6155955791, 2.3271207594, 1.8170376524, 0.6271432862};
   for (int i = 0; i < 8; ++i) {
-    const int body = resolve(m, mjOBJ_BODY, "robot_0/fr3_link" + std::to_string(i), "test");
+    const int body = scene::resolve(m, mjOBJ_BODY, "robot_0/fr3_link" + std::to_string(i), "test");
     EXPECT_NEAR(m->body_mass[body], masses[i], 1e-9);
   }
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -11,7 +11,7 @@
 #include "mjsense/robots/action_noise.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 void check_groups(const std::string& context, std::size_t found) {
@@ -27,7 +27,7 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
              std::optional<ControlPeriods> periods)
     : cfg_(std::move(cfg)), model_(model), prefix_(prefix) {
   const std::string context = "robot '" + cfg_.name + "'";
-  base_body_ = resolve(model, mjOBJ_BODY, prefix_ + cfg_.base_body, context);
+  base_body_ = scene::resolve(model, mjOBJ_BODY, prefix_ + cfg_.base_body, context);
   check_groups(context, cfg_.groups.size());
   ControllerInit init{
       model,
@@ -317,4 +317,4 @@ void Robot::add_arm_noise(const World& world, int g, Rng& rng, std::span<double>
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

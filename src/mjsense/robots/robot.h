@@ -26,7 +26,7 @@
 #include "mjsense/robots/robot_cfg.h"
 #include "mjsense/robots/state_row.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 class Robot {
  public:
@@ -105,8 +105,8 @@ class Robot {
   // must outlive them.
   std::vector<std::shared_ptr<Sensor>> create_robot_sensors() const;
   // Parts of the robot that object_image_points includes: the grippers.
-  std::vector<ImagePointsSensor::Object> image_objects() const;
-  std::vector<JointGroup> joint_groups() const;
+  std::vector<observe::ImagePointsSensor::Object> image_objects() const;
+  std::vector<observe::JointGroup> joint_groups() const;
 
  private:
   std::span<double> holding(int world, int group);
@@ -126,4 +126,4 @@ class Robot {
   std::vector<RobotValues> targets_;  // [B]; `given` is false while the group holds
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -19,13 +19,13 @@
 #include "mjsense/robots/controllers/controller_cfg.h"
 #include "mjsense/scene/entity.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // kActuators: a group defined by its actuators; without a command their controls do not change.
 enum class GroupKind { kBase, kTorso, kArm, kGripper, kHead, kActuators };
-template <>
-inline constexpr std::array<std::string_view, 6> kEnumNames<GroupKind>{
-    "base", "torso", "arm", "gripper", "head", "actuators"};
+constexpr std::array<std::string_view, 6> enum_names(GroupKind) {
+  return {"base", "torso", "arm", "gripper", "head", "actuators"};
+}
 
 // Names are local to the robot's model, without the "robot_0/" prefix.
 struct MoveGroupCfg {
@@ -168,7 +168,7 @@ struct PythonSensorRef {
 struct RobotCfg {
   std::string name;
   std::string description;
-  ModelSource model;
+  scene::ModelSource model;
   // Called on the scene's spec before compilation with the prefix of the robot's names; may be
   // empty.
   std::function<void(mjSpec* spec, const std::string& prefix)> edit_spec;
@@ -228,4 +228,4 @@ void visit_fields(V& v, RobotCfg& c) {
 // Checks that the periods divide each other and that names are unique.
 void validate(const RobotCfg& cfg, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -8,7 +8,7 @@
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 using testing::HasSubstr;
@@ -19,9 +19,9 @@ struct DataDelete {
 
 // A Franka without other objects, in two worlds.
 struct Franka : testing::Test {
-  static SceneCfg scene_cfg() {
-    SceneCfg cfg;
-    EntityCfg entity;
+  static scene::SceneCfg scene_cfg() {
+    scene::SceneCfg cfg;
+    scene::EntityCfg entity;
     entity.model = robot_cfg("franka").model;
     cfg.entities = {{"robot_0", entity}};
     return cfg;
@@ -48,7 +48,7 @@ struct Franka : testing::Test {
     return {arm.begin(), arm.end()};
   }
 
-  Scene scene{scene_cfg()};
+  scene::Scene scene{scene_cfg()};
   const mjModel* model = scene.model();
   Robot robot{robot_cfg("franka"), model, 2};
   std::unique_ptr<mjData, DataDelete> data[2];
@@ -330,4 +330,4 @@ TEST_F(Franka, UnknownNamesAreErrorsWithASuggestion) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -13,7 +13,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 using testing::HasSubstr;
@@ -28,12 +28,12 @@ struct Alone {
       : cfg(robot_cfg(name)) {
     for (MoveGroupCfg& group : cfg.groups)
       if (of_arms && group.kind == GroupKind::kArm) group.controller = *of_arms;
-    SceneCfg scene_cfg;
-    EntityCfg entity;
+    scene::SceneCfg scene_cfg;
+    scene::EntityCfg entity;
     entity.model = cfg.model;
     scene_cfg.entities = {{"robot_0", entity}};
     scene_cfg.options.timestep = 0.001 * cfg.sim_dt_ms;
-    scene = std::make_unique<Scene>(scene_cfg);
+    scene = std::make_unique<scene::Scene>(scene_cfg);
     model = scene->model();
     robot = std::make_unique<Robot>(cfg, model, 1);
     data.reset(mj_makeData(model));
@@ -68,7 +68,7 @@ struct Alone {
   }
 
   RobotCfg cfg;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<scene::Scene> scene;
   const mjModel* model = nullptr;
   std::unique_ptr<Robot> robot;
   std::unique_ptr<mjData, DataDelete> data;
@@ -408,4 +408,4 @@ TEST(Robots, GroupsMatchMolmoSpaces) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

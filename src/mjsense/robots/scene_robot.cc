@@ -10,7 +10,7 @@
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 // The elements of one type whose names begin with the prefix: local names and ids.
@@ -23,8 +23,8 @@ Named named(const mjModel* m, mjtObj type, const std::string& prefix) {
   Named found;
   // the world body is not part of the robot
   const int first = type == mjOBJ_BODY && prefix.empty() ? 1 : 0;
-  for (int id = first; id < count_of(m, type); ++id) {
-    const std::string name = name_of(m, type, id);
+  for (int id = first; id < scene::count_of(m, type); ++id) {
+    const std::string name = scene::name_of(m, type, id);
     if (!name.starts_with(prefix)) continue;
     found.names.push_back(name.substr(prefix.size()));
     found.ids.push_back(id);
@@ -73,7 +73,7 @@ RobotCfg scene_robot(const mjModel* m, const std::string& entity, const Actuator
               actuators = named(m, mjOBJ_ACTUATOR, prefix);
   if (!entity.empty() && bodies.names.empty()) {
     std::set<std::string> entities;
-    for (const std::string& name : model_names(m, mjOBJ_BODY)) {
+    for (const std::string& name : scene::model_names(m, mjOBJ_BODY)) {
       if (name.find('/') != std::string::npos) entities.insert(name.substr(0, name.find('/')));
     }
     throw_unknown(context, "robot entity", entity,
@@ -112,11 +112,11 @@ RobotCfg scene_robot(const mjModel* m, const std::string& entity, const Actuator
       add_driven(m, actuators.ids[i], driven);
     }
     for (int joint : driven) {
-      group.joints.push_back(name_of(m, mjOBJ_JOINT, joint).substr(prefix.size()));
+      group.joints.push_back(scene::name_of(m, mjOBJ_JOINT, joint).substr(prefix.size()));
     }
     robot.groups.push_back(group);
   }
   return robot;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

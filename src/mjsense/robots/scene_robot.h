@@ -13,7 +13,7 @@
 
 #include "mjsense/robots/robot_cfg.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Pairs of move group name and regular expressions for the local names of its actuators.
 using ActuatorGroups = std::vector<std::pair<std::string, std::vector<std::string>>>;
@@ -27,4 +27,4 @@ using ActuatorGroups = std::vector<std::pair<std::string, std::vector<std::strin
 RobotCfg scene_robot(const mjModel* model, const std::string& entity, const ActuatorGroups& groups,
                      std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

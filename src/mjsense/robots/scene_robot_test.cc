@@ -7,7 +7,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 using testing::ElementsAre;
@@ -33,14 +33,14 @@ constexpr const char* kArm = R"(
 </mujoco>)";
 
 struct SceneRobot : testing::Test {
-  static SceneCfg scene_cfg() {
-    EntityCfg arm;
+  static scene::SceneCfg scene_cfg() {
+    scene::EntityCfg arm;
     arm.model.xml = kArm;
-    SceneCfg cfg;
+    scene::SceneCfg cfg;
     cfg.entities = {{"arm", arm}};
     return cfg;
   }
-  Scene scene{scene_cfg()};
+  scene::Scene scene{scene_cfg()};
   const mjModel* model = scene.model();
 
   std::string error(const std::string& entity, const ActuatorGroups& groups) const {
@@ -104,4 +104,4 @@ TEST_F(SceneRobot, WrongNamesAreErrors) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -13,7 +13,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/sensors/all_sensors.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 using Kind = FieldType::Kind;
@@ -114,7 +114,7 @@ PythonSensorRef python_sensor(const toml::table& table, const std::string& path,
 std::shared_ptr<SensorCfg> built_in_sensor(const toml::table& table, const std::string& kind,
                                            const std::string& path, const std::string& inside) {
   std::vector<std::string> kinds;
-  for (const SensorKind& known : sensor_kinds()) {
+  for (const SensorKind& known : sensors::sensor_kinds()) {
     if (std::ranges::find(kNotHere, known.cfg->kind) != std::end(kNotHere)) continue;
     if (kind == known.cfg->kind) {
       void* fields = nullptr;
@@ -153,4 +153,4 @@ void take_robot_sensors(toml::table& file, const std::string& path, RobotCfg& cf
   file.erase("sensors");
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

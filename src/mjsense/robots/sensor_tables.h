@@ -19,9 +19,9 @@
 #include "mjsense/core/fields/toml_value.h"
 #include "mjsense/robots/robot_cfg.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Moves the [[sensors]] tables from `file` to `cfg`. Throws ValueError with file, line and key.
 void take_robot_sensors(toml::table& file, const std::string& path, RobotCfg& cfg);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -5,9 +5,11 @@
 
 #include <mujoco/mujoco.h>
 
-namespace mjsense {
-
+namespace mjsense::worlds {
 class Worlds;
+}  // namespace mjsense::worlds
+
+namespace mjsense::robots {
 
 struct StateRow {
   double* qpos = nullptr;        // [nq]
@@ -18,6 +20,6 @@ struct StateRow {
 };
 
 StateRow state_row(mjData* data);
-StateRow state_row(Worlds& worlds, int world);
+StateRow state_row(worlds::Worlds& worlds, int world);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

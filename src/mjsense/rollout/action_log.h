@@ -10,22 +10,22 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/robots/robot.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 class ActionLog {
  public:
   explicit ActionLog(int num_worlds) : entries_(num_worlds) {}
 
   struct Entry {
-    bool given = false;                              // false: the episode has had no action yet
-    RobotValues qpos;                                // of all groups
-    std::array<Pose, RobotValues::kMaxGroups> leaf;  // X_BL of each group
+    bool given = false;        // false: the episode has had no action yet
+    robots::RobotValues qpos;  // of all groups
+    std::array<Pose, robots::RobotValues::kMaxGroups> leaf;  // X_BL of each group
   };
 
   void begin(int world) { entries_[world].given = false; }
   // Call before an action is applied. `world` must be fresh and show the observation that the
   // action answers.
-  void remember(const World& world, const Robot& robot) {
+  void remember(const World& world, const robots::Robot& robot) {
     Entry& entry = entries_[world.id];
     entry.given = true;
     robot.read_qpos(world, entry.qpos);
@@ -39,4 +39,4 @@ class ActionLog {
   std::vector<Entry> entries_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

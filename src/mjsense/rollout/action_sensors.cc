@@ -8,18 +8,20 @@
 
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 // True if the policy ended the episode with this observation. For episodes that the task ends see
 // blank_actions(). A time-out is not terminal.
-bool terminal(const Task& task, const World& world) { return task.done_received(world.id); }
+bool terminal(const episode::Task& task, const World& world) {
+  return task.done_received(world.id);
+}
 
 // Values per move group: fields `<group>`, then `given/<group>`.
 template <class T>
 class ActionSensor : public Sensor {
  public:
-  ActionSensor(std::string name, const Task& task, const ActionLog& log)
+  ActionSensor(std::string name, const episode::Task& task, const ActionLog& log)
       : Sensor(std::move(name)), task_(task), log_(log) {}
   std::string_view kind() const override { return "action"; }
 
@@ -48,7 +50,7 @@ class ActionSensor : public Sensor {
 
  protected:
   // Spec of a group's values; rank 0 if the group has none.
-  virtual SensorSpec group_spec(const MoveGroup& group) const = 0;
+  virtual SensorSpec group_spec(const robots::MoveGroup& group) const = 0;
   virtual void declare_more(const SensorInit& /*init*/) {}
   // Whether any group has an action at this observation.
   virtual bool shown(const World& /*world*/) { return true; }
@@ -67,10 +69,12 @@ class ActionSensor : public Sensor {
     return add_field("given/" + name, spec, init.num_worlds);
   }
 
-  const MoveGroup& group(int g) const { return task_.robot().groups()[g]; }
-  const RobotValues& targets(const World& world) const { return task_.robot().targets(world.id); }
+  const robots::MoveGroup& group(int g) const { return task_.robot().groups()[g]; }
+  const robots::RobotValues& targets(const World& world) const {
+    return task_.robot().targets(world.id);
+  }
   bool is_first(const World& world) const { return !log_[world.id].given; }
-  const Task& task_;
+  const episode::Task& task_;
   const ActionLog& log_;
 
  private:
@@ -100,14 +104,14 @@ class CommandedAction final : public ActionSensor<float> {
 
   void compute(const World& world) override {
     ActionSensor::compute(world);
-    const Action* action = task_.last_action(world.id);
+    const robots::Action* action = task_.last_action(world.id);
     const bool given = action && action->success.has_value();
     verdict_->data.row<float>(world.id)[0] = given && *action->success ? 1.0f : 0.0f;
     verdict_given_->data.row<bool>(world.id)[0] = given;
   }
 
  protected:
-  SensorSpec group_spec(const MoveGroup& g) const override {
+  SensorSpec group_spec(const robots::MoveGroup& g) const override {
     return spec_of(g.command_size, g.command_unit, "",
                    fmt::format("The policy's command to '{}', unchanged.", g.name));
   }
@@ -117,7 +121,7 @@ class CommandedAction final : public ActionSensor<float> {
     verdict_given_ = &add_given("success", init);
   }
   bool write(const World& world, int g, std::span<float> row) override {
-    const Action* action = task_.last_action(world.id);
+    const robots::Action* action = task_.last_action(world.id);
     if (!action || !action->commands[g].given) return false;
     std::ranges::transform(action->commands[g].view(), row.begin(),
                            [](double x) { return static_cast<float>(x); });
@@ -133,7 +137,7 @@ class JointPos final : public ActionSensor<double> {
   using ActionSensor::ActionSensor;
 
  protected:
-  SensorSpec group_spec(const MoveGroup& g) const override {
+  SensorSpec group_spec(const robots::MoveGroup& g) const override {
     if (g.target_size == 0) return {};
     SensorSpec spec =
         spec_of(g.target_size, g.target_unit, "",
@@ -156,7 +160,7 @@ class JointPosRel final : public ActionSensor<double> {
   using ActionSensor::ActionSensor;
 
  protected:
-  SensorSpec group_spec(const MoveGroup& g) const override {
+  SensorSpec group_spec(const robots::MoveGroup& g) const override {
     return spec_of(
         count(g.qpos), g.targets_are_qpos() ? g.target_unit : "", "",
         fmt::format("Target of '{}' minus its previously observed joint positions.", g.name));
@@ -167,7 +171,7 @@ class JointPosRel final : public ActionSensor<double> {
       std::ranges::fill(row, 0.0);
       return true;
     }
-    const GroupValues &target = targets(world)[g], &qpos = log_[world.id].qpos[g];
+    const robots::GroupValues &target = targets(world)[g], &qpos = log_[world.id].qpos[g];
     if (!group(g).targets_are_qpos()) return false;
     for (int i = 0; i < target.size; ++i) row[i] = target.values[i] - qpos.values[i];
     return true;
@@ -179,9 +183,9 @@ class EePose final : public ActionSensor<double> {
   using ActionSensor::ActionSensor;
 
  protected:
-  SensorSpec group_spec(const MoveGroup& g) const override {
+  SensorSpec group_spec(const robots::MoveGroup& g) const override {
     const int base = task_.robot().base_body();
-    return spec_of(7, "m, wxyz", "body " + name_of(task_.model(), mjOBJ_BODY, base),
+    return spec_of(7, "m, wxyz", "body " + scene::name_of(task_.model(), mjOBJ_BODY, base),
                    fmt::format("Target pose of the leaf frame of '{}'.", g.name));
   }
   bool shown(const World& world) override { return !terminal(task_, world); }
@@ -196,7 +200,7 @@ class EeTwist final : public ActionSensor<double> {
   using ActionSensor::ActionSensor;
 
  protected:
-  SensorSpec group_spec(const MoveGroup& g) const override {
+  SensorSpec group_spec(const robots::MoveGroup& g) const override {
     if (g.target_size == 0) return {};
     return spec_of(
         6, "m, rad", "the leaf frame as previously observed",
@@ -218,7 +222,8 @@ class EeTwist final : public ActionSensor<double> {
 
 }  // namespace
 
-std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const ActionLog& log) {
+std::vector<std::shared_ptr<Sensor>> action_sensors(const episode::Task& task,
+                                                    const ActionLog& log) {
   return {std::make_shared<CommandedAction>("actions/commanded_action", task, log),
           std::make_shared<JointPos>("actions/joint_pos", task, log),
           std::make_shared<JointPosRel>("actions/joint_pos_rel", task, log),
@@ -226,7 +231,7 @@ std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const Acti
           std::make_shared<EePose>("actions/ee_pose", task, log)};
 }
 
-void blank_actions(SensorSuite& suite, int world, bool first) {
+void blank_actions(observe::SensorSuite& suite, int world, bool first) {
   for (const char* name :
        {"actions/joint_pos", "actions/ee_pose", "actions/joint_pos_rel", "actions/ee_twist"}) {
     if (first && (name == std::string_view("actions/joint_pos_rel") ||
@@ -241,4 +246,4 @@ void blank_actions(SensorSuite& suite, int world, bool first) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -10,7 +10,7 @@
 #include "mjsense/observe/suite.h"
 #include "mjsense/rollout/action_log.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 // Streams `<sensor>/<group>` and `<sensor>/given/<group>` (bool []). `given` is false if the group
 // has no action at this observation; its values are then 0. Units are those of each group's
@@ -33,11 +33,12 @@ namespace mjsense {
 //   actions/ee_pose           float64 [7], fk(targets), X_BL of every group; identity for a base
 //
 // The sensors refer to the task and the log, which must outlive them.
-std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const ActionLog& log);
+std::vector<std::shared_ptr<Sensor>> action_sensors(const episode::Task& task,
+                                                    const ActionLog& log);
 
 // Clears the rows of this world that have no meaning at a terminal observation. This happens after
 // the sensors were computed, because the evaluation follows them. `first`: no action has been taken
 // yet.
-void blank_actions(SensorSuite& suite, int world, bool first);
+void blank_actions(observe::SensorSuite& suite, int world, bool first);
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -12,7 +12,7 @@
 #include "mjsense/observe/suite.h"
 #include "mjsense/rollout/action_log.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 // A camera that an episode records.
 struct RecordedCamera {
@@ -32,8 +32,8 @@ struct RecordedCamera {
 // task, the robot and the policy. Names must be unique; the error for a clash names both owners.
 // The sensors refer to task, log and cameras, which must outlive them. `robot_sensors`: sensors of
 // the robot in addition to those of its model.
-SensorSuite core_suite(const Task& task, const ActionLog& log,
-                       const std::vector<RecordedCamera>& cameras,
-                       std::span<const std::shared_ptr<Sensor>> robot_sensors = {});
+observe::SensorSuite core_suite(const episode::Task& task, const ActionLog& log,
+                                const std::vector<RecordedCamera>& cameras,
+                                std::span<const std::shared_ptr<Sensor>> robot_sensors = {});
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -10,13 +10,13 @@
 #include "mjsense/core/error.h"
 #include "mjsense/rollout/rollout.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
-CameraMountCfg of_model(const CameraMount& mount, bool of_scene) {
-  CameraMountCfg out;
+cameras::CameraMountCfg of_model(const robots::CameraMount& mount, bool of_scene) {
+  cameras::CameraMountCfg out;
   out.name = mount.name;
-  out.mount = MountKind::kMjcf;
+  out.mount = cameras::MountKind::kMjcf;
   out.camera = mount.mjcf_camera;
   out.of_scene = of_scene;
   out.depth = mount.record_depth;
@@ -36,37 +36,39 @@ int scaled(int side, int other, int of) {
 
 }  // namespace
 
-CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg) {
-  const RobotCfg& robot = task.cfg().robot;
-  CameraSystemCfg system;
+cameras::CameraSystem choose_cameras(const episode::Task& task, const RolloutCfg& cfg) {
+  const robots::RobotCfg& robot = task.cfg().robot;
+  cameras::CameraSystemCfg system;
   system.width = robot.image_width;
   system.height = robot.image_height;
   if (!cfg.camera_system.empty()) {
-    system = load_camera_system(cfg.camera_system, robot.file, Robot::kPrefix);
+    system = cameras::load_camera_system(cfg.camera_system, robot.file, robots::Robot::kPrefix);
   } else {
-    for (const CameraMount& mount : robot.cameras) system.cameras.push_back(of_model(mount, false));
+    for (const robots::CameraMount& mount : robot.cameras)
+      system.cameras.push_back(of_model(mount, false));
   }
-  for (const CameraMount& mount : task.cameras()) system.cameras.push_back(of_model(mount, true));
+  for (const robots::CameraMount& mount : task.cameras())
+    system.cameras.push_back(of_model(mount, true));
 
   if (cfg.cameras) {
     std::vector<std::string> names;
-    for (const CameraMountCfg& camera : system.cameras) names.push_back(camera.name);
-    std::vector<CameraMountCfg> chosen;
+    for (const cameras::CameraMountCfg& camera : system.cameras) names.push_back(camera.name);
+    std::vector<cameras::CameraMountCfg> chosen;
     for (const std::string& name : *cfg.cameras) {
-      const auto mount = std::ranges::find(system.cameras, name, &CameraMountCfg::name);
+      const auto mount = std::ranges::find(system.cameras, name, &cameras::CameraMountCfg::name);
       if (mount == system.cameras.end()) {
         throw_unknown(!cfg.camera_system.empty() ? fmt::format("camera system '{}'", system.name)
                       : robot.name.empty()       ? fmt::format("task '{}'", task.name())
                                                  : fmt::format("robot '{}'", robot.name),
                       "camera", name, names);
       }
-      if (std::ranges::find(chosen, name, &CameraMountCfg::name) != chosen.end())
+      if (std::ranges::find(chosen, name, &cameras::CameraMountCfg::name) != chosen.end())
         throw ValueError(fmt::format("camera '{}' is given twice", name));
       chosen.push_back(*mount);
     }
     system.cameras = std::move(chosen);
   }
-  for (CameraMountCfg& camera : system.cameras) {
+  for (cameras::CameraMountCfg& camera : system.cameras) {
     const int width = camera.width.value_or(system.width);
     const int height = camera.height.value_or(system.height);
     if (cfg.width || cfg.height) {
@@ -78,13 +80,13 @@ CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg) {
     camera.depth = camera.depth || cfg.depth;
     camera.segmentation = camera.segmentation || cfg.segmentation;
   }
-  return {std::move(system), std::string(Robot::kPrefix), robot.base_body};
+  return {std::move(system), std::string(robots::Robot::kPrefix), robot.base_body};
 }
 
-std::vector<RecordedCamera> recorded_cameras(const CameraSystem& system) {
+std::vector<RecordedCamera> recorded_cameras(const cameras::CameraSystem& system) {
   std::vector<RecordedCamera> cameras;
   for (std::size_t i = 0; i < system.cfg().cameras.size(); ++i) {
-    const CameraMountCfg& mount = system.cfg().cameras[i];
+    const cameras::CameraMountCfg& mount = system.cfg().cameras[i];
     const int camera = static_cast<int>(i);
     cameras.push_back({.name = mount.name,
                        .mjcf_camera = system.mounted(camera).camera,
@@ -98,10 +100,10 @@ std::vector<RecordedCamera> recorded_cameras(const CameraSystem& system) {
   return cameras;
 }
 
-CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
-                                  const RecordedCamera& recorded, const RolloutCfg& cfg) {
-  const CameraSystem::Mounted& mounted = system.mounted(camera);
-  CameraSensorCfg out;
+sensors::CameraSensorCfg camera_sensor_cfg(const cameras::CameraSystem& system, int camera,
+                                           const RecordedCamera& recorded, const RolloutCfg& cfg) {
+  const cameras::CameraSystem::Mounted& mounted = system.mounted(camera);
+  sensors::CameraSensorCfg out;
   out.name = recorded.name;
   if (mounted.is_new) {
     out.parent_body = mounted.body;
@@ -120,9 +122,9 @@ CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
   return out;
 }
 
-CameraSensorCfg default_view(const Task& task, const RolloutCfg& cfg) {
-  const RobotCfg& robot = task.cfg().robot;
-  CameraSensorCfg out;
+sensors::CameraSensorCfg default_view(const episode::Task& task, const RolloutCfg& cfg) {
+  const robots::RobotCfg& robot = task.cfg().robot;
+  sensors::CameraSensorCfg out;
   out.name = kDefaultView;
   out.width = cfg.width.value_or(robot.image_width);
   out.height = cfg.height.value_or(robot.image_height);
@@ -135,27 +137,27 @@ CameraSensorCfg default_view(const Task& task, const RolloutCfg& cfg) {
   const Vec3 right = normalized(cross(Vec3{0, 0, 1}, back));
   const Vec3 up = cross(back, right);
   const double axes[9] = {right.x, up.x, back.x, right.y, up.y, back.y, right.z, up.z, back.z};
-  out.parent_body = std::string(Robot::kPrefix) + robot.base_body;
+  out.parent_body = std::string(robots::Robot::kPrefix) + robot.base_body;
   write_vec(eye, out.pos.data());
   mju_mat2Quat(out.quat.data(), axes);
   return out;
 }
 
-Vec3 middle_of(const Task& task, const World& world) {
+Vec3 middle_of(const episode::Task& task, const World& world) {
   Vec3 sum;
   int count = 0;
-  for (const TaskObject& object : task.objects(world.id)) {
+  for (const episode::TaskObject& object : task.objects(world.id)) {
     if (object.body < 0) continue;
     sum = sum + vec3(world.data->xpos + 3 * object.body);
     ++count;
   }
   const auto groups = task.robot().groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    if (groups[g].kind != GroupKind::kGripper) continue;
+    if (groups[g].kind != robots::GroupKind::kGripper) continue;
     sum = sum + task.robot().leaf_pose(world, static_cast<int>(g)).p;
     ++count;
   }
   return count > 0 ? (1.0 / count) * sum : sum;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -11,24 +11,24 @@
 #include "mjsense/rollout/core_suite.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 struct RolloutCfg;
 
 // Camera mounts and image sizes, in the order of a recording. Throws KeyError for an unknown camera
 // or system and ValueError for a camera that is named twice.
-CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg);
+cameras::CameraSystem choose_cameras(const episode::Task& task, const RolloutCfg& cfg);
 
 // The recorded cameras, and the configuration of the scene's sensor that renders each of them.
-std::vector<RecordedCamera> recorded_cameras(const CameraSystem& system);
-CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
-                                  const RecordedCamera& recorded, const RolloutCfg& cfg);
+std::vector<RecordedCamera> recorded_cameras(const cameras::CameraSystem& system);
+sensors::CameraSensorCfg camera_sensor_cfg(const cameras::CameraSystem& system, int camera,
+                                           const RecordedCamera& recorded, const RolloutCfg& cfg);
 
 // Centre of the orbits of orbiting cameras: the mean position of the task's objects and the robot's
 // grippers. World frame, m.
-Vec3 middle_of(const Task& task, const World& world);
+Vec3 middle_of(const episode::Task& task, const World& world);
 
 // The camera of RolloutCfg::default_view.
-CameraSensorCfg default_view(const Task& task, const RolloutCfg& cfg);
+sensors::CameraSensorCfg default_view(const episode::Task& task, const RolloutCfg& cfg);
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -15,21 +15,21 @@
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
-std::unique_ptr<PlannerPolicy> make_manipulation() {
-  return std::make_unique<ManipulationPlanner>();
+std::unique_ptr<episode::PlannerPolicy> make_manipulation() {
+  return std::make_unique<policies::ManipulationPlanner>();
 }
 
 struct Planners {
   std::mutex mutex;
   // Built-in task types first, then registered ones in the order of registration.
   std::vector<std::pair<std::string, PlannerFactory>> entries{
-      {"open", [] { return std::make_unique<OpeningPlanner>(); }},
-      {"close", [] { return std::make_unique<OpeningPlanner>(); }},
-      {"door_open", [] { return std::make_unique<DoorPlanner>(); }},
-      {"nav_to_obj", [] { return std::make_unique<NavPlanner>(); }},
+      {"open", [] { return std::make_unique<policies::OpeningPlanner>(); }},
+      {"close", [] { return std::make_unique<policies::OpeningPlanner>(); }},
+      {"door_open", [] { return std::make_unique<policies::DoorPlanner>(); }},
+      {"nav_to_obj", [] { return std::make_unique<policies::NavPlanner>(); }},
       {"pick_and_place", make_manipulation},
       {"pick_and_place_next_to", make_manipulation},
       {"pick_and_place_color", make_manipulation},
@@ -41,28 +41,28 @@ Planners& planners() {
   return all;
 }
 
-bool has_its_own(const Task& task) {
+bool has_its_own(const episode::Task& task) {
   Planners& all = planners();
   const std::lock_guard lock(all.mutex);
   return std::ranges::any_of(all.entries, [&](const auto& e) { return e.first == task.type(); });
 }
 
 // True for tasks without a specific planner that have objects to grasp.
-bool picks(const Task& task) { return task.grasp_scene() && !has_its_own(task); }
-bool has_planner(const Task& task) { return task.grasp_scene() || has_its_own(task); }
+bool picks(const episode::Task& task) { return task.grasp_scene() && !has_its_own(task); }
+bool has_planner(const episode::Task& task) { return task.grasp_scene() || has_its_own(task); }
 
 // Picks from above if possible, otherwise with the general manipulation planner.
-class TopDownPlanner final : public PlannerPolicy {
+class TopDownPlanner final : public episode::PlannerPolicy {
  public:
   std::string_view name() const override { return "top_down_planner"; }
-  void initialize(Task& task) override {
+  void initialize(episode::Task& task) override {
     if (!picks(task)) {
       throw ValueError(
           fmt::format("policy '{}' supports picking tasks only; task '{}' is of type '{}'; policy "
                       "'planner' selects the planner by the task's type",
                       name(), task.name(), task.type()));
     }
-    if (!PickPlanner::can_use(task.robot())) {
+    if (!policies::PickPlanner::can_use(task.robot())) {
       throw ValueError(
           fmt::format("policy '{}' needs a gripper that only the joints of an arm move; robot '{}' "
                       "has none: policy 'planner' picks with any gripper",
@@ -74,59 +74,63 @@ class TopDownPlanner final : public PlannerPolicy {
   }
   void reset(const World& world) override {
     top_down_.reset(world);
-    uses_any_direction_[world.id] = top_down_.last_failure(world.id) == PlanFailure::kUnplanned;
+    uses_any_direction_[world.id] =
+        top_down_.last_failure(world.id) == policies::PlanFailure::kUnplanned;
     if (uses_any_direction_[world.id]) any_direction_.reset(world);
   }
-  void act(const World& world, Action& action) override {
+  void act(const World& world, robots::Action& action) override {
     active_planner(world.id).act(world, action);
   }
-  std::span<const Phase> phases() const override { return top_down_.phases(); }
+  std::span<const episode::Phase> phases() const override { return top_down_.phases(); }
   int phase(int world) const override { return active_planner(world).phase(world); }
   int num_retries(int world) const override { return active_planner(world).num_retries(world); }
   Pose grasp_pose(int world) const override { return active_planner(world).grasp_pose(world); }
   std::string failure(int world) const override { return active_planner(world).failure(world); }
 
  private:
-  TaskPlanner& active_planner(int world) {
-    return uses_any_direction_[world] ? static_cast<TaskPlanner&>(any_direction_) : top_down_;
+  policies::TaskPlanner& active_planner(int world) {
+    return uses_any_direction_[world] ? static_cast<policies::TaskPlanner&>(any_direction_)
+                                      : top_down_;
   }
-  const TaskPlanner& active_planner(int world) const {
+  const policies::TaskPlanner& active_planner(int world) const {
     return const_cast<TopDownPlanner*>(this)->active_planner(world);
   }
 
-  PickPlanner top_down_;
-  ManipulationPlanner any_direction_;
+  policies::PickPlanner top_down_;
+  policies::ManipulationPlanner any_direction_;
   std::vector<char> uses_any_direction_;  // [B], 1: the episode uses any_direction_
 };
 
 // The first child of the task that a planner exists for. Tasks without such a child are returned
 // unchanged.
-Task& first_plannable(Task& task) {
+episode::Task& first_plannable(episode::Task& task) {
   for (const auto& child : task.children()) {
     if (has_planner(*child)) return *child;
   }
   return task;
 }
 
-class AnyPlanner final : public PlannerPolicy {
+class AnyPlanner final : public episode::PlannerPolicy {
  public:
   std::string_view name() const override { return "planner"; }
-  void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
-  void initialize(Task& task) override {
-    Task& doable = first_plannable(task);
+  void bind(const std::shared_ptr<sim::Simulation>& simulation) override {
+    simulation_ = simulation;
+  }
+  void initialize(episode::Task& task) override {
+    episode::Task& doable = first_plannable(task);
     planner_ = make_planner(doable);
     if (simulation_) planner_->bind(simulation_);
     simulation_.reset();
     planner_->initialize(doable);
   }
   void reset(const World& world) override { planner_->reset(world); }
-  void act(const World& world, Action& action) override { planner_->act(world, action); }
-  void reset_all(ActiveWorlds& worlds) override { planner_->reset_all(worlds); }
-  void act_all(ActiveWorlds& worlds, std::span<Action> actions) override {
+  void act(const World& world, robots::Action& action) override { planner_->act(world, action); }
+  void reset_all(episode::ActiveWorlds& worlds) override { planner_->reset_all(worlds); }
+  void act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) override {
     planner_->act_all(worlds, actions);
   }
-  std::span<const Phase> phases() const override {
-    return planner_ ? planner_->phases() : std::span<const Phase>{};
+  std::span<const episode::Phase> phases() const override {
+    return planner_ ? planner_->phases() : std::span<const episode::Phase>{};
   }
   int phase(int world) const override { return planner_->phase(world); }
   int num_retries(int world) const override { return planner_->num_retries(world); }
@@ -141,8 +145,8 @@ class AnyPlanner final : public PlannerPolicy {
   }
 
  private:
-  std::unique_ptr<PlannerPolicy> planner_;
-  std::shared_ptr<Simulation> simulation_;  // until it can be passed to planner_
+  std::unique_ptr<episode::PlannerPolicy> planner_;
+  std::shared_ptr<sim::Simulation> simulation_;  // until it can be passed to planner_
 };
 
 }  // namespace
@@ -158,7 +162,7 @@ void register_planner(std::string task_type, PlannerFactory make) {
   all.entries.emplace_back(std::move(task_type), std::move(make));
 }
 
-std::unique_ptr<PlannerPolicy> make_planner(const Task& task) {
+std::unique_ptr<episode::PlannerPolicy> make_planner(const episode::Task& task) {
   Planners& all = planners();
   PlannerFactory make;
   std::string types;
@@ -177,7 +181,9 @@ std::unique_ptr<PlannerPolicy> make_planner(const Task& task) {
                   task.name(), types));
 }
 
-std::unique_ptr<Policy> make_any_planner() { return std::make_unique<AnyPlanner>(); }
-std::unique_ptr<Policy> make_top_down_planner() { return std::make_unique<TopDownPlanner>(); }
+std::unique_ptr<episode::Policy> make_any_planner() { return std::make_unique<AnyPlanner>(); }
+std::unique_ptr<episode::Policy> make_top_down_planner() {
+  return std::make_unique<TopDownPlanner>();
+}
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -19,7 +19,7 @@
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/model_archive.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -28,8 +28,9 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const StopFlag* stop) {
-  RecordingCfg cfg;
+record::RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout,
+                                   const StopFlag* stop) {
+  record::RecordingCfg cfg;
   cfg.out_dir = job.out;
   cfg.house = job.house;
   cfg.episodes = job.episodes;
@@ -37,12 +38,12 @@ RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const Stop
   cfg.first_attempt = job.first_attempt;
   cfg.batches = job.batches;
   cfg.num_worlds = rollout.num_worlds();
-  cfg.fps = Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
+  cfg.fps = record::Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
   for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
   if (const Sensor* replay = rollout.replay_sensor()) {
     cfg.sensors.push_back(replay);
-    cfg.archive = model_archive(rollout.simulation().scene());
-    Checksum sum;
+    cfg.archive = scene::model_archive(rollout.simulation().scene());
+    record::Checksum sum;
     sum.add(cfg.archive.data(), cfg.archive.size());
     cfg.archive_name = fmt::format("model_{}.zip", sum.text());
   }
@@ -176,7 +177,7 @@ class RecordJob {
   // Records the current observation of world w and ends its episode if it is over.
   void observe(int w) {
     if (!rollout_.fault(w).empty()) return end(w, false, rollout_.fault(w));
-    const Evaluation& now = rollout_.evaluation(w);
+    const episode::Evaluation& now = rollout_.evaluation(w);
     timed([&] {
       recorder_.append(w, {.reward = static_cast<float>(now.reward),
                            .terminated = now.terminal,
@@ -191,14 +192,14 @@ class RecordJob {
 
   // Outcome of an attempt: "horizon reached: the object is not lifted", "the policy gave up: found
   // no way (256 grasps: 200 out of reach; ...)".
-  std::string outcome(int w, const Evaluation& now) {
+  std::string outcome(int w, const episode::Evaluation& now) {
     if (now.success) return "success";
-    const Action* last = rollout_.task().last_action(w);
+    const robots::Action* last = rollout_.task().last_action(w);
     const bool gave_up = now.terminal && last && last->success == false;
     const char* what = gave_up        ? "the policy gave up"
                        : now.terminal ? "no success"
                                       : "horizon reached";
-    const Policy* policy = rollout_.policy();
+    const episode::Policy* policy = rollout_.policy();
     const std::string why = gave_up && policy ? policy->failure(w) : std::string(now.missing);
     return why.empty() ? what : fmt::format("{}: {}", what, why);
   }
@@ -217,7 +218,7 @@ class RecordJob {
     progress_.mean_length = static_cast<double>(ended_steps_) /
                             std::max(1, cfg_.keep_failures ? progress_.succeeded + progress_.failed
                                                            : progress_.succeeded);
-    if (!success) ++summary_.failures[std::string(outcome_without_details(outcome))];
+    if (!success) ++summary_.failures[std::string(record::outcome_without_details(outcome))];
     summary_.lengths.push_back(lengths_[w]);
     rollout_.stop(w);
     --running_;
@@ -225,11 +226,11 @@ class RecordJob {
 
   // Data for replay that does not depend on the step: the model's arrays of world w that differ from
   // the archived model, and the free joints of absent objects, which are held at rest.
-  std::vector<EpisodeArray> replay_arrays(int w) {
+  std::vector<record::EpisodeArray> replay_arrays(int w) {
     if (!rollout_.replay_sensor()) return {};
-    Simulation& simulation = rollout_.simulation();
-    std::vector<EpisodeArray> arrays =
-        differing_fields(simulation.model_of(w), *rollout_.task().model());
+    sim::Simulation& simulation = rollout_.simulation();
+    std::vector<record::EpisodeArray> arrays =
+        record::differing_fields(simulation.model_of(w), *rollout_.task().model());
     const std::vector<int> held = simulation.worlds().held(w);
     const auto bytes = std::as_bytes(std::span(held));
     if (!held.empty())
@@ -265,7 +266,7 @@ class RecordJob {
 
   RecordJobCfg cfg_;
   Rollout rollout_;
-  Recorder recorder_;
+  record::Recorder recorder_;
   RecordProgress progress_;
   RecordSummary summary_;
   std::vector<int> lengths_;  // observations recorded of each world's current episode
@@ -331,4 +332,4 @@ RecordSummary record_episodes(const RecordJobCfg& cfg,
   return RecordJob(cfg, stop).run(progress, stop);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -14,7 +14,7 @@
 #include "mjsense/record/recorder.h"
 #include "mjsense/rollout/rollout.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 struct RecordJobCfg {
   RecordJobCfg() { rollout.num_worlds = 4; }
@@ -32,7 +32,7 @@ struct RecordJobCfg {
   int house = 0;
   int batches = 0;
   int gzip = 4;
-  VideoCfg video;
+  record::VideoCfg video;
 };
 template <class V>
 void visit_fields(V& v, RecordJobCfg& c) {
@@ -103,7 +103,7 @@ struct RecordSummary {
   RolloutTimes times;
   double recording_s =
       0;  // wall seconds in the recorder: copying, and waiting for encoders and the disk
-  RecordStats record;
+  record::RecordStats record;
   std::filesystem::path house_dir;
   std::vector<std::string> damage;  // see Recorder::damage()
 };
@@ -117,4 +117,4 @@ RecordSummary record_episodes(const RecordJobCfg& cfg,
                               const std::function<void(const RecordProgress&)>& progress = {},
                               const StopFlag* stop = nullptr);
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/testing/tools.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using testing::error_of;
@@ -68,4 +68,4 @@ TEST(SeedOfHouse, HousesHaveTheirOwnRandomNumbers) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -15,7 +15,7 @@
 #include "mjsense/record/checksum.h"
 #include "mjsense/scenes/load_scene.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using Json = nlohmann::json;
@@ -33,7 +33,7 @@ Json json_of(const FieldDecl& field, const void* object) {
 }
 
 // Adds a value of any declared type to the checksum, recursively.
-void add_value(Checksum& sum, const FieldType& type, const void* value) {
+void add_value(record::Checksum& sum, const FieldType& type, const void* value) {
   // const_cast: the functions of a type are shared between reading and writing.
   void* v = const_cast<void*>(value);
   const auto add_text = [&](std::string_view text) {
@@ -95,7 +95,7 @@ Json checksums_of(const T& object) {
   Json sums = Json::object();
   for (const FieldDecl& field : struct_of<T>().fields) {
     if (!field.type || std::string_view(field.name) == "description") continue;
-    Checksum sum;
+    record::Checksum sum;
     add_value(sum, *field.type, reinterpret_cast<const char*>(&object) + field.offset);
     sums[field.name] = sum.text();
   }
@@ -135,7 +135,7 @@ void require_code(const RecordJobCfg& job) {
 std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
   require_code(job);
   const RolloutCfg& cfg = job.rollout;
-  const TaskCfg& task = rollout.task().cfg();
+  const episode::TaskCfg& task = rollout.task().cfg();
   Json settings{{"cameras", cameras_of(rollout)},
                 {"horizon", task.horizon},
                 {"meshes", task.robot.edit_spec ? "real" : "shapes"},
@@ -152,10 +152,10 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
   }
   if (!cfg.robot.empty()) settings["robot_file"] = checksums_of(task.robot);
   if (cfg.make_scene || !cfg.scene.empty())
-    settings["scene_file"] = checksums_of(task_scene(task, ""));
+    settings["scene_file"] = checksums_of(scenes::task_scene(task, ""));
   if (cfg.camera_system.ends_with(".toml") || cfg.camera_system.ends_with(".json")) {
     const std::string text = read_text_file(cfg.camera_system);
-    Checksum sum;
+    record::Checksum sum;
     sum.add(text.data(), text.size());
     settings["camera_file"] = sum.text();
   }
@@ -163,4 +163,4 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
   return settings.dump();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -9,10 +9,10 @@
 
 #include "mjsense/rollout/record_job.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 // Throws ValueError if `job` resumes a recording with a user-defined task, policy or scene whose
 // dependencies are unknown (RolloutCfg::code).
 [[nodiscard]] std::string recording_settings(const RecordJobCfg& job, Rollout& rollout);
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

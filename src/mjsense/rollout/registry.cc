@@ -15,7 +15,7 @@
 #include "mjsense/tasks/pick/pick.h"
 #include "mjsense/tasks/pick_and_place/pick_and_place.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 // Factories by name. `group` and `kind` are for messages: "tasks", "task".
@@ -62,33 +62,39 @@ class Registry {
   std::vector<Entry> entries_;
 };
 
-template <PlaceKind kind>
-std::unique_ptr<Task> pick_and_place(TaskCfg cfg) {
-  return std::make_unique<PickAndPlaceTask>(kind, std::move(cfg));
+template <tasks::PlaceKind kind>
+std::unique_ptr<episode::Task> pick_and_place(episode::TaskCfg cfg) {
+  return std::make_unique<tasks::PickAndPlaceTask>(kind, std::move(cfg));
 }
 
-std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg);
+std::unique_ptr<episode::Task> any_of(std::string_view name, episode::TaskCfg cfg);
 
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
       "tasks", "task",
-      {{"pick", [](TaskCfg c) { return std::make_unique<PickTask>(std::move(c)); }},
+      {{"pick", [](episode::TaskCfg c) { return std::make_unique<tasks::PickTask>(std::move(c)); }},
        {"open",
-        [](TaskCfg c) { return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kOpen); }},
+        [](episode::TaskCfg c) {
+          return std::make_unique<tasks::OpeningTask>(std::move(c), tasks::OpeningKind::kOpen);
+        }},
        {"close",
-        [](TaskCfg c) { return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kClose); }},
-       {"pick_and_place", pick_and_place<PlaceKind::kInOrOn>},
-       {"pick_and_place_next_to", pick_and_place<PlaceKind::kNextTo>},
-       {"pick_and_place_color", pick_and_place<PlaceKind::kColor>},
-       {"packing", pick_and_place<PlaceKind::kPacking>},
-       {"door_opening", [](TaskCfg c) { return std::make_unique<DoorOpeningTask>(std::move(c)); }},
-       {"nav_to_obj", [](TaskCfg c) { return std::make_unique<NavToObjTask>(std::move(c)); }},
-       {"multi_task", [](TaskCfg c) { return any_of("multi_task", std::move(c)); }}});
+        [](episode::TaskCfg c) {
+          return std::make_unique<tasks::OpeningTask>(std::move(c), tasks::OpeningKind::kClose);
+        }},
+       {"pick_and_place", pick_and_place<tasks::PlaceKind::kInOrOn>},
+       {"pick_and_place_next_to", pick_and_place<tasks::PlaceKind::kNextTo>},
+       {"pick_and_place_color", pick_and_place<tasks::PlaceKind::kColor>},
+       {"packing", pick_and_place<tasks::PlaceKind::kPacking>},
+       {"door_opening",
+        [](episode::TaskCfg c) { return std::make_unique<tasks::DoorOpeningTask>(std::move(c)); }},
+       {"nav_to_obj",
+        [](episode::TaskCfg c) { return std::make_unique<tasks::NavToObjTask>(std::move(c)); }},
+       {"multi_task", [](episode::TaskCfg c) { return any_of("multi_task", std::move(c)); }}});
   return all;
 }
 
 // Combines several tasks in the scene of the first one.
-std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
+std::unique_ptr<episode::Task> any_of(std::string_view name, episode::TaskCfg cfg) {
   const std::vector<std::string> parts = task_components(name);
   for (const std::string& part : parts) tasks().at(part);  // throws for unknown names
   if (cfg.scene.empty()) cfg.scene = default_scene(parts[0]);
@@ -97,9 +103,9 @@ std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
         "task '{}': '{}' has no default scene that the other tasks can use: set the scene", name,
         parts[0]));
   }
-  std::vector<std::unique_ptr<Task>> children;
+  std::vector<std::unique_ptr<episode::Task>> children;
   for (const std::string& part : parts) children.push_back(tasks().at(part)(cfg));
-  return std::make_unique<MultiTask>(std::string(name), std::move(cfg), std::move(children));
+  return std::make_unique<tasks::MultiTask>(std::string(name), std::move(cfg), std::move(children));
 }
 
 Registry<PolicyFactory>& policies() {
@@ -114,12 +120,14 @@ Registry<PolicyFactory>& policies() {
 std::vector<std::string> task_names() { return tasks().names(); }
 std::vector<std::string> policy_names() { return policies().names(); }
 
-std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg) {
+std::unique_ptr<episode::Task> make_task(std::string_view name, episode::TaskCfg cfg) {
   if (name.find('+') != std::string_view::npos) return any_of(name, std::move(cfg));
   return tasks().at(name)(std::move(cfg));
 }
 
-std::unique_ptr<Policy> make_policy(std::string_view name) { return policies().at(name)(); }
+std::unique_ptr<episode::Policy> make_policy(std::string_view name) {
+  return policies().at(name)();
+}
 
 void register_task(std::string name, TaskFactory make) {
   tasks().add(std::move(name), std::move(make));
@@ -129,4 +137,4 @@ void register_policy(std::string name, PolicyFactory make) {
   policies().add(std::move(name), std::move(make));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

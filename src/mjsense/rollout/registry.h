@@ -14,19 +14,19 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/robots/load_robot.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
-using TaskFactory = std::function<std::unique_ptr<Task>(TaskCfg)>;
-using PolicyFactory = std::function<std::unique_ptr<Policy>()>;
+using TaskFactory = std::function<std::unique_ptr<episode::Task>(episode::TaskCfg)>;
+using PolicyFactory = std::function<std::unique_ptr<episode::Policy>()>;
 
 // Built-in names first, then registered ones in the order of registration.
 std::vector<std::string> task_names();
-std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg);
+std::unique_ptr<episode::Task> make_task(std::string_view name, episode::TaskCfg cfg);
 // Throws ValueError for a name that is empty or in use. Thread-safe.
 void register_task(std::string name, TaskFactory make);
 
 std::vector<std::string> policy_names();
-std::unique_ptr<Policy> make_policy(std::string_view name);
+std::unique_ptr<episode::Policy> make_policy(std::string_view name);
 void register_policy(std::string name, PolicyFactory make);
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -6,7 +6,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using testing::HasSubstr;
@@ -22,10 +22,10 @@ void expect_unknown(Make&& make, const char* nearest) {
 }
 
 TEST(Registry, CreatesEveryNamedTaskAndPolicy) {
-  for (const std::string& robot : robot_names()) {
+  for (const std::string& robot : robots::robot_names()) {
     for (const std::string& task : task_names()) {
-      TaskCfg cfg;
-      cfg.robot = robot_cfg(robot);
+      episode::TaskCfg cfg;
+      cfg.robot = robots::robot_cfg(robot);
       EXPECT_EQ(cfg.robot.name, robot);
       EXPECT_EQ(make_task(task, cfg)->name(), task);
     }
@@ -34,10 +34,10 @@ TEST(Registry, CreatesEveryNamedTaskAndPolicy) {
 }
 
 TEST(Registry, UnknownNamesThrowWithTheNearest) {
-  expect_unknown([] { robot_cfg("frnka"); }, "did you mean 'franka'?");
+  expect_unknown([] { robots::robot_cfg("frnka"); }, "did you mean 'franka'?");
   expect_unknown([] { make_task("pik", {}); }, "did you mean 'pick'?");
   expect_unknown([] { make_policy("plannr"); }, "did you mean 'planner'?");
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

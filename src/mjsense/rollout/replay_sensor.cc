@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
@@ -26,7 +26,7 @@ SensorSpec spec_of(Shape shape, const char* description) {
 
 }  // namespace
 
-ReplaySensor::ReplaySensor(Worlds& worlds, int ticks)
+ReplaySensor::ReplaySensor(worlds::Worlds& worlds, int ticks)
     : Sensor("replay"), worlds_(worlds), ticks_(ticks) {}
 
 void ReplaySensor::initialize(const SensorInit& init) {
@@ -100,4 +100,4 @@ bool ReplaySensor::note_tick(const World& world, int tick) {
   return !played.ctrl.empty();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -9,7 +9,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/worlds/worlds.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 // Streams, for observation t:
 //   replay/state    float64 [nstate]  MuJoCo's mjSTATE_INTEGRATION at observation t
@@ -22,7 +22,7 @@ namespace mjsense {
 class ReplaySensor final : public Sensor {
  public:
   // ticks: how often controllers run in a step.
-  ReplaySensor(Worlds& worlds, int ticks);
+  ReplaySensor(worlds::Worlds& worlds, int ticks);
   std::string_view kind() const override { return "replay"; }
   void initialize(const SensorInit& init) override;
   mjtStage needs() const override { return mjSTAGE_NONE; }
@@ -43,10 +43,10 @@ class ReplaySensor final : public Sensor {
   struct Played {
     std::span<const double> ctrl, mocap;
   };
-  Worlds& worlds_;
+  worlds::Worlds& worlds_;
   int ticks_;
   std::vector<Played> played_;
   Field *state_ = nullptr, *written_ = nullptr, *ctrl_ = nullptr, *mocap_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

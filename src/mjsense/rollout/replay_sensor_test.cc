@@ -18,13 +18,13 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_archive.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 // What a recording stores of one episode.
 struct Recorded {
   std::vector<std::vector<double>> state, written, ctrl, mocap;
-  std::vector<EpisodeArray> model;
+  std::vector<record::EpisodeArray> model;
   std::vector<int> held;
 };
 
@@ -44,22 +44,22 @@ void append(const Sensor& replay, Recorded& out) {
   out.mocap.push_back(row_of(replay, "mocap"));
 }
 
-ModelPtr model_from(const Scene& scene) {
-  Vfs vfs;
+scene::ModelPtr model_from(const scene::Scene& scene) {
+  scene::Vfs vfs;
   std::string xml;
-  for (const auto& [name, bytes] : unzip(model_archive(scene))) {
-    if (name == kArchivedModel) xml = bytes;
-    if (name != kArchivedModel) vfs.add(name, bytes, "test");
+  for (const auto& [name, bytes] : unzip(scene::model_archive(scene))) {
+    if (name == scene::kArchivedModel) xml = bytes;
+    if (name != scene::kArchivedModel) vfs.add(name, bytes, "test");
   }
   char error[1000] = "";
-  const SpecPtr spec(mj_parseXMLString(xml.c_str(), vfs.get(), error, sizeof error));
+  const scene::SpecPtr spec(mj_parseXMLString(xml.c_str(), vfs.get(), error, sizeof error));
   EXPECT_TRUE(spec) << error;
-  return compile(spec.get(), vfs);
+  return scene::compile(spec.get(), vfs);
 }
 
 // Writes the values that are not NaN.
 template <class T>
-void write(const EpisodeArray& array, T* to) {
+void write(const record::EpisodeArray& array, T* to) {
   for (std::size_t i = 0; i < array.values.size() / sizeof(T); ++i) {
     T value;
     std::memcpy(&value, array.values.data() + i * sizeof(T), sizeof(T));
@@ -70,8 +70,8 @@ void write(const EpisodeArray& array, T* to) {
   }
 }
 
-void write_model(const std::vector<EpisodeArray>& arrays, mjModel* m) {
-  for (const EpisodeArray& array : arrays) {
+void write_model(const std::vector<record::EpisodeArray>& arrays, mjModel* m) {
+  for (const record::EpisodeArray& array : arrays) {
 #define X(type, name, rows, columns) \
   if (array.path == "model/" #name) write(array, m->name);
     MJMODEL_POINTERS
@@ -131,8 +131,8 @@ Recorded play(Rollout& rollout, int steps) {
     EXPECT_EQ(rollout.fault(0), "");
     append(*rollout.replay_sensor(), out);
   }
-  Simulation& simulation = rollout.simulation();
-  out.model = differing_fields(simulation.model_of(0), *simulation.scene().model());
+  sim::Simulation& simulation = rollout.simulation();
+  out.model = record::differing_fields(simulation.model_of(0), *simulation.scene().model());
   out.held = simulation.worlds().held(0);
   return out;
 }
@@ -149,9 +149,10 @@ RolloutCfg cfg_of(const std::string& task, const std::string& robot) {
 void expect_replays(const RolloutCfg& cfg, int steps) {
   Rollout rollout(cfg);
   Recorded recorded = play(rollout, steps);
-  const ModelPtr m = model_from(rollout.simulation().scene());
+  const scene::ModelPtr m = model_from(rollout.simulation().scene());
   ASSERT_TRUE(m);
-  EXPECT_EQ(model_checksums(*m), model_checksums(*rollout.simulation().scene().model()));
+  EXPECT_EQ(record::model_checksums(*m),
+            record::model_checksums(*rollout.simulation().scene().model()));
   write_model(recorded.model, m.get());
   EXPECT_EQ(first_difference(recorded, m.get(), rollout.task().decimation()), -1);
   // And the test can fail.
@@ -223,4 +224,4 @@ TEST(Replay, APolicyDoesNotObserveTheState) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

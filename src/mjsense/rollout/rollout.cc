@@ -14,14 +14,14 @@
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
-void set_arm_controller(const std::string& text, RobotCfg& robot) {
-  const ControllerCfg controller = parse_controller(text, "arm_controller");
+void set_arm_controller(const std::string& text, robots::RobotCfg& robot) {
+  const robots::ControllerCfg controller = robots::parse_controller(text, "arm_controller");
   bool any = false;
-  for (MoveGroupCfg& group : robot.groups) {
-    if (group.kind != GroupKind::kArm) continue;
+  for (robots::MoveGroupCfg& group : robot.groups) {
+    if (group.kind != robots::GroupKind::kArm) continue;
     group.controller = controller;
     any = true;
   }
@@ -30,17 +30,17 @@ void set_arm_controller(const std::string& text, RobotCfg& robot) {
         fmt::format("arm_controller is '{}', but robot '{}' has no arm", text, robot.name));
 }
 
-TaskCfg task_cfg(const RolloutCfg& cfg) {
-  TaskCfg out;
+episode::TaskCfg task_cfg(const RolloutCfg& cfg) {
+  episode::TaskCfg out;
   if (!cfg.robot.empty()) {
-    out.robot = robot_cfg(cfg.robot);
+    out.robot = robots::robot_cfg(cfg.robot);
     if (!cfg.arm_controller.empty()) set_arm_controller(cfg.arm_controller, out.robot);
     out.policy_dt_ms = out.robot.policy_dt_ms;
     out.ctrl_dt_ms = out.robot.ctrl_dt_ms;
     out.sim_dt_ms = out.robot.sim_dt_ms;
   }
   if (!out.robot.python_sensors.empty() && !cfg.robot_sensors) {
-    const PythonSensorRef& sensor = out.robot.python_sensors.front();
+    const robots::PythonSensorRef& sensor = out.robot.python_sensors.front();
     throw ValueError(
         fmt::format("robot '{}': sensor '{}' is the Python class '{}', which this program cannot "
                     "run: call mjsense.record() or mjsense.make_vec() from Python",
@@ -68,7 +68,7 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
 
 // Removes the task's sensors whose names are used by `others`: a user-composed suite may replace
 // them.
-void drop_of_task(SensorSuite& suite, std::span<const std::shared_ptr<Sensor>> others) {
+void drop_of_task(observe::SensorSuite& suite, std::span<const std::shared_ptr<Sensor>> others) {
   std::vector<std::string> kept;
   for (const std::string& name : suite.names()) {
     const bool replaced = suite.owner(name).starts_with("task ") &&
@@ -99,9 +99,10 @@ Rollout::Rollout(const RolloutCfg& cfg) : cfg_(resolved(cfg)) {
   make();
 }
 
-Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Policy> policy)
+Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<episode::Task> task,
+                 std::shared_ptr<episode::Policy> policy)
     : cfg_(std::move(cfg)), policy_(std::move(policy)), task_(std::move(task)) {
-  const TaskCfg& own = task_->cfg();
+  const episode::TaskCfg& own = task_->cfg();
   cfg_.task = task_->name();
   cfg_.robot = own.robot.name;
   cfg_.scene = own.scene;
@@ -119,17 +120,19 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
 
 void Rollout::make() {
   if (cfg_.on_construct_begin) cfg_.on_construct_begin(*this);
-  camera_system_ = std::make_unique<CameraSystem>(choose_cameras(*task_, cfg_));
+  camera_system_ = std::make_unique<cameras::CameraSystem>(choose_cameras(*task_, cfg_));
   cameras_ = recorded_cameras(*camera_system_);
-  SceneCfg scene_cfg = task_->scene_cfg_with_robot();
+  scene::SceneCfg scene_cfg = task_->scene_cfg_with_robot();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(
+    scene_cfg.sensors.push_back(std::make_shared<sensors::CameraSensorCfg>(
         camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));
   }
   if (cfg_.default_view)
-    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(default_view(*task_, cfg_)));
-  auto scene = std::make_shared<Scene>(std::move(scene_cfg));
-  simulation_ = std::make_shared<Simulation>(scene, SimulationCfg{.num_worlds = cfg_.num_worlds,
+    scene_cfg.sensors.push_back(
+        std::make_shared<sensors::CameraSensorCfg>(default_view(*task_, cfg_)));
+  auto scene = std::make_shared<scene::Scene>(std::move(scene_cfg));
+  simulation_ =
+      std::make_shared<sim::Simulation>(scene, sim::SimulationCfg{.num_worlds = cfg_.num_worlds,
                                                                   .decimation = task_->decimation(),
                                                                   .threads = cfg_.threads,
                                                                   .seed = cfg_.seed});
@@ -169,7 +172,8 @@ void Rollout::make() {
   faults_.resize(cfg_.num_worlds);
   active_.assign(cfg_.num_worlds, 0);
   refused_.assign(cfg_.num_worlds, 0);
-  for (int w = 0; w < cfg_.num_worlds; ++w) rows_.push_back(state_row(simulation_->worlds(), w));
+  for (int w = 0; w < cfg_.num_worlds; ++w)
+    rows_.push_back(robots::state_row(simulation_->worlds(), w));
   ids_.reserve(cfg_.num_worlds);
   moving_.reserve(cfg_.num_worlds);
   if (cfg_.on_constructed) cfg_.on_constructed(*this);
@@ -179,8 +183,8 @@ void Rollout::make() {
 std::vector<std::shared_ptr<Sensor>> Rollout::robot_sensors() {
   std::vector<std::shared_ptr<Sensor>> sensors;
   for (const auto& cfg : task_->cfg().robot.sensors) {
-    sensors.push_back(
-        std::make_shared<SharedSensor>(cfg->name, simulation_->scene().sensor(cfg->key())));
+    sensors.push_back(std::make_shared<observe::SharedSensor>(
+        cfg->name, simulation_->scene().sensor(cfg->key())));
   }
   if (cfg_.robot_sensors) {
     for (auto& sensor : cfg_.robot_sensors(*this)) sensors.push_back(std::move(sensor));
@@ -199,4 +203,4 @@ std::string Rollout::obs_scene(int world) const {
                      camera_system_->frozen(world));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

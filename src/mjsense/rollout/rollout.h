@@ -35,7 +35,7 @@
 #include "mjsense/rollout/registry.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 class ReplaySensor;
 class Rollout;
@@ -72,13 +72,13 @@ struct RolloutCfg {
   bool action_noise = true;
   bool terminate_upon_success = false;
   double perturb = 0;
-  NamedEnum<Instructions> instructions;
+  NamedEnum<episode::Instructions> instructions;
   bool use_sensors = true;
   // User-defined factories, used instead of a named task, policy or scene. `task`, `policy` and
   // `scene` above are then only display names.
   TaskFactory make_task;
   PolicyFactory make_policy;
-  std::function<SceneFileCfg()> make_scene;
+  std::function<scenes::SceneFileCfg()> make_scene;
   // Dependencies of these functions and of `more_sensors`: checksums of code and of the values that
   // it uses, by name, for "task", "policy", "sensor 'x'" ... A recording can only be resumed with
   // equal ones.
@@ -93,7 +93,7 @@ struct RolloutCfg {
   // The same for sensors of the robot that are written in Python. They precede those of the policy.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> robot_sensors;
   // Edits the suite after everything else.
-  std::function<void(SensorSuite&)> edit_suite;
+  std::function<void(observe::SensorSuite&)> edit_suite;
   // `on_construct_begin` is called when only task and policy exist, `on_constructed` at the end of
   // the construction.
   std::function<void(Rollout&)> on_construct_begin, on_constructed;
@@ -195,18 +195,19 @@ class Rollout {
   explicit Rollout(const RolloutCfg& cfg);
   // Uses an existing task and policy (or null). Robot, seed, horizon and noise are those of the
   // task.
-  Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Policy> policy);
+  Rollout(RolloutCfg cfg, std::shared_ptr<episode::Task> task,
+          std::shared_ptr<episode::Policy> policy);
   ~Rollout();
   Rollout(const Rollout&) = delete;
   Rollout& operator=(const Rollout&) = delete;
 
   const RolloutCfg& cfg() const { return cfg_; }
   int num_worlds() const { return cfg_.num_worlds; }
-  Task& task() { return *task_; }
-  Policy* policy() { return policy_.get(); }
-  Simulation& simulation() { return *simulation_; }
-  const std::shared_ptr<Simulation>& simulation_ptr() const { return simulation_; }
-  SensorSuite& suite() { return suite_; }
+  episode::Task& task() { return *task_; }
+  episode::Policy* policy() { return policy_.get(); }
+  sim::Simulation& simulation() { return *simulation_; }
+  const std::shared_ptr<sim::Simulation>& simulation_ptr() const { return simulation_; }
+  observe::SensorSuite& suite() { return suite_; }
   // Runs a function on the fresh data of some worlds, in parallel.
   void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
@@ -227,7 +228,7 @@ class Rollout {
 
   // Lets the policy fill the actions of the active worlds.
   void act();
-  Action& action(int world) { return actions_[world]; }
+  robots::Action& action(int world) { return actions_[world]; }
   // One control step. Updates the suite and the evaluations of the active worlds.
   void step();
   // Repeats a recorded control step of each of these worlds: what actions and controllers write is
@@ -242,9 +243,9 @@ class Rollout {
   // world stops early at the end of its episode or, with `stop_on_success`, at its first success.
   // Its evaluation is that of its last step, with the sum of all rewards. Throws ValueError unless
   // there is at least one whole step.
-  void step_chunk(std::span<const Action> actions, bool stop_on_success = false);
+  void step_chunk(std::span<const robots::Action> actions, bool stop_on_success = false);
 
-  const Evaluation& evaluation(int world) const { return evaluations_[world]; }
+  const episode::Evaluation& evaluation(int world) const { return evaluations_[world]; }
   // Reason why this world's episode cannot continue: physics that diverged (MuJoCo's message) or a
   // row that could not be computed. "" if there is none. With a fault, the world's rows are invalid
   // until its next episode starts.
@@ -276,22 +277,22 @@ class Rollout {
   int threads() const;
 
   RolloutCfg cfg_;
-  std::shared_ptr<Policy> policy_;  // outlives the task
-  std::shared_ptr<Task> task_;
-  std::unique_ptr<CameraSystem> camera_system_;
+  std::shared_ptr<episode::Policy> policy_;  // outlives the task
+  std::shared_ptr<episode::Task> task_;
+  std::unique_ptr<cameras::CameraSystem> camera_system_;
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<ActionLog> log_;
   std::shared_ptr<ReplaySensor> replay_;
-  SensorSuite suite_;
-  std::shared_ptr<Simulation> simulation_;  // refers to the suite's sensors
-  std::vector<Action> actions_;
-  std::vector<Evaluation> evaluations_;
+  observe::SensorSuite suite_;
+  std::shared_ptr<sim::Simulation> simulation_;  // refers to the suite's sensors
+  std::vector<robots::Action> actions_;
+  std::vector<episode::Evaluation> evaluations_;
   std::vector<std::string> faults_;
   std::vector<char> active_, refused_;
-  std::vector<StateRow> rows_;  // [B]
-  std::vector<int> ids_;        // scratch of active_worlds()
-  std::vector<int> moving_;     // scratch of start() and step_chunk()
+  std::vector<robots::StateRow> rows_;  // [B]
+  std::vector<int> ids_;                // scratch of active_worlds()
+  std::vector<int> moving_;             // scratch of start() and step_chunk()
   RolloutTimes times_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

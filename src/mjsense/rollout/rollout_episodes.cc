@@ -11,7 +11,7 @@
 #include "mjsense/rollout/replay_sensor.h"
 #include "mjsense/rollout/rollout.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -22,13 +22,13 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::span<double> state_row(Simulation& simulation, int world) {
+std::span<double> state_row(sim::Simulation& simulation, int world) {
   const ArrayView rows = simulation.worlds().state();
   return {reinterpret_cast<double*>(rows.data + world * rows.strides[0]),
           static_cast<std::size_t>(rows.shape[1])};
 }
 
-std::vector<double> state_of(Simulation& simulation, int world) {
+std::vector<double> state_of(sim::Simulation& simulation, int world) {
   const std::span<const double> row = state_row(simulation, world);
   return {row.begin(), row.end()};
 }
@@ -36,7 +36,7 @@ std::vector<double> state_of(Simulation& simulation, int world) {
 }  // namespace
 
 // Runs a function on the fresh data of some worlds, in parallel.
-class Rollout::ForEachHook final : public WorldHooks {
+class Rollout::ForEachHook final : public worlds::WorldHooks {
  public:
   explicit ForEachHook(std::function<void(const World&)> body) : body_(std::move(body)) {}
   void substep(const World& /*world*/) override {}
@@ -48,7 +48,7 @@ class Rollout::ForEachHook final : public WorldHooks {
 };
 
 // A subset of the worlds, as seen by tasks and policies.
-class Rollout::WorldSubset final : public ActiveWorlds {
+class Rollout::WorldSubset final : public episode::ActiveWorlds {
  public:
   WorldSubset(Rollout& rollout, std::span<const int> ids) : rollout_(rollout), ids_(ids) {}
   std::span<const int> ids() const override { return ids_; }
@@ -95,7 +95,7 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
     faults_[w].clear();
     evaluations_[w] = {};
     refused_[w] = false;
-    actions_[w] = Action{};
+    actions_[w] = robots::Action{};
     log_->begin(w);
   }
   sample(worlds, episodes);
@@ -137,7 +137,7 @@ void Rollout::place_cameras(std::span<const int> worlds) {
   for_each(worlds, [&](const World& world) {
     if (!faults_[world.id].empty()) return;
     std::vector<int> objects;
-    for (const TaskObject& object : task_->objects(world.id)) {
+    for (const episode::TaskObject& object : task_->objects(world.id)) {
       if (object.body >= 0) objects.push_back(object.body);
     }
     why[world.id] = camera_system_->place_cameras(world, cfg_.seed,
@@ -155,7 +155,7 @@ void Rollout::place_cameras(std::span<const int> worlds) {
 void Rollout::act() {
   if (!policy_) throw ValueError("this rollout has no policy: write action(world) before step()");
   const auto begun = Clock::now();
-  for (int w : active_worlds()) actions_[w] = Action{};
+  for (int w : active_worlds()) actions_[w] = robots::Action{};
   if (!ids_.empty()) {
     WorldSubset worlds(*this, ids_);
     policy_->act_all(worlds, actions_);
@@ -233,7 +233,7 @@ void Rollout::step() {
   finish_rows();
 }
 
-void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) {
+void Rollout::step_chunk(std::span<const robots::Action> actions, bool stop_on_success) {
   const auto B = static_cast<std::size_t>(num_worlds());
   if (actions.empty() || actions.size() % B != 0) {
     throw ValueError(fmt::format(
@@ -242,7 +242,7 @@ void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) 
   const std::size_t steps = actions.size() / B;
   std::vector<double> reward(B);
   const auto goes_on = [&](int w) {
-    const Evaluation& now = evaluations_[w];
+    const episode::Evaluation& now = evaluations_[w];
     return active_[w] && faults_[w].empty() && !now.terminal && !now.truncated &&
            !(stop_on_success && now.success);
   };
@@ -323,4 +323,4 @@ int Rollout::threads() const {
   return std::max(1, std::min<int>(simulation_->worlds().threads(), static_cast<int>(ids_.size())));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

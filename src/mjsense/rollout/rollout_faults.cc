@@ -6,7 +6,7 @@
 #include "mjsense/core/row_error.h"
 #include "mjsense/rollout/rollout.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 // m/s or rad/s. MuJoCo's own limit is 1e10, which lets an object that a contact has thrown away fly
@@ -22,7 +22,8 @@ void Rollout::set_fault(int world, std::string text) {
 }
 
 void Rollout::take_failures() {
-  for (const Failure& failure : simulation_->failures()) set_fault(failure.world, failure.message);
+  for (const worlds::Failure& failure : simulation_->failures())
+    set_fault(failure.world, failure.message);
 }
 
 // Ends the episodes in which something is faster than kMaxSpeed.
@@ -60,4 +61,4 @@ bool Rollout::guard_rows(const std::function<void()>& body) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -15,7 +15,7 @@
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/record/molmospaces.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using nlohmann::json;
@@ -83,7 +83,7 @@ TEST(Rollout, CamerasHaveVideosAndImagePoints) {
   }
   cameras[0].image_points = false;
   const ActionLog log(1);
-  const SensorSuite suite = core_suite(rollout.task(), log, cameras);
+  const observe::SensorSuite suite = core_suite(rollout.task(), log, cameras);
   Sensor& points = suite.get("object_image_points");
   points.initialize({.model = rollout.task().model(), .num_worlds = 1});
   EXPECT_THAT(points.fields(), Not(IsEmpty()));
@@ -96,13 +96,13 @@ TEST(Rollout, CamerasHaveVideosAndImagePoints) {
 TEST(Rollout, FunctionSensor) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
-  const Robot& robot = rollout.task().robot();
-  SensorSuite suite;
-  suite.add(
-      std::make_shared<FunctionSensor<float>>("gripper_opening", SensorSpec{.unit = "m"},
-                                              [&robot](const World& world, std::span<float> row) {
-                                                row[0] = robot.opening(world, robot.gripper());
-                                              }));
+  const robots::Robot& robot = rollout.task().robot();
+  observe::SensorSuite suite;
+  suite.add(std::make_shared<observe::FunctionSensor<float>>(
+      "gripper_opening", SensorSpec{.unit = "m"},
+      [&robot](const World& world, std::span<float> row) {
+        row[0] = robot.opening(world, robot.gripper());
+      }));
   EXPECT_THAT(suite.names(), ElementsAre("gripper_opening"));
 }
 
@@ -115,13 +115,13 @@ TEST(Rollout, CommandsAreInTheUnitOfTheirActuators) {
     EXPECT_EQ(unit(name + "/arm"), "rad");
     EXPECT_EQ(unit(name + "/gripper"), "0 open .. 255 closed");
     // The dataset that a recording writes has the same unit.
-    EXPECT_EQ(text_of(rollout.suite().get("actions/" + name))->unit,
+    EXPECT_EQ(record::text_of(rollout.suite().get("actions/" + name))->unit,
               "arm: rad; gripper: 0 open .. 255 closed");
   }
   EXPECT_EQ(unit("joint_pos_rel/arm"), "rad");
   // One command but two joints, so it has no relative position.
   EXPECT_EQ(unit("joint_pos_rel/gripper"), "");
-  EXPECT_EQ(text_of(rollout.suite().get("actions/joint_pos_rel"))->unit, "arm: rad");
+  EXPECT_EQ(record::text_of(rollout.suite().get("actions/joint_pos_rel"))->unit, "arm: rad");
 }
 
 // Row t describes the action between observations t-1 and t.
@@ -139,7 +139,7 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
   EXPECT_THAT(numbers(rollout, "actions/ee_twist/arm"), ElementsAre(0, 0, 0, 0, 0, 0));
   EXPECT_THAT(numbers(rollout, "actions/ee_pose/base"), ElementsAre(0, 0, 0, 1, 0, 0, 0));
 
-  const Robot& robot = rollout.task().robot();
+  const robots::Robot& robot = rollout.task().robot();
   for (int t = 1; t <= 20; ++t) {
     const auto before = numbers<float>(rollout, "qpos/arm");
     const auto leaf_row = rollout.suite().stream("tcp_pose").data.row<float>(0);
@@ -156,7 +156,7 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
     const auto twist = numbers(rollout, "actions/ee_twist/arm");
     const Pose reached =
         leaf * exp6({{twist[0], twist[1], twist[2]}, {twist[3], twist[4], twist[5]}});
-    RobotValues values;
+    robots::RobotValues values;
     values[robot.arm()].set(target);
     const Pose expected = robot.fk(robot.arm(), values);
     EXPECT_NEAR(norm(reached.p - expected.p), 0, 1e-5);
@@ -209,7 +209,7 @@ TEST(Rollout, PolicyVerdictIsNumeric) {
   cfg.policy.clear();
   Rollout rollout(cfg);
   start(rollout, {0}, {7});
-  Action& action = rollout.action(0);
+  robots::Action& action = rollout.action(0);
   const double hold[7] = {0.1, -0.7, 0, -2.3, 0, 1.6, 0};
   action.commands[rollout.task().robot().arm()].set(hold);
   action.success = false;
@@ -247,7 +247,7 @@ std::uint64_t hash(Rollout& rollout, int world) {
 // Hashes of the first observations of episodes 0 .. 4, played in worlds as they become free.
 std::map<std::int64_t, std::vector<std::uint64_t>> play(RolloutCfg cfg) {
   cfg.more_sensors = [](Rollout&) {  // a sensor with noise
-    return std::vector<std::shared_ptr<Sensor>>{std::make_shared<FunctionSensor<double>>(
+    return std::vector<std::shared_ptr<Sensor>>{std::make_shared<observe::FunctionSensor<double>>(
         "noise", SensorSpec{}, [](const World& world, std::span<double> row) {
           row[0] = world.rng(stream_of("noise")).uniform();
         })};
@@ -310,7 +310,7 @@ TEST(Rollout, ImpossibleSpeedsEndTheEpisode) {
   const mjModel* m = rollout.simulation().model();
   int dof = 0;
   while (m->jnt_type[m->dof_jntid[dof]] != mjJNT_FREE) ++dof;
-  state_row(rollout.simulation().worlds(), 1).qvel[dof] = 1e7;
+  robots::state_row(rollout.simulation().worlds(), 1).qvel[dof] = 1e7;
   rollout.act();
   rollout.step();
   EXPECT_THAT(rollout.fault(1), HasSubstr("the physics diverged: body '"));
@@ -325,7 +325,7 @@ TEST(Rollout, DivergingWorldDoesNotAffectOthers) {
     start(rollout, {0, 1}, {0, 1});
     for (int t = 0; t < 8; ++t) {
       if (poison && t == 4) {
-        const StateRow state = state_row(rollout.simulation().worlds(), 1);
+        const robots::StateRow state = robots::state_row(rollout.simulation().worlds(), 1);
         state.qvel[0] = std::numeric_limits<double>::quiet_NaN();
       }
       rollout.act();
@@ -350,7 +350,7 @@ TEST(Rollout, DivergingWorldDoesNotAffectOthers) {
 
 TEST(Rollout, RowThatDoesNotFitEndsOnlyItsEpisode) {
   Rollout rollout(blind(2));
-  rollout.suite().add(std::make_shared<JsonFunctionSensor>(
+  rollout.suite().add(std::make_shared<observe::JsonFunctionSensor>(
       "notes", 16, "", [&](const World& world, JsonWriter& json) {
         const int step = rollout.task().episode_step(world.id);
         json.begin_object();
@@ -374,7 +374,7 @@ TEST(Rollout, RowThatDoesNotFitEndsOnlyItsEpisode) {
 
 // Computes the rows of all worlds in one call, and fails for two of them at one step.
 struct Batch final : Sensor {
-  explicit Batch(const Task& task) : Sensor("batch"), task(task) {}
+  explicit Batch(const episode::Task& task) : Sensor("batch"), task(task) {}
   std::string_view kind() const override { return "batch"; }
   Stage stage() const override { return Stage::kBatch; }
   void initialize(const SensorInit& init) override {
@@ -391,7 +391,7 @@ struct Batch final : Sensor {
     }
     if (!faults.empty()) throw RowError(faults);
   }
-  const Task& task;
+  const episode::Task& task;
   std::vector<int> computed;
 };
 
@@ -442,4 +442,4 @@ TEST(Rollout, WrongNamesAndNumbersThrow) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

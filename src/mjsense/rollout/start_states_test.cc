@@ -6,7 +6,7 @@
 
 #include "mjsense/rollout/rollout.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 constexpr int kWorlds = 8;
@@ -41,4 +41,4 @@ TEST(Starts, ObjectsDoNotOverlap) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

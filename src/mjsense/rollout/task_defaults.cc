@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 constexpr std::string_view kUsualRobot = "franka";
@@ -65,7 +65,7 @@ std::string_view default_robot(std::string_view task) {
   return d ? d->robot : kUsualRobot;
 }
 
-void set_task_defaults(std::string_view task, TaskCfg& cfg) {
+void set_task_defaults(std::string_view task, episode::TaskCfg& cfg) {
   const Defaults* d = defaults_of(task);
   if (!d) {
     const bool ours = !default_scene(task_components(task)[0]).empty();
@@ -78,4 +78,4 @@ void set_task_defaults(std::string_view task, TaskCfg& cfg) {
   if (d->sim_dt_ms > 0) cfg.sim_dt_ms = d->sim_dt_ms;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

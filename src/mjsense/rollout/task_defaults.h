@@ -8,7 +8,7 @@
 
 #include "mjsense/episode/task.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 
 // Names of the tasks that a name denotes: itself, or the parts of "nav_to_obj+pick". "multi_task"
 // denotes "nav_to_obj+pick".
@@ -23,6 +23,6 @@ std::string_view default_robot(std::string_view task);
 // Sets the horizon of a built-in task (of the first part of a combined one), and its periods if
 // they differ from the robot's. Other tasks are left unchanged. `cfg` must already contain the
 // robot and its periods.
-void set_task_defaults(std::string_view task, TaskCfg& cfg);
+void set_task_defaults(std::string_view task, episode::TaskCfg& cfg);
 
-}  // namespace mjsense
+}  // namespace mjsense::rollout

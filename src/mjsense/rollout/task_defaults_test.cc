@@ -5,11 +5,11 @@
 
 #include "mjsense/episode/testing/played_task.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 int horizon(const char* task, const char* robot) {
-  TaskCfg cfg = task_cfg(robot, "");
+  episode::TaskCfg cfg = episode::task_cfg(robot, "");
   set_task_defaults(task, cfg);
   return cfg.horizon;
 }
@@ -27,4 +27,4 @@ TEST(TaskDefaults, HorizonsEqualMolmoSpaces) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

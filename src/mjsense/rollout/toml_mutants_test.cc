@@ -26,7 +26,7 @@
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/scenes/load_scene.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 constexpr DataFolder kRobots{"robot", "robots/", "/robot.toml"};
@@ -40,17 +40,17 @@ int random_mutants() {
 }
 
 // Loads a task with the robot and computes the planner's first plan.
-void use(TaskCfg cfg, bool plan) {
+void use(episode::TaskCfg cfg, bool plan) {
   set_task_defaults("pick", cfg);
-  const std::unique_ptr<Task> task = make_task("pick", cfg);
-  const Scene scene(task->scene_cfg_with_robot());
+  const std::unique_ptr<episode::Task> task = make_task("pick", cfg);
+  const scene::Scene scene(task->scene_cfg_with_robot());
   task->initialize(scene.model(), 1);
-  const std::unique_ptr<Policy> policy = make_policy("planner");
+  const std::unique_ptr<episode::Policy> policy = make_policy("planner");
   task->register_policy(*policy);
   if (!plan) return;
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(scene.model()),
                                                                mj_deleteData);
-  task->sample(0, 0, state_row(data.get()));
+  task->sample(0, 0, robots::state_row(data.get()));
   mj_forward(scene.model(), data.get());
   const World world{.id = 0, .model = scene.model(), .data = data.get()};
   task->begin(world);
@@ -88,8 +88,8 @@ std::string outcome(const std::function<void()>& action) {
 
 std::string used_robot(const std::string& text, const std::string& path, bool plan) {
   return outcome([&] {
-    TaskCfg cfg;
-    cfg.robot = parse_robot(text, path);
+    episode::TaskCfg cfg;
+    cfg.robot = robots::parse_robot(text, path);
     cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
     cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
     cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
@@ -99,7 +99,7 @@ std::string used_robot(const std::string& text, const std::string& path, bool pl
 
 std::string used_scene(const std::string& text, const std::filesystem::path& file) {
   std::ofstream(file) << text;
-  return outcome([&] { use(task_cfg("franka", file.string()), false); });
+  return outcome([&] { use(episode::task_cfg("franka", file.string()), false); });
 }
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -137,7 +137,7 @@ TEST_P(RobotMutants, RemovedLinesNeitherCrashNorHang) {
         << file.path << " without line " << i + 1 << ": " << lines[i];
   }
 }
-INSTANTIATE_TEST_SUITE_P(Robots, RobotMutants, ::testing::ValuesIn(robot_names()),
+INSTANTIATE_TEST_SUITE_P(Robots, RobotMutants, ::testing::ValuesIn(robots::robot_names()),
                          [](const auto& info) { return info.param; });
 
 // Models referenced relative to the file are not found from the copy. That is one of the faults.
@@ -146,7 +146,7 @@ TEST(SceneMutants, RemovedLinesNeitherCrashNorHang) {
   const std::filesystem::path copy = folder.path / "scene.toml";
   const std::size_t stride = random_mutants() > 0 ? 1 : 40;
   std::size_t count = 0;
-  for (const std::string& name : scene_names()) {
+  for (const std::string& name : scenes::scene_names()) {
     const DataFile file = kScenes.find(name);
     const std::vector<std::string> lines = lines_of(file.text);
     for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -192,7 +192,7 @@ std::string mutate(std::vector<std::string> lines, Rng& rng) {
 }
 
 TEST(RandomRobotMutants, NeitherCrashNorHang) {
-  const std::vector<std::string> names = robot_names();
+  const std::vector<std::string> names = robots::robot_names();
   const int mutants = random_mutants() > 0 ? random_mutants() : 40;
   for (int i = 0; i < mutants; ++i) {
     Rng rng(7, static_cast<std::uint32_t>(i), stream_of("toml mutants"), 0);
@@ -203,4 +203,4 @@ TEST(RandomRobotMutants, NeitherCrashNorHang) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

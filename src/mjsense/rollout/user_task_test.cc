@@ -10,7 +10,7 @@
 #include "mjsense/rollout/rollout.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::rollout {
 namespace {
 
 using testing::ElementsAre;
@@ -29,31 +29,31 @@ constexpr const char* kCart = R"(
 </mujoco>)";
 
 // Drive a cart to a mark.
-class CartTask final : public Task {
+class CartTask final : public episode::Task {
  public:
-  explicit CartTask(TaskCfg cfg) : Task(with_periods(std::move(cfg))) {}
+  explicit CartTask(episode::TaskCfg cfg) : episode::Task(with_periods(std::move(cfg))) {}
   std::string_view name() const override { return "cart"; }
   std::string_view type() const override { return "cart"; }
   std::string robot_entity() const override { return "cart"; }
 
-  SceneCfg scene_cfg() const override {
-    EntityCfg cart;
+  scene::SceneCfg scene_cfg() const override {
+    scene::EntityCfg cart;
     cart.model.xml = kCart;
-    SceneCfg scene;
+    scene::SceneCfg scene;
     scene.entities = {{"cart", cart}};
     return scene;
   }
-  Evaluation evaluate(const World& world) const override {
+  episode::Evaluation evaluate(const World& world) const override {
     const double error = std::abs(world.data->qpos[0] - marks_[world.id]);
     return make_evaluation(world.id, -error,
                            error<0.02, /*over=*/std::abs(world.data->qpos[0])> 0.95);
   }
-  void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) override {
+  void evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) override {
     ++evaluations;
-    Task::evaluate_all(worlds, out);
+    episode::Task::evaluate_all(worlds, out);
   }
 
-  std::span<const TaskObject> objects(int) const override { return {}; }
+  std::span<const episode::TaskObject> objects(int) const override { return {}; }
   std::string description(int) const override { return "Drive the cart to the mark"; }
   Referrals referrals(int) const override { return {}; }
   Pose start_pose(int, std::string_view) const override { return {}; }
@@ -62,14 +62,14 @@ class CartTask final : public Task {
     json.key("mark").value(marks_[world.id]);
   }
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override {
-    return {std::make_shared<FunctionSensor<double>>(
+    return {std::make_shared<observe::FunctionSensor<double>>(
         "mark", SensorSpec{.unit = "m"},
         [this](const World& world, std::span<double> row) { row[0] = marks_[world.id]; })};
   }
   std::string start_error(const World& world) const override {
     return world.data->qpos[0] < min_start ? "the cart starts on the left" : "";
   }
-  void edit_suite(SensorSuite& suite) const override {
+  void edit_suite(observe::SensorSuite& suite) const override {
     if (!keep.empty()) suite.select(keep);
   }
 
@@ -80,7 +80,7 @@ class CartTask final : public Task {
 
  protected:
   void initialize_task() override { marks_.assign(num_worlds(), 0.0); }
-  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override {
+  std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override {
     ++samples;
     state.qpos[0] = rng.uniform(-0.5, 0.5);
     marks_[world] = rng.uniform(-0.5, 0.5);
@@ -88,7 +88,7 @@ class CartTask final : public Task {
   }
 
  private:
-  static TaskCfg with_periods(TaskCfg cfg) {
+  static episode::TaskCfg with_periods(episode::TaskCfg cfg) {
     cfg.policy_dt_ms = 20;
     return cfg;
   }
@@ -96,11 +96,11 @@ class CartTask final : public Task {
 };
 
 // Acts for all worlds at once.
-class Drive final : public Policy {
+class Drive final : public episode::Policy {
  public:
   std::string_view name() const override { return "drive"; }
-  void initialize(Task& task) override { task_ = &dynamic_cast<CartTask&>(task); }
-  void act_all(ActiveWorlds& worlds, std::span<Action> actions) override {
+  void initialize(episode::Task& task) override { task_ = &dynamic_cast<CartTask&>(task); }
+  void act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) override {
     ++acts;
     for (int w : worlds.ids()) {
       const double command[] = {task_->mark(w)};
@@ -121,7 +121,7 @@ RolloutCfg two_worlds() {
 }
 
 struct OwnTask : testing::Test {
-  std::shared_ptr<CartTask> task = std::make_shared<CartTask>(TaskCfg{});
+  std::shared_ptr<CartTask> task = std::make_shared<CartTask>(episode::TaskCfg{});
   std::shared_ptr<Drive> policy = std::make_shared<Drive>();
 
   static void start(Rollout& rollout) {
@@ -138,8 +138,8 @@ struct OwnTask : testing::Test {
   static bool given(Rollout& rollout, const std::string& action, int world) {
     return rollout.suite().stream(action + "/given/joints").data.row<bool>(world)[0];
   }
-  static Action command(const Task& task, double x) {
-    Action action;
+  static robots::Action command(const episode::Task& task, double x) {
+    robots::Action action;
     action.commands[task.robot().group_index("joints")].set({&x, 1});
     return action;
   }
@@ -169,7 +169,9 @@ TEST_F(OwnTask, SceneContainsTheRobot) {
 TEST_F(OwnTask, RobotOfTheSceneIsTheDefault) {
   RolloutCfg cfg = two_worlds();
   cfg.policy = "";
-  cfg.make_task = [](TaskCfg wanted) { return std::make_unique<CartTask>(std::move(wanted)); };
+  cfg.make_task = [](episode::TaskCfg wanted) {
+    return std::make_unique<CartTask>(std::move(wanted));
+  };
   ASSERT_EQ(cfg.robot, kTaskRobot);
   Rollout rollout(cfg);
   EXPECT_EQ(rollout.cfg().robot, "");
@@ -190,7 +192,8 @@ TEST_F(OwnTask, EvaluatesAndActsForAllWorldsAtOnce) {
 }
 
 TEST_F(OwnTask, RegisteredTaskHasAName) {
-  register_task("cart", [](TaskCfg cfg) { return std::make_unique<CartTask>(std::move(cfg)); });
+  register_task("cart",
+                [](episode::TaskCfg cfg) { return std::make_unique<CartTask>(std::move(cfg)); });
   register_policy("drive", [] { return std::make_unique<Drive>(); });
   EXPECT_THAT(task_names(), testing::Contains("cart"));
   EXPECT_THAT(policy_names(), testing::Contains("drive"));
@@ -228,7 +231,7 @@ TEST_F(OwnTask, TaskMayEditTheSuite) {
   task->keep = {"mark", "qpos"};
   Rollout rollout(two_worlds(), task, policy);
   EXPECT_THAT(rollout.suite().names(), ElementsAre("mark", "qpos"));
-  auto wrong = std::make_shared<CartTask>(TaskCfg{});
+  auto wrong = std::make_shared<CartTask>(episode::TaskCfg{});
   wrong->keep = {"qpo"};
   try {
     Rollout other(two_worlds(), wrong, nullptr);
@@ -250,7 +253,7 @@ TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallers) {
 }
 
 TEST_F(OwnTask, SuccessEndsAnEpisodeOnRequest) {
-  TaskCfg cfg;
+  episode::TaskCfg cfg;
   cfg.terminate_upon_success = true;
   auto needs_every_step = std::make_shared<CartTask>(cfg);
   Rollout rollout(two_worlds(), needs_every_step, policy);
@@ -272,11 +275,11 @@ TEST_F(OwnTask, SuccessEndsAnEpisodeOnRequest) {
 // A chunk equals its single steps without the intermediate observations.
 TEST_F(OwnTask, ChunkEqualsItsSteps) {
   Rollout single(two_worlds(), task, policy);
-  auto other = std::make_shared<CartTask>(TaskCfg{});
+  auto other = std::make_shared<CartTask>(episode::TaskCfg{});
   Rollout chunked(two_worlds(), other, nullptr);
   start(single);
   start(chunked);
-  std::vector<Action> chunk;
+  std::vector<robots::Action> chunk;
   double reward[2] = {};
   for (int t = 0; t < 4; ++t) {
     for (int w = 0; w < 2; ++w) {
@@ -301,7 +304,7 @@ TEST_F(OwnTask, ChunkEndsWithItsEpisode) {
   Rollout rollout(two_worlds(), task, nullptr);
   start(rollout);
   // World 0 drives out of the field, world 1 reaches its mark.
-  std::vector<Action> chunk;
+  std::vector<robots::Action> chunk;
   for (int t = 0; t < 200; ++t) {
     chunk.push_back(command(*task, 1.0));
     chunk.push_back(command(*task, task->mark(1)));
@@ -324,7 +327,7 @@ TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
   const int worlds[] = {7, 1, 2, 3, 4, 5, 6, 0};
   const std::int64_t episodes[] = {0, 1, 2, 3, 4, 5, 6, 7};
   many.start(worlds, episodes);
-  auto other = std::make_shared<CartTask>(TaskCfg{});
+  auto other = std::make_shared<CartTask>(episode::TaskCfg{});
   other->min_start = 0.2;
   cfg.num_worlds = 1;
   Rollout one(cfg, other, nullptr);
@@ -357,4 +360,4 @@ TEST_F(OwnTask, EpisodesDependOnTheSeed) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::rollout

@@ -18,7 +18,7 @@
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr const char* kFreeJoint = "floating_base_joint";
@@ -249,4 +249,4 @@ Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs) {
   return attached;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -11,7 +11,7 @@
 #include "mjsense/scene/initial_state.h"
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // Parses the entity's model, names unnamed elements, and attaches it to `scene` with the prefix
 // "<name>/". Throws ValueError that names the entity.
@@ -25,4 +25,4 @@ void name_unnamed(mjSpec* spec);
 // elements and takes out the keyframes.
 Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

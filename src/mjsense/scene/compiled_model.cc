@@ -18,7 +18,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 // Types of the elements in an outline.
@@ -340,4 +340,4 @@ void CompiledModel::replace_model(Scene& scene) const {
   std::swap(*model, *const_cast<mjModel*>(scene.model()));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

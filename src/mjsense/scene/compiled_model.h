@@ -14,7 +14,7 @@
 
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // A model with the sizes, options and arrays of `fields`, whose `nbuffer` is ignored. Throws
 // RuntimeError if MuJoCo rejects the sizes.
@@ -48,4 +48,4 @@ class CompiledModel {
   std::vector<Names> names_;  // of the outline, by type
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -11,7 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr const char* kModel = R"(
@@ -111,4 +111,4 @@ TEST(CompiledModel, UnnamedElementsGetTheNamesOfABase) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 bool is_muscle(const mjsActuator* actuator) {
@@ -100,4 +100,4 @@ SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_vie
   return made;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

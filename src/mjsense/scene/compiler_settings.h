@@ -12,7 +12,7 @@
 
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // Returns the names of the settings that the model sets and that affect it: settotalmass,
 // fusestatic, discardvisual, fitaabb, lengthrange.
@@ -23,4 +23,4 @@ std::vector<std::string> whole_model_settings(const mjSpec* spec);
 // ValueError, or RuntimeError for what MJCF cannot express; both start with `context`.
 SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

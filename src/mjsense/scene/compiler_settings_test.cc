@@ -22,7 +22,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 using ::testing::ElementsAre;
@@ -387,4 +387,4 @@ TEST(CompilerSettings, OnlyEffectiveSettingsAreApplied) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scene

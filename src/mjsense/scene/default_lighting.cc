@@ -5,7 +5,7 @@
 
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 void add_sun(mjSpec* spec) {
@@ -64,4 +64,4 @@ void add_daylight(mjSpec* spec) {
     add_squares(spec, plane);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -6,7 +6,7 @@
 
 #include <array>
 
-namespace mjsense {
+namespace mjsense::scene {
 
 using Rgb3 = std::array<double, 3>;
 inline constexpr Rgb3 kSkyTop{0.55, 0.67, 0.80}, kSkyBottom{0.86, 0.89, 0.92};
@@ -19,4 +19,4 @@ void set_sky(mjSpec* spec, const char* name, const Rgb3& top, const Rgb3& bottom
 // elements begin with "terrain_".
 void add_daylight(mjSpec* spec);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // Source of an MJCF model: a path, an XML text, or a file of models/ ("embedded:objects/mug.xml").
 struct ModelSource {
@@ -83,4 +83,4 @@ void visit_fields(V& v, ObjRef& c) {
   v("entity", c.entity, "Entity that contains the element.").or_none();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -10,7 +10,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 std::vector<double> values_of(const mjDoubleVec* values) {
@@ -201,4 +201,4 @@ void merge_initial_states(const std::vector<Attached>& entities, mjModel* model)
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

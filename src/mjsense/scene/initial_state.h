@@ -11,7 +11,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/scene/entity.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 inline constexpr std::string_view kInitState = "init_state";
 
@@ -44,4 +44,4 @@ void add_keyframes(mjSpec* spec, const std::vector<Keyframe>& base);
 // Fills the keyframes of the compiled model, which must still have the model's defaults.
 void merge_initial_states(const std::vector<Attached>& entities, mjModel* model);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

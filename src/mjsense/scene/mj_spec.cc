@@ -17,7 +17,7 @@
 extern "C" int _mjPRIVATE__get_xml_precision(void);
 extern "C" void _mjPRIVATE__set_xml_precision(int precision);
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr std::string_view kEmbedded = "embedded:";
@@ -194,4 +194,4 @@ mjsElement* find_in_spec(const mjSpec* spec, mjtObj type, const std::string& nam
   return element;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -14,7 +14,7 @@
 
 #include "mjsense/scene/entity.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 struct SpecDelete {
   bool owned = true;
@@ -77,4 +77,4 @@ std::vector<std::string> spec_names(const mjSpec* spec, mjtObj type);
 mjsElement* find_in_spec(const mjSpec* spec, mjtObj type, const std::string& name,
                          std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -14,7 +14,7 @@
 #include "mjsense/core/files/zip.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr std::pair<std::string_view, char> kEscapes[] = {
@@ -75,4 +75,4 @@ std::string model_archive(const Scene& scene) {
   return zip.finish();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace mjsense {
+namespace mjsense::scene {
 
 class Scene;
 
@@ -16,4 +16,4 @@ inline constexpr const char* kArchivedModel = "model.xml";
 // scene reads from disk are in `assets/`. Throws RuntimeError if one of them cannot be read.
 std::string model_archive(const Scene& scene);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

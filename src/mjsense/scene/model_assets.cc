@@ -14,7 +14,7 @@
 // Null with MuJoCo 4.0.0, which lacks this function.
 extern "C" __attribute__((weak)) const char* mjs_getInStringVec(const mjStringVec* source, int i);
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 namespace fs = std::filesystem;
@@ -108,4 +108,4 @@ void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& e
   child->strippath = 0;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

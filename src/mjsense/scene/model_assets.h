@@ -9,11 +9,11 @@
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // Renames every file of the parsed model so that the name is valid wherever the spec is compiled or
 // saved: an absolute path, or a file in `vfs` for files given in memory. If two entities have
 // different files of the same name, the later one is renamed "<entity>/<name>".
 void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& entity, Vfs& vfs);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -12,7 +12,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr double kLongestTimestep = 0.1;  // s; a longer one gives a warning
@@ -72,4 +72,4 @@ void check_model(const mjModel* m, std::vector<std::string>& warnings) {
 #undef X
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

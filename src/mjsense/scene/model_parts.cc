@@ -12,7 +12,7 @@
 #include "mjsense/scene/model_assets.h"
 #include "mjsense/scene/mujoco_log.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 template <class Element>
@@ -74,4 +74,4 @@ SpecPtr compose_model(const ModelSource& model, std::span<const ModelPart> parts
   return spec;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -10,7 +10,7 @@
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // A model that is attached to another, such as a gripper to the flange of an arm.
 struct ModelPart {
@@ -27,4 +27,4 @@ struct ModelPart {
 SpecPtr compose_model(const ModelSource& model, std::span<const ModelPart> parts,
                       std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 std::mutex capture_mutex;
@@ -68,4 +68,4 @@ void install_warning_filter() {
 
 void drop_warnings(bool on) { dropping = on; }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // Stops MuJoCo from also writing its warnings to MUJOCO_LOG.TXT in the user's current folder. A log
 // file chosen by mju_setLogConfig() is kept. For programs only, because it changes a setting of the
@@ -33,4 +33,4 @@ void install_warning_filter();
 // A function and not an object, because MuJoCo's errors jump over destructors.
 void drop_warnings(bool on);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

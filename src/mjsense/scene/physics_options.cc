@@ -12,7 +12,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 std::string lower(std::string_view text) {
@@ -87,4 +87,4 @@ std::vector<std::string> differing_options(const mjOption& a, const mjOption& b)
   return names;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

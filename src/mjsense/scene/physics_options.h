@@ -13,7 +13,6 @@
 #include "mjsense/core/fields/named_enum.h"
 
 namespace mjsense {
-
 template <>
 inline constexpr std::array<std::string_view, 5> kEnumNames<mjtIntegrator>{
     "euler", "rk4", "implicit", "implicitfast", "discrete"};
@@ -23,6 +22,9 @@ template <>
 inline constexpr std::array<std::string_view, 3> kEnumNames<mjtSolver>{"pgs", "cg", "newton"};
 template <>
 inline constexpr std::array<std::string_view, 3> kEnumNames<mjtJacobian>{"dense", "sparse", "auto"};
+}  // namespace mjsense
+
+namespace mjsense::scene {
 
 struct OptionsCfg {
   double timestep = 0.002;
@@ -81,4 +83,4 @@ void apply_options(const OptionsCfg& cfg, mjOption& option);
 // Returns the names of the fields in which two sets of options differ.
 std::vector<std::string> differing_options(const mjOption& a, const mjOption& b);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 void check_entity(const Scene* scene, std::string_view entity, std::string_view context) {
@@ -142,4 +142,4 @@ Elements entity_elements(const mjModel* model, const Scene* scene, std::string_v
   return found;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -11,7 +11,7 @@
 
 #include "mjsense/scene/entity.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 class Scene;
 
@@ -48,4 +48,4 @@ struct Elements {
 Elements entity_elements(const mjModel* model, const Scene* scene, std::string_view entity,
                          mjtObj type, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -18,7 +18,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 using ::testing::HasSubstr;
@@ -258,4 +258,4 @@ TEST(RoundTrip, ModelsOfFolders) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scene

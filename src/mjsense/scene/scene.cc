@@ -19,7 +19,7 @@
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 void check_name(const std::string& name, bool has_terrain, const std::vector<Attached>& before) {
@@ -185,7 +185,7 @@ void Scene::Impl::add_sensors() {
 void Scene::Impl::compile() {
   try {
     WarningCapture capture(warnings);
-    model = mjsense::compile(spec.get(), vfs);
+    model = scene::compile(spec.get(), vfs);
   } catch (const RuntimeError& error) {
     throw RuntimeError(fmt::format("scene: {}", error.what()));
   }
@@ -267,4 +267,4 @@ std::vector<double> Scene::env_origins(int num_worlds) const {
 
 const Terrain* Scene::terrain() const { return impl_->terrain ? &*impl_->terrain : nullptr; }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

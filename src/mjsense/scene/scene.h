@@ -19,7 +19,7 @@
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/terrain.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 struct SceneCfg {
   // A complete model to start from, used unchanged: names have no prefix, it may have any number of
@@ -122,4 +122,4 @@ class Scene {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -14,7 +14,7 @@
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 using ::testing::ElementsAre;
@@ -514,4 +514,4 @@ TEST(Scene, UsesVisualSettingsOfTheFirstEntity) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scene

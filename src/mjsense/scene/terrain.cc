@@ -12,7 +12,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain_tile.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 // The configured sub-terrains, or one of each kind.
@@ -151,4 +151,4 @@ std::vector<double> Terrain::env_origins(int num_worlds, double env_spacing) con
   return origins;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

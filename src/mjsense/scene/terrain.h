@@ -14,7 +14,7 @@
 
 #include "mjsense/core/fields/named_enum.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // clang-format off: this is a table
 // flat             flat ground
@@ -25,9 +25,9 @@ namespace mjsense {
 // stepping_stones  boxes: stones of `stone_width` with gaps of `gap` over a pit, around a platform
 // clang-format on
 enum class SubTerrain { kFlat, kRough, kWaves, kSlope, kStairs, kSteppingStones };
-template <>
-inline constexpr std::array<std::string_view, 6> kEnumNames<SubTerrain>{
-    "flat", "rough", "waves", "slope", "stairs", "stepping_stones"};
+constexpr std::array<std::string_view, 6> enum_names(SubTerrain) {
+  return {"flat", "rough", "waves", "slope", "stairs", "stepping_stones"};
+}
 
 struct SubTerrainCfg {
   NamedEnum<SubTerrain> kind;
@@ -74,8 +74,7 @@ void visit_fields(V& v, SubTerrainCfg& c) {
 void validate(const SubTerrainCfg& cfg, std::string_view context);
 
 enum class TerrainType { kPlane, kGenerator };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<TerrainType>{"plane", "generator"};
+constexpr std::array<std::string_view, 2> enum_names(TerrainType) { return {"plane", "generator"}; }
 
 // Generated tiles: levels along +x with increasing difficulty, types along +y. The grid is centred
 // on the world origin, and tiles meet at z = 0.
@@ -147,4 +146,4 @@ class Terrain {
   std::vector<double> origins_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

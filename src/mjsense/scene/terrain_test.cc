@@ -11,7 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 using ::testing::ElementsAre;
@@ -237,4 +237,4 @@ TEST(Terrain, DaylightAddsMissingElements) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr double kThickness = 1.0;  // m, of the ground below its lowest point
@@ -200,4 +200,4 @@ double build_tile(const SubTerrainCfg& cfg, Tile& tile) {
   return kBuild[static_cast<std::size_t>(static_cast<SubTerrain>(cfg.kind))](cfg, tile);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -11,7 +11,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 struct Tile {
   mjSpec* spec;
@@ -32,4 +32,4 @@ void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centr
              std::array<double, 2> size, double bottom, double top,
              const std::array<float, 4>& rgba);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

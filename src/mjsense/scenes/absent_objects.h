@@ -4,10 +4,10 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 inline constexpr double kAway = 100;  // m, x and y of absent objects
 // Pose of an absent object: out of sight, one metre from other absent objects.
 inline Pose away(int object) { return {{kAway + object, kAway, 0.5}, {}}; }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

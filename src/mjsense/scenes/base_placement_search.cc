@@ -11,7 +11,7 @@
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -47,11 +47,12 @@ std::vector<Vec3> targets(const mjModel* m, const EpisodeScene& scene) {
   return points;
 }
 
-RobotValues start_of(const mjModel* model, const Robot& robot, bool stooped = false) {
-  RobotValues start;
+robots::RobotValues start_of(const mjModel* model, const robots::Robot& robot,
+                             bool stooped = false) {
+  robots::RobotValues start;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const MoveGroup& group = robot.groups()[g];
-    const MoveGroupCfg& cfg = robot.cfg().groups[g];
+    const robots::MoveGroup& group = robot.groups()[g];
+    const robots::MoveGroupCfg& cfg = robot.cfg().groups[g];
     const auto& init = stooped && !cfg.low_init.empty() ? cfg.low_init : cfg.init;
     start[g].size = static_cast<int>(group.qpos.size());
     for (std::size_t i = 0; i < group.qpos.size(); ++i)
@@ -61,11 +62,12 @@ RobotValues start_of(const mjModel* model, const Robot& robot, bool stooped = fa
 }
 
 // Fraction of the approach orientations at a point that a hand can reach; maximum over the hands.
-double reachable_orientations(const Robot& robot, const RobotValues& start, const Pose& base,
-                              Vec3 point, std::span<const double> tilts) {
+double reachable_orientations(const robots::Robot& robot, const robots::RobotValues& start,
+                              const Pose& base, Vec3 point, std::span<const double> tilts) {
   double best = 0;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    if (robot.groups()[g].kind != GroupKind::kArm || robot.groups()[g].leaf_site < 0) continue;
+    if (robot.groups()[g].kind != robots::GroupKind::kArm || robot.groups()[g].leaf_site < 0)
+      continue;
     int reached = 0, orientations = 0;
     for (double tilt : tilts) {
       for (int quarter = 0; quarter < 2; ++quarter, ++orientations) {
@@ -73,7 +75,7 @@ double reachable_orientations(const Robot& robot, const RobotValues& start, cons
         // directions.
         const Quat q =
             axis_angle({0, 1, 0}, pi - tilt * pi / 180) * axis_angle({0, 0, 1}, 0.5 * pi * quarter);
-        RobotValues values = start;
+        robots::RobotValues values = start;
         const Pose tool{point, base.q * q};
         reached += robot.ik(static_cast<int>(g), inverse(base) * tool, values, kIterations);
       }
@@ -93,7 +95,7 @@ struct Reached {
 // Evaluates base positions, with the robot upright or stooped.
 class Search {
  public:
-  Search(const mjModel* model, const Robot& robot, const EpisodeScene& scene,
+  Search(const mjModel* model, const robots::Robot& robot, const EpisodeScene& scene,
          std::span<const Vec3> surface, bool stooped)
       : model_(model),
         robot_(robot),
@@ -151,7 +153,7 @@ class Search {
   bool is_collision_free(const Pose& base) const {
     mj_resetData(model_, data_.get());
     Rng none(0, 0, 0, 0);
-    robot_.write_start(state_row(data_.get()), base, none);
+    robot_.write_start(robots::state_row(data_.get()), base, none);
     for (std::size_t g = 0; g < robot_.groups().size(); ++g) {
       const auto& address = robot_.groups()[g].qpos;
       if (robot_.cfg().groups[g].init.empty()) continue;
@@ -196,10 +198,10 @@ class Search {
   }
 
   const mjModel* model_;
-  const Robot& robot_;
+  const robots::Robot& robot_;
   const EpisodeScene& scene_;
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data_;
-  RobotValues start_;
+  robots::RobotValues start_;
   std::vector<Vec3> points_;  // m, world
 };
 
@@ -218,15 +220,16 @@ void limit_targets(const Reached& reached, EpisodeScene& scene) {
 
 }  // namespace
 
-BasePlacementSearch::BasePlacementSearch(const mjModel* model, Robot& robot, EpisodeScene& scene) {
+BasePlacementSearch::BasePlacementSearch(const mjModel* model, robots::Robot& robot,
+                                         EpisodeScene& scene) {
   const std::vector<Vec3> surface = targets(model, scene);
   if (surface.empty()) return;
   const SceneRobotCfg& cfg = scene.cfg().robot;
   const Pose base{{cfg.pos[0], cfg.pos[1], cfg.pos[2]}, axis_angle({0, 0, 1}, cfg.yaw * pi / 180)};
   bool has_arm = false, floats = false;
-  for (const MoveGroup& group : robot.groups()) {
-    has_arm = has_arm || (group.kind == GroupKind::kArm && group.leaf_site >= 0);
-    floats = floats || (group.kind == GroupKind::kBase && group.command_size == 7);
+  for (const robots::MoveGroup& group : robot.groups()) {
+    has_arm = has_arm || (group.kind == robots::GroupKind::kArm && group.leaf_site >= 0);
+    floats = floats || (group.kind == robots::GroupKind::kBase && group.command_size == 7);
   }
   if (!has_arm) {
     if (!floats || robot.gripper() < 0) return;
@@ -250,7 +253,7 @@ BasePlacementSearch::BasePlacementSearch(const mjModel* model, Robot& robot, Epi
   double best = there.orientations;
   upright.improve(base, best, offset_);
   if (upright.reached(base * offset_).points >= kEnough) return;
-  const auto stoops = [](const MoveGroupCfg& group) { return !group.low_init.empty(); };
+  const auto stoops = [](const robots::MoveGroupCfg& group) { return !group.low_init.empty(); };
   if (std::ranges::any_of(robot.cfg().groups, stoops)) {
     const Search stooped(model, robot, scene, surface, true);
     Pose offset;
@@ -266,4 +269,4 @@ BasePlacementSearch::BasePlacementSearch(const mjModel* model, Robot& robot, Epi
   limit_targets(upright.reached(base * offset_, kAnyTilts), scene);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

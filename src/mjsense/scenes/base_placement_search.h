@@ -7,7 +7,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 class BasePlacementSearch {
  public:
@@ -17,7 +17,7 @@ class BasePlacementSearch {
   // poses. If it does not reach nearly all of the target areas either, the robot stoops
   // (Robot::stoop) if that increases the number. If that is still not enough, targets are limited to
   // the regions of which a hand reaches at least half, unless there is none.
-  BasePlacementSearch(const mjModel* model, Robot& robot, EpisodeScene& scene);
+  BasePlacementSearch(const mjModel* model, robots::Robot& robot, EpisodeScene& scene);
   // Returns X_WB for an episode in which the scene gives `scene_pose`.
   Pose operator()(const Pose& scene_pose) const { return scene_pose * offset_; }
   const Pose& offset() const { return offset_; }
@@ -26,4 +26,4 @@ class BasePlacementSearch {
   Pose offset_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -11,17 +11,17 @@
 #include "mjsense/scenes/load_scene.h"
 #include "mjsense/tasks/pick/pick.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 Pose offset_of(const char* robot_name) {
   EpisodeScene scene(load_scene("table"));
-  TaskCfg cfg;
-  cfg.robot = robot_cfg(robot_name);
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg(robot_name);
   cfg.scene = "table";
-  PickTask task(cfg);
-  Scene compiled(task.scene_cfg_with_robot());
-  Robot robot(cfg.robot, compiled.model(), 1);
+  tasks::PickTask task(cfg);
+  scene::Scene compiled(task.scene_cfg_with_robot());
+  robots::Robot robot(cfg.robot, compiled.model(), 1);
   scene.initialize(compiled.model(), 1, "robot_0/");
   return BasePlacementSearch(compiled.model(), robot, scene).offset();
 }
@@ -38,12 +38,12 @@ TEST(BasePlacementSearch, KeepsThePlacementIfReachable) {
 // The table tops are 0.6 m high; RB-Y1's hands are at twice that height.
 TEST(BasePlacementSearch, StoopsAtALowTable) {
   EpisodeScene scene(load_scene("table"));
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("rby1");
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("rby1");
   cfg.scene = "table";
-  PickTask task(cfg);
-  Scene compiled(task.scene_cfg_with_robot());
-  Robot robot(cfg.robot, compiled.model(), 1);
+  tasks::PickTask task(cfg);
+  scene::Scene compiled(task.scene_cfg_with_robot());
+  robots::Robot robot(cfg.robot, compiled.model(), 1);
   const int torso = robot.group_index("torso");
   const std::vector<double> upright = robot.cfg().groups[torso].init;
   scene.initialize(compiled.model(), 1, "robot_0/");
@@ -56,18 +56,18 @@ TEST(BasePlacementSearch, StoopsAtALowTable) {
 // At no base pose that the scene can sample may the robot penetrate the table, which would push it
 // away.
 TEST(BasePlacementSearch, MovedBaseIsCollisionFree) {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("rby1");
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("rby1");
   cfg.scene = "tableware";
-  PickTask task(cfg);
-  Scene scene(task.scene_cfg_with_robot());
+  tasks::PickTask task(cfg);
+  scene::Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
   const mjModel* model = scene.model();
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
   const int root = model->body_rootid[task.robot().base_body()];
   for (int episode = 0; episode < 16; ++episode) {
     mj_resetData(model, data.get());
-    task.sample(0, episode, state_row(data.get()));
+    task.sample(0, episode, robots::state_row(data.get()));
     mj_forward(model, data.get());
     for (int c = 0; c < data->ncon; ++c) {
       const mjContact& contact = data->contact[c];
@@ -102,15 +102,15 @@ name = "cube"
 model = "cube.xml"
 )";
   for (const auto& [robot, z] : {std::pair{"franka", 0.1}, {"mobile_franka", -0.15}}) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(robot);
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg(robot);
     cfg.scene = dir.file("scene.toml");
-    PickTask task(cfg);
-    Scene scene(task.scene_cfg_with_robot());
+    tasks::PickTask task(cfg);
+    scene::Scene scene(task.scene_cfg_with_robot());
     const mjModel* model = scene.model();
     task.initialize(model, 1);
     const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
-    task.sample(0, 0, state_row(data.get()));
+    task.sample(0, 0, robots::state_row(data.get()));
     mj_kinematics(model, data.get());
     EXPECT_NEAR(task.robot().base_pose({.id = 0, .model = model, .data = data.get()}).p.z, z, 1e-9)
         << robot;
@@ -121,12 +121,12 @@ model = "cube.xml"
 TEST(BasePlacementSearch, TargetsAreLimitedToRegionsThatAHandReaches) {
   for (const auto& [robot_name, upper] : {std::pair{"franka", true}, {"i2rt_yam", false}}) {
     EpisodeScene scene(load_scene("shelf"));
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(robot_name);
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg(robot_name);
     cfg.scene = "shelf";
-    PickTask task(cfg);
-    const Scene compiled(task.scene_cfg_with_robot());
-    Robot robot(cfg.robot, compiled.model(), 1);
+    tasks::PickTask task(cfg);
+    const scene::Scene compiled(task.scene_cfg_with_robot());
+    robots::Robot robot(cfg.robot, compiled.model(), 1);
     scene.initialize(compiled.model(), 1, "robot_0/");
     const BasePlacementSearch standing(compiled.model(), robot, scene);
     ASSERT_EQ(scene.regions().size(), 3u);
@@ -143,4 +143,4 @@ TEST(BasePlacementSearch, FloatingHandIsAboveTheTargets) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

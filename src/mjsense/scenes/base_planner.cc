@@ -8,7 +8,7 @@
 #include <numbers>
 #include <queue>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -233,4 +233,4 @@ std::vector<TimedBasePose> timed(std::span<const BasePose> path, const BaseSpeed
   return out;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -10,7 +10,7 @@
 
 #include "mjsense/scenes/occupancy_grid.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct BasePose {
   double x = 0, y = 0, yaw = 0;  // m, m, rad; world frame
@@ -80,4 +80,4 @@ std::vector<TimedBasePose> timed(std::span<const BasePose> path, const BaseSpeed
 // Wraps an angle to [-pi, pi].
 double wrapped(double angle);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

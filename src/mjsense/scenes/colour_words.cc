@@ -6,7 +6,7 @@
 
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr unsigned kAll = (1u << kColourWords.size()) - 1;
@@ -83,7 +83,8 @@ ColourWords colour_words(const mjModel* m, int body) {
   std::array<double, kColourWords.size()> is{}, may_be{};
   double all = 0;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (m->geom_group[g] >= kHidden || !is_descendant_or_self(m, m->geom_bodyid[g], body)) continue;
+    if (m->geom_group[g] >= kHidden || !observe::is_descendant_or_self(m, m->geom_bodyid[g], body))
+      continue;
     const int material = m->geom_matid[g];
     const float* rgba = material >= 0 ? m->mat_rgba + 4 * material : m->geom_rgba + 4 * g;
     if (rgba[3] == 0) continue;
@@ -107,4 +108,4 @@ ColourWords colour_words(const mjModel* m, int body) {
   return words;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -7,7 +7,7 @@
 #include <array>
 #include <string_view>
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 inline constexpr std::array<std::string_view, 12> kColourWords{"red",   "orange", "yellow", "green",
                                                                "teal",  "blue",   "purple", "pink",
@@ -26,4 +26,4 @@ ColourWords colour_words(const float* rgb);
 // colour.
 ColourWords colour_words(const mjModel* model, int body);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

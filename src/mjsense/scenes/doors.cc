@@ -9,7 +9,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kMinWidth = 0.4;        // m
@@ -83,9 +83,9 @@ void find_handle(const mjModel* m, Door& door) {
   door.handle = door.body;
   for (const bool by_name : {true, false}) {
     for (int body = door.body + 1; body < m->nbody; ++body) {
-      if (!is_descendant_or_self(m, body, door.body)) continue;
+      if (!observe::is_descendant_or_self(m, body, door.body)) continue;
       const int hinge = hinge_of(m, body);
-      if (by_name ? !called_handle(name_of(m, mjOBJ_BODY, body)) : hinge < 0) continue;
+      if (by_name ? !called_handle(scene::name_of(m, mjOBJ_BODY, body)) : hinge < 0) continue;
       door.handle = body;
       door.handle_joint = hinge;
       return;
@@ -105,7 +105,8 @@ std::vector<Door> find_doors(const mjModel* m, std::string_view robot_prefix) {
   std::vector<Door> doors;
   for (int body = 1; body < m->nbody; ++body) {
     if (m->body_jntnum[body] != 1) continue;
-    if (!robot_prefix.empty() && name_of(m, mjOBJ_BODY, body).starts_with(robot_prefix)) continue;
+    if (!robot_prefix.empty() && scene::name_of(m, mjOBJ_BODY, body).starts_with(robot_prefix))
+      continue;
     const int joint = m->body_jntadr[body];
     if (!is_leaf(m, body, joint)) continue;
     Door door{.joint = joint, .body = body};
@@ -135,4 +136,4 @@ Vec3 opening_direction(const mjModel* m, const mjData* d, const Door& door) {
   return normalized(direction);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A leaf on a hinge with a vertical axis, higher than kMinHeight.
 struct Door {
@@ -41,4 +41,4 @@ Vec3 opening_direction(const mjModel* model, const mjData* data, const Door& doo
 // Centre of the leaf, m, world frame.
 Vec3 leaf_middle(const mjModel* model, const mjData* data, const Door& door);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

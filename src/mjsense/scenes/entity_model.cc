@@ -14,7 +14,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_parts.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 namespace fs = std::filesystem;
@@ -64,11 +64,11 @@ mjsBody* root_of(mjsBody* body, mjsBody* world) {
 
 void leave_out(mjSpec* spec, const std::string& name, const std::string& who) {
   mjsBody* world = mjs_findBody(spec, "world");
-  mjsBody* body = mjs_asBody(find_in_spec(spec, mjOBJ_BODY, name, who));
+  mjsBody* body = mjs_asBody(scene::find_in_spec(spec, mjOBJ_BODY, name, who));
   mjsBody* root = root_of(body, world);
   if (mjs_delete(spec, root->element) != 0)
     throw ValueError(fmt::format("{}: body '{}' cannot be left out: {}", who, name,
-                                 one_line(mjs_getError(spec))));
+                                 scene::one_line(mjs_getError(spec))));
 }
 
 void set_free(mjSpec* spec, const SceneEntityCfg& entity, const std::string& who) {
@@ -77,8 +77,8 @@ void set_free(mjSpec* spec, const SceneEntityCfg& entity, const std::string& who
   mjsBody* body = mjs_asBody(first);
   if (mjs_firstChild(body, mjOBJ_JOINT, 0) != nullptr)
     throw ValueError(
-        fmt::format("{}: free = true, but body '{}' has a joint", who, element_name(first)));
-  if (element_name(first).empty()) mjs_setName(first, entity.name.c_str());
+        fmt::format("{}: free = true, but body '{}' has a joint", who, scene::element_name(first)));
+  if (scene::element_name(first).empty()) mjs_setName(first, entity.name.c_str());
   mjs_addFreeJoint(body);
 }
 
@@ -88,9 +88,10 @@ void set_mass(mjSpec* spec, double mass, const std::string& who) {
                                                                mj_deleteSpec);
   const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(
       call_mujoco(mj_compile, copy.get(), nullptr), mj_deleteModel);
-  if (!model) throw ValueError(fmt::format("{}: {}", who, one_line(mjs_getError(copy.get()))));
+  if (!model)
+    throw ValueError(fmt::format("{}: {}", who, scene::one_line(mjs_getError(copy.get()))));
   const double factor = mass / model->body_subtreemass[0];
-  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
+  for (mjsElement* element : scene::spec_elements(spec, mjOBJ_GEOM)) {
     mjsGeom* geom = mjs_asGeom(element);
     geom->density *= factor;
     geom->mass *= factor;  // NaN if the density counts
@@ -121,7 +122,8 @@ std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_v
       !entity.mass && !entity.friction)
     return nullptr;
   const std::string who = fmt::format("{}, entity '{}'", context, entity.name);
-  std::shared_ptr<mjSpec> spec = compose_model({.path = model_path(entity.model, who)}, {}, who);
+  std::shared_ptr<mjSpec> spec =
+      scene::compose_model({.path = model_path(entity.model, who)}, {}, who);
   for (const std::string& body : entity.without) leave_out(spec.get(), body, who);
   if (entity.inertia_groups) {
     spec->compiler.inertiagrouprange[0] = (*entity.inertia_groups)[0];
@@ -129,14 +131,14 @@ std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_v
   }
   if (entity.hidden_group >= 0) {
     constexpr int kTouched = 3;  // the first group that is not visible
-    for (mjsElement* element : spec_elements(spec.get(), mjOBJ_GEOM)) {
+    for (mjsElement* element : scene::spec_elements(spec.get(), mjOBJ_GEOM)) {
       mjsGeom* geom = mjs_asGeom(element);
       const bool solid = geom->contype != 0 || geom->conaffinity != 0;
       if (geom->group == entity.hidden_group && solid) geom->group = kTouched;
     }
   }
   if (entity.friction) {
-    for (mjsElement* element : spec_elements(spec.get(), mjOBJ_GEOM))
+    for (mjsElement* element : scene::spec_elements(spec.get(), mjOBJ_GEOM))
       std::ranges::copy(*entity.friction, mjs_asGeom(element)->friction);
   }
   if (entity.mass) set_mass(spec.get(), *entity.mass, who);
@@ -144,4 +146,4 @@ std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_v
   return spec;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

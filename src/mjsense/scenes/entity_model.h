@@ -10,7 +10,7 @@
 
 #include "mjsense/scenes/scene_file.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Resolves the path of a model. "package:<package>/<file>" is a file of an installed Python
 // package. It is searched in the folders listed in the environment variable MJSENSE_PACKAGES (set
@@ -21,4 +21,4 @@ std::string model_path(const std::string& name, std::string_view context);
 // Returns the model with the scene's changes; null if there are none. Throws ValueError, KeyError.
 std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -12,7 +12,7 @@
 #include "mjsense/scenes/final_spec_edits.h"
 #include "mjsense/scenes/generators/generator.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
   check_fields(cfg_, "");
@@ -24,20 +24,20 @@ EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
 
 std::string EpisodeScene::context() const { return fmt::format("scene '{}'", cfg_.name); }
 
-SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
-  SceneCfg scene;
+scene::SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
+  scene::SceneCfg scene;
   if (cfg_.models) scene = cfg_.models();
   if (!cfg_.base.empty()) scene.base.path = cfg_.base;
   if (!generated_.empty()) {
-    EntityCfg room;
+    scene::EntityCfg room;
     room.model = generated_;
     room.mocap_base = false;
     scene.entities.emplace_back("room", room);
-    scene.entities.emplace_back(robot, EntityCfg{});
+    scene.entities.emplace_back(robot, scene::EntityCfg{});
   }
   for (std::size_t i = 0; i < cfg_.entities.size(); ++i) {
     const SceneEntityCfg& one = cfg_.entities[i];
-    EntityCfg entity;
+    scene::EntityCfg entity;
     if (edited_[i]) {
       entity.model.spec = edited_[i].get();
     } else {
@@ -51,9 +51,9 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
       entity.pos = {p.x, p.y, p.z};
     }
     scene.entities.emplace_back(one.name, entity);
-    if (scene.entities.size() == 1) scene.entities.emplace_back(robot, EntityCfg{});
+    if (scene.entities.size() == 1) scene.entities.emplace_back(robot, scene::EntityCfg{});
   }
-  if (scene.entities.empty()) scene.entities.emplace_back(robot, EntityCfg{});
+  if (scene.entities.empty()) scene.entities.emplace_back(robot, scene::EntityCfg{});
   if (cfg_.extent) scene.extent = cfg_.extent;
   if (!cfg_.models) scene.options = cfg_.options;
   scene.spec_fn = [cfg = cfg_, first = scene.spec_fn, meshes = meshes_, robot](mjSpec* spec) {
@@ -75,7 +75,7 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
   make_sizes();
 }
 
-void EpisodeScene::bind(Simulation& simulation) {
+void EpisodeScene::bind(sim::Simulation& simulation) {
   simulation_ = &simulation;
   if (!cfg_.vary.empty())
     variation_ = std::make_unique<SceneVariation>(cfg_.vary, simulation, context());
@@ -86,4 +86,4 @@ bool EpisodeScene::is_placed(const SceneEntityCfg& entity) const {
   return entity.free && !cfg_.regions.empty() && entity.pos == std::array<double, 3>{};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -20,7 +20,7 @@
 #include "mjsense/scenes/scene_file.h"
 #include "mjsense/scenes/scene_variation.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A body with a free joint that a task may refer to.
 struct SceneObject {
@@ -29,12 +29,12 @@ struct SceneObject {
   std::string text;                 // name in instructions
   std::vector<std::string> others;  // further names in instructions
   std::vector<Quat> rests;
-  ObjectShape shape;        // in the size of its model
-  bool receptacle = false;  // objects can be put in or on it
+  episode::ObjectShape shape;  // in the size of its model
+  bool receptacle = false;     // objects can be put in or on it
   std::string color;
-  std::string material;             // adjective in instructions; "": unknown
-  std::vector<double> sizes;        // possible scale factors
-  std::vector<ObjectShape> shapes;  // for each of `sizes`
+  std::string material;                      // adjective in instructions; "": unknown
+  std::vector<double> sizes;                 // possible scale factors
+  std::vector<episode::ObjectShape> shapes;  // for each of `sizes`
 };
 
 class EpisodeScene {
@@ -45,13 +45,13 @@ class EpisodeScene {
 
   const SceneFileCfg& cfg() const { return cfg_; }
   // The scene with an empty entity named `robot` after the first entity, which the caller fills in.
-  SceneCfg scene_cfg(const std::string& robot) const;
+  scene::SceneCfg scene_cfg(const std::string& robot) const;
   // Finds objects and surfaces. Bodies of the robot, whose names start with `robot_prefix`, are not
   // objects. Throws KeyError, ValueError. For a scene without objects, only object() throws.
   void initialize(const mjModel* model, int num_worlds, std::string_view robot_prefix);
   // Connects the scene's variation to the worlds. The simulation must outlive this object. Throws
   // KeyError, ValueError.
-  void bind(Simulation& simulation);
+  void bind(sim::Simulation& simulation);
   // Replaces the height (m) of the robot's base that the scene file specifies.
   void put_robot_at(double height) { cfg_.robot.pos[2] = height; }
 
@@ -72,7 +72,7 @@ class EpisodeScene {
 
   // Shape at the object's size in the current episode of this world. Valid for the lifetime of the
   // scene.
-  const ObjectShape& shape(int world, int object) const;
+  const episode::ObjectShape& shape(int world, int object) const;
   double size(int world, int object) const;
 
   // Height (m) of the surface under the target at the start of this world's episode.
@@ -81,23 +81,23 @@ class EpisodeScene {
   // Samples the start of an episode: writes the objects' joints and returns the pose of the robot's
   // base. `target` is the object of the task, or -1. Positions are drawn from `rng`.
   Pose sample(int world, int target, std::uint64_t seed, std::uint64_t episode, Rng& rng,
-              const StateRow& state);
+              const robots::StateRow& state);
   // Like sample() with one target, for several objects of the task: all are present and in the
   // target area. The first one is the target.
   Pose sample(int world, std::span<const int> wanted, std::uint64_t seed, std::uint64_t episode,
-              Rng& rng, const StateRow& state);
+              Rng& rng, const robots::StateRow& state);
   // A start without random variation: all objects that an episode would place are absent. Returns
   // the pose of the robot's base.
-  Pose clear(const StateRow& state) const;
+  Pose clear(const robots::StateRow& state) const;
   // For a state that another instance of this scene has sampled: adopts which objects are present
   // and their sizes. Returns their indices.
   std::vector<int> adopt(int world, std::uint64_t seed, std::uint64_t episode,
-                         const StateRow& state);
+                         const robots::StateRow& state);
   // Draws one of these objects uniformly. If no hand of the robot can grasp it at its size in this
   // world's episode, another one is drawn, as long as there is one.
-  int draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const;
+  int draw(int world, std::span<const int> of, const robots::Robot& robot, Rng& rng) const;
   // Makes an object the target of the episode, at its position in `state`.
-  void set_target(int world, int target, const StateRow& state);
+  void set_target(int world, int target, const robots::StateRow& state);
   // Indices of the objects to pick up, and of the receptacles.
   std::vector<int> pickup_objects() const { return where(false); }
   std::vector<int> receptacles() const { return where(true); }
@@ -119,7 +119,7 @@ class EpisodeScene {
   void find_objects(std::string_view robot_prefix);
   void collect_objects(std::string_view robot_prefix);
   void find_regions();
-  void put(int object, const Pose& pose, const StateRow& state) const;
+  void put(int object, const Pose& pose, const robots::StateRow& state) const;
   void find_furniture();
   void make_meshes();
   void make_sizes();
@@ -129,7 +129,7 @@ class EpisodeScene {
 
   SceneFileCfg cfg_;
   const mjModel* model_ = nullptr;
-  ModelSource generated_;                        // empty if the scene has no generator
+  scene::ModelSource generated_;                 // empty if the scene has no generator
   std::vector<std::shared_ptr<mjSpec>> edited_;  // models that the scene changes
   std::shared_ptr<const ObjectMeshes> meshes_;   // null: object sizes do not vary
   std::vector<SceneObject> objects_;
@@ -139,9 +139,9 @@ class EpisodeScene {
   std::vector<char> present_;              // [B, objects]
   std::vector<int> steps_;                 // [B, objects] index into `sizes`; -1: size of the model
   std::vector<double> support_;            // [B]
-  Simulation* simulation_ = nullptr;
+  sim::Simulation* simulation_ = nullptr;
   std::unique_ptr<SceneVariation> variation_;
   std::unique_ptr<ObjectSizes> sizes_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

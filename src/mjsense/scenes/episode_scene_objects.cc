@@ -10,7 +10,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -34,13 +34,13 @@ bool is_free(const mjModel* m, int body) {
 bool touches(const mjModel* m, int body) {
   for (int g = 0; g < m->ngeom; ++g) {
     const bool solid = m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
-    if (solid && is_descendant_or_self(m, m->geom_bodyid[g], body)) return true;
+    if (solid && observe::is_descendant_or_self(m, m->geom_bodyid[g], body)) return true;
   }
   return false;
 }
 
 // Smallest horizontal or vertical extent of a shape, m.
-double min_extent(const ObjectShape& shape) {
+double min_extent(const episode::ObjectShape& shape) {
   double low[3] = {1e10, 1e10, 1e10}, high[3] = {-1e10, -1e10, -1e10};
   for (Vec3 p : shape.points) {
     for (int i = 0; i < 3; ++i) {
@@ -54,7 +54,7 @@ double min_extent(const ObjectShape& shape) {
 }
 
 // A gripper grasps an object at its smallest extent.
-bool can_be_held(const ObjectShape& shape) {
+bool can_be_held(const episode::ObjectShape& shape) {
   return min_extent(shape) <= kHand && shape.reach <= kReach;
 }
 
@@ -70,18 +70,18 @@ void EpisodeScene::make_meshes() {
   }
   const bool found = cfg_.objects.empty() && cfg_.sizes[0] < cfg_.sizes[1];
   if (objects.empty() && !found) return;
-  SceneCfg things = scene_cfg("");
+  scene::SceneCfg things = scene_cfg("");
   // Removes entities whose models were generated for this scene only.
   std::erase_if(things.entities, [&](const auto& entity) {
     return entity.first.empty() || (entity.first == "room" && !generated_.empty());
   });
   things.spec_fn = {};
   if (found) {
-    const Scene scene(things);
+    const scene::Scene scene(things);
     for (int body = 1; body < scene.model()->nbody; ++body) {
       if (is_free(scene.model(), body))
         objects.push_back(
-            {name_of(scene.model(), mjOBJ_BODY, body), ObjectSizes::steps(cfg_.sizes)});
+            {scene::name_of(scene.model(), mjOBJ_BODY, body), ObjectSizes::steps(cfg_.sizes)});
     }
   }
   meshes_ = std::make_shared<ObjectMeshes>(std::move(things), objects);
@@ -99,7 +99,7 @@ void EpisodeScene::make_sizes() {
   sizes_ = std::make_unique<ObjectSizes>(*simulation_, bodies, std::move(sizes), context());
 }
 
-const ObjectShape& EpisodeScene::shape(int world, int object) const {
+const episode::ObjectShape& EpisodeScene::shape(int world, int object) const {
   const int step = steps_[world * objects_.size() + object];
   return step < 0 ? objects_[object].shape : objects_[object].shapes[step];
 }
@@ -113,7 +113,7 @@ void EpisodeScene::find_objects(std::string_view robot_prefix) {
   collect_objects(robot_prefix);
   for (const SceneEntityCfg& entity : cfg_.entities) {
     const auto of_entity = [&](const SceneObject& object) {
-      return name_of(model_, mjOBJ_BODY, object.body).starts_with(entity.name + "/");
+      return scene::name_of(model_, mjOBJ_BODY, object.body).starts_with(entity.name + "/");
     };
     if (is_placed(entity) && std::ranges::none_of(objects_, of_entity)) {
       throw ValueError(fmt::format(
@@ -130,15 +130,15 @@ void EpisodeScene::collect_objects(std::string_view robot_prefix) {
     SceneObject object;
     object.body = body;
     object.kind = std::move(kind);
-    object.shape = object_shape(model_, body);
+    object.shape = episode::object_shape(model_, body);
     object.sizes = ObjectSizes::steps(sizes);
     if (meshes_) {
-      for (double size : object.sizes) object.shapes.push_back(scaled(object.shape, size));
+      for (double size : object.sizes) object.shapes.push_back(episode::scaled(object.shape, size));
     }
     return object;
   };
   for (const SceneObjectCfg& one : cfg_.objects) {
-    const int body = resolve(model_, mjOBJ_BODY, one.body, context());
+    const int body = scene::resolve(model_, mjOBJ_BODY, one.body, context());
     if (!is_free(model_, body))
       throw ValueError(fmt::format("{}: object '{}' has no free joint", context(), one.body));
     SceneObject object = found(body, last_part(one.body), one.sizes.value_or(cfg_.sizes));
@@ -153,7 +153,7 @@ void EpisodeScene::collect_objects(std::string_view robot_prefix) {
   }
   if (!cfg_.objects.empty()) return;
   for (int body = 1; body < model_->nbody; ++body) {
-    const std::string name = name_of(model_, mjOBJ_BODY, body);
+    const std::string name = scene::name_of(model_, mjOBJ_BODY, body);
     if (!is_free(model_, body) || name.empty() || name.starts_with(robot_prefix)) continue;
     if (!touches(model_, body)) continue;
     SceneObject object = found(body, last_part(name), cfg_.sizes);
@@ -165,9 +165,11 @@ void EpisodeScene::collect_objects(std::string_view robot_prefix) {
   }
 }
 
-int EpisodeScene::draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const {
+int EpisodeScene::draw(int world, std::span<const int> of, const robots::Robot& robot,
+                       Rng& rng) const {
   double opening = 0;
-  for (const MoveGroup& group : robot.groups()) opening = std::max(opening, group.max_opening);
+  for (const robots::MoveGroup& group : robot.groups())
+    opening = std::max(opening, group.max_opening);
   const auto fits = [&](int i) { return min_extent(shape(world, i)) <= opening - kBeside; };
   const bool some = std::ranges::any_of(of, fits);
   for (;;) {
@@ -184,4 +186,4 @@ std::vector<int> EpisodeScene::where(bool receptacle) const {
   return found;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

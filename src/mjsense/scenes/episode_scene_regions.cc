@@ -10,7 +10,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -66,7 +66,7 @@ LevelBox surface_named(const mjModel* m, const std::string& name, const std::str
   const int body = mj_name2id(m, mjOBJ_BODY, name.c_str());
   const bool of_body = body > 0 && mj_name2id(m, mjOBJ_GEOM, name.c_str()) < 0;
   const std::optional<LevelBox> box =
-      of_body ? highest_box(m, body) : level_box(m, resolve(m, mjOBJ_GEOM, name, who));
+      of_body ? highest_box(m, body) : level_box(m, scene::resolve(m, mjOBJ_GEOM, name, who));
   if (box) return *box;
   throw ValueError(of_body ? fmt::format("{}: body '{}' has no level, fixed box", who, name)
                            : fmt::format("{}: geom '{}' must be a level, fixed box", who, name));
@@ -122,7 +122,7 @@ void EpisodeScene::find_furniture() {
     if (one.what != VaryKind::kBody) continue;
     const Regex pattern(one.pattern, context());
     for (int body = 1; body < model_->nbody; ++body) {
-      if (pattern.fullmatch(name_of(model_, mjOBJ_BODY, body)))
+      if (pattern.fullmatch(scene::name_of(model_, mjOBJ_BODY, body)))
         furniture_.insert_or_assign(body, one);
     }
   }
@@ -156,4 +156,4 @@ std::vector<Pose> EpisodeScene::elsewhere(int geom) const {
   return moves;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

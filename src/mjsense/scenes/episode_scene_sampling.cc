@@ -9,7 +9,7 @@
 #include "mjsense/scenes/absent_objects.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -19,7 +19,7 @@ constexpr double kInside = 0.002;  // m
 }  // namespace
 
 // Places an object at rest.
-void EpisodeScene::put(int object, const Pose& pose, const StateRow& state) const {
+void EpisodeScene::put(int object, const Pose& pose, const robots::StateRow& state) const {
   const int joint = model_->body_jntadr[objects_[object].body];
   double* qpos = state.qpos + model_->jnt_qposadr[joint];
   double* qvel = state.qvel + model_->jnt_dofadr[joint];
@@ -28,7 +28,7 @@ void EpisodeScene::put(int object, const Pose& pose, const StateRow& state) cons
   std::fill(qvel, qvel + 6, 0.0);
 }
 
-Pose EpisodeScene::clear(const StateRow& state) const {
+Pose EpisodeScene::clear(const robots::StateRow& state) const {
   for (std::size_t i = 0; i < objects_.size() && !regions_.empty(); ++i)
     put(static_cast<int>(i), away(static_cast<int>(i)), state);
   const SceneRobotCfg& r = cfg_.robot;
@@ -36,12 +36,12 @@ Pose EpisodeScene::clear(const StateRow& state) const {
 }
 
 Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64_t episode,
-                          Rng& rng, const StateRow& state) {
+                          Rng& rng, const robots::StateRow& state) {
   return sample(world, std::span(&target, target >= 0 ? 1u : 0u), seed, episode, rng, state);
 }
 
 Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t seed,
-                          std::uint64_t episode, Rng& rng, const StateRow& state) {
+                          std::uint64_t episode, Rng& rng, const robots::StateRow& state) {
   const int target = wanted.empty() ? -1 : wanted[0];
   const auto n = static_cast<int>(objects_.size());
   char* present = present_.data() + static_cast<std::size_t>(world) * n;
@@ -92,7 +92,7 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
 }
 
 std::vector<int> EpisodeScene::adopt(int world, std::uint64_t seed, std::uint64_t episode,
-                                     const StateRow& state) {
+                                     const robots::StateRow& state) {
   draw_sizes(world, seed, episode);
   std::vector<int> here;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -120,7 +120,7 @@ bool EpisodeScene::body_present(int world, int body) const {
   return object == objects_.end() || present(world, static_cast<int>(object - objects_.begin()));
 }
 
-void EpisodeScene::set_target(int world, int target, const StateRow& state) {
+void EpisodeScene::set_target(int world, int target, const robots::StateRow& state) {
   const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
   const Pose pose{vec3(qpos), quat(qpos + 3)};
   support_[world] = std::numeric_limits<double>::max();
@@ -160,10 +160,10 @@ std::string EpisodeScene::fault(const World& world) const {
       if (m->body_rootid[a] != body && m->body_rootid[b] != body) continue;
       const int other = m->body_rootid[a] == body ? b : a;
       return fmt::format("{}: '{}' starts {:.1f} mm inside '{}'", context(), objects_[k].kind,
-                         -1000 * contact.dist, name_of(m, mjOBJ_BODY, other));
+                         -1000 * contact.dist, scene::name_of(m, mjOBJ_BODY, other));
     }
   }
   return "";
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -14,7 +14,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using ::testing::HasSubstr;
@@ -65,38 +65,39 @@ struct Files {
 // The scene's simulation, without a robot.
 struct Played {
   EpisodeScene scene;
-  std::shared_ptr<Simulation> sim;
+  std::shared_ptr<sim::Simulation> sim;
 
   explicit Played(SceneFileCfg cfg, int worlds = 1) : scene(std::move(cfg)) {
-    SceneCfg whole = scene.scene_cfg("robot_0");
+    scene::SceneCfg whole = scene.scene_cfg("robot_0");
     std::erase_if(whole.entities, [](const auto& entity) { return entity.first == "robot_0"; });
-    sim = std::make_shared<Simulation>(std::make_shared<Scene>(whole),
-                                       SimulationCfg{.num_worlds = worlds});
+    sim = std::make_shared<sim::Simulation>(std::make_shared<scene::Scene>(whole),
+                                            sim::SimulationCfg{.num_worlds = worlds});
     scene.initialize(sim->model(), worlds, "robot_0/");
     scene.bind(*sim);
   }
   Pose start(std::uint64_t episode, int target = 0, int world = 0) {
     Rng rng(3, 0, stream_of("places"), episode);
     if (scene.vary(world, 3, episode)) sim->worlds().model_changed();
-    const Pose base = scene.sample(world, target, 3, episode, rng, state_row(sim->worlds(), world));
+    const Pose base =
+        scene.sample(world, target, 3, episode, rng, robots::state_row(sim->worlds(), world));
     sim->forward();
     return base;
   }
   Vec3 at(int object, int world = 0) const {
     const mjModel* m = sim->model();
-    const double* qpos = state_row(sim->worlds(), world).qpos;
+    const double* qpos = robots::state_row(sim->worlds(), world).qpos;
     return vec3(qpos + m->jnt_qposadr[m->body_jntadr[scene.objects()[object].body]]);
   }
   std::string fault() const {
     std::string found;
-    struct Hooks final : WorldHooks {
+    struct Hooks final : worlds::WorldHooks {
       std::function<void(const World&)> body;
       void substep(const World& /*world*/) override {}
       void reset(const World& /*world*/) override {}
       void refreshed(const World& world) override { body(world); }
     } hooks;
     hooks.body = [&](const World& world) { found = scene.fault(world); };
-    sim->worlds().visit(all_worlds, hooks);
+    sim->worlds().visit(worlds::all_worlds, hooks);
     return found;
   }
 };
@@ -170,13 +171,13 @@ TEST(EpisodeScene, RaisedPedestalGetsAPlinth) {
     </body></worldbody></mujoco>)");
   const auto model = [&](double z) {
     files.cfg.robot.pos = {0, 0, z};
-    SceneCfg whole = EpisodeScene(files.cfg).scene_cfg("robot_0");
+    scene::SceneCfg whole = EpisodeScene(files.cfg).scene_cfg("robot_0");
     for (auto& [name, entity] : whole.entities) {
       if (name == "robot_0") entity.model.path = files.dir.file("robot.xml");
     }
-    return Scene(whole);
+    return scene::Scene(whole);
   };
-  const Scene on_floor = model(0), raised = model(.22);
+  const scene::Scene on_floor = model(0), raised = model(.22);
   const mjModel* m = raised.model();
   ASSERT_EQ(m->ngeom, on_floor.model()->ngeom + 1);
   const int base = mj_name2id(m, mjOBJ_BODY, "robot_0/base");
@@ -296,7 +297,7 @@ TEST(EpisodeScene, PenetrationAtTheStartIsReported) {
   Played played(files.cfg);
   played.start(0);
   const mjModel* m = played.sim->model();
-  double* qpos = state_row(played.sim->worlds(), 0).qpos;
+  double* qpos = robots::state_row(played.sim->worlds(), 0).qpos;
   qpos[m->jnt_qposadr[m->body_jntadr[played.scene.objects()[0].body]] + 2] -= .01;
   played.sim->forward();
   EXPECT_THAT(played.fault(),
@@ -409,7 +410,7 @@ TEST(EpisodeScene, AbsentObjectsAreInert) {
   std::vector<Vec3> before;
   for (int i = 0; i < 3; ++i) before.push_back(played.at(i));
   for (int k = 0; k < 200; ++k) played.sim->step();
-  const double* qvel = state_row(played.sim->worlds(), 0).qvel;
+  const double* qvel = robots::state_row(played.sim->worlds(), 0).qvel;
   const mjModel* m = played.sim->model();
   for (const int i : {0, 2}) {
     const int body = played.scene.objects()[i].body;
@@ -432,4 +433,4 @@ TEST(EpisodeScene, AbsentObjectsAreInert) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -9,14 +9,14 @@
 #include "mjsense/scene/default_lighting.h"
 #include "mjsense/scene/mj_spec.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 // Built-in robots have contype 2 and conaffinity 1. Third-party scenes contain furniture with
 // contype 0 and conaffinity 1, which objects collide with. This makes robots collide with it as
 // well.
 void let_robots_touch(mjSpec* spec) {
-  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
+  for (mjsElement* element : scene::spec_elements(spec, mjOBJ_GEOM)) {
     mjsGeom* geom = mjs_asGeom(element);
     if (geom->contype == 0 && (geom->conaffinity & 1) != 0) geom->conaffinity |= 2;
   }
@@ -34,14 +34,14 @@ void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
   spec->visual.quality.shadowsize = 4096;
   std::optional<SceneSkyCfg> sky = cfg.sky;
   if (!sky && !cfg.generator.empty()) sky.emplace();  // generated rooms have windows
-  if (sky) set_sky(spec, "", sky->top, sky->bottom);
+  if (sky) scene::set_sky(spec, "", sky->top, sky->bottom);
 }
 
 // If a scene places the robot's pedestal `high` m above the floor, adds a plinth of that height, so
 // that the pedestal does not float.
 void stand_on_plinth(mjSpec* spec, const std::string& robot, double high) {
   if (high <= 0) return;
-  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
+  for (mjsElement* element : scene::spec_elements(spec, mjOBJ_GEOM)) {
     const mjsGeom* foot = mjs_asGeom(element);
     mjsBody* base = mjs_getParent(element);
     if (!base->mocap ||
@@ -69,4 +69,4 @@ void finish_spec(mjSpec* spec, const SceneFileCfg& cfg, const std::string& robot
   let_robots_touch(spec);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -10,9 +10,9 @@
 
 #include "mjsense/scenes/scene_file.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // `robot`: name of its entity.
 void finish_spec(mjSpec* spec, const SceneFileCfg& cfg, const std::string& robot);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -13,7 +13,7 @@
 #include "mjsense/core/files/data_file.h"
 #include "mjsense/scenes/object_catalogue.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr DataFolder kScenes{"scene", "scenes/", "/scene.toml", true};
@@ -75,9 +75,9 @@ SceneFileCfg load_scene(std::string_view name) {
   return with_catalogue_objects(std::move(cfg));
 }
 
-SceneFileCfg task_scene(const TaskCfg& cfg, std::string_view own) {
+SceneFileCfg task_scene(const episode::TaskCfg& cfg, std::string_view own) {
   if (cfg.make_scene) return with_catalogue_objects(cfg.make_scene());
   return load_scene(cfg.scene.empty() ? own : std::string_view(cfg.scene));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

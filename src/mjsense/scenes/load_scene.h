@@ -9,7 +9,7 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/scenes/scene_file.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Names of the built-in scenes.
 std::vector<std::string> scene_names();
@@ -22,6 +22,6 @@ SceneFileCfg load_scene(std::string_view name_or_path);
 
 // Returns the scene that a task uses: the one that its configuration builds or names, otherwise
 // `own`.
-SceneFileCfg task_scene(const TaskCfg& cfg, std::string_view own);
+SceneFileCfg task_scene(const episode::TaskCfg& cfg, std::string_view own);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -13,7 +13,7 @@
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scenes/entity_model.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr DataFolder kTables{"table of objects", "objects/", ".toml"};
@@ -126,4 +126,4 @@ SceneFileCfg with_catalogue_objects(SceneFileCfg cfg) {
   return cfg;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

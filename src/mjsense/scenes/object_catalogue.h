@@ -10,7 +10,7 @@
 
 #include "mjsense/scenes/scene_file.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct ObjectSourceCfg {
   std::string name;
@@ -86,4 +86,4 @@ bool is_installed(const CatalogueObjectCfg& object);
 // KeyError for an entry that matches no object.
 SceneFileCfg with_catalogue_objects(SceneFileCfg cfg);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

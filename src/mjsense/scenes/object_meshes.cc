@@ -10,7 +10,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 std::string name_of_size(const std::string& mesh, int step) {
@@ -25,17 +25,18 @@ std::vector<T> rows(const T* all, int first, int count, int width) {
 
 }  // namespace
 
-ObjectMeshes::ObjectMeshes(SceneCfg things, std::span<const Object> objects) {
+ObjectMeshes::ObjectMeshes(scene::SceneCfg things, std::span<const Object> objects) {
   if (objects.empty()) return;
-  const Scene scene(std::move(things));
+  const scene::Scene scene(std::move(things));
   const mjModel* m = scene.model();
   for (const Object& object : objects) {
-    const int body = resolve(m, mjOBJ_BODY, object.body, "sizes of objects");
+    const int body = scene::resolve(m, mjOBJ_BODY, object.body, "sizes of objects");
     for (int g = 0; g < m->ngeom; ++g) {
-      if (m->geom_type[g] != mjGEOM_MESH || !is_descendant_or_self(m, m->geom_bodyid[g], body))
+      if (m->geom_type[g] != mjGEOM_MESH ||
+          !observe::is_descendant_or_self(m, m->geom_bodyid[g], body))
         continue;
       const int id = m->geom_dataid[g];
-      const std::string name = name_of(m, mjOBJ_MESH, id);
+      const std::string name = scene::name_of(m, mjOBJ_MESH, id);
       if (std::ranges::count(meshes_, name, &Mesh::name) > 0) continue;
       Mesh& mesh = meshes_.emplace_back();
       mesh.name = name;
@@ -81,7 +82,7 @@ void ObjectMeshes::add(mjSpec* spec) const {
 
 int ObjectMeshes::find(const mjModel* model, int mesh, int step) {
   return mj_name2id(model, mjOBJ_MESH,
-                    name_of_size(name_of(model, mjOBJ_MESH, mesh), step).c_str());
+                    name_of_size(scene::name_of(model, mjOBJ_MESH, mesh), step).c_str());
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -9,7 +9,7 @@
 
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Meshes of `objects` in the scene `things`, which has no robot.
 class ObjectMeshes {
@@ -20,7 +20,7 @@ class ObjectMeshes {
   };
   ObjectMeshes() = default;
   // Throws KeyError for an unknown body.
-  ObjectMeshes(SceneCfg things, std::span<const Object> objects);
+  ObjectMeshes(scene::SceneCfg things, std::span<const Object> objects);
 
   // Adds the meshes to the complete scene's spec.
   void add(mjSpec* spec) const;
@@ -37,4 +37,4 @@ class ObjectMeshes {
   std::vector<Mesh> meshes_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -19,7 +19,7 @@ struct Footprint {
   double low = 0;     // m, its lowest point
 };
 
-Footprint footprint(const ObjectShape& shape, Quat rest) {
+Footprint footprint(const episode::ObjectShape& shape, Quat rest) {
   Footprint print;
   for (Vec3 point : shape.points) {
     const Vec3 p = rotate(rest, point);
@@ -119,4 +119,4 @@ void place_objects(std::span<const PlacedObject> objects, std::span<const int> w
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -10,7 +10,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/episode/object_shape.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct Area {
   double x0, x1, y0, y1;  // m, world frame
@@ -33,7 +33,7 @@ struct LayoutCfg {
 
 // An object to be placed: its shape and its resting orientations.
 struct PlacedObject {
-  const ObjectShape* shape;
+  const episode::ObjectShape* shape;
   std::span<const Quat> rests;
 };
 
@@ -46,4 +46,4 @@ void place_objects(std::span<const PlacedObject> objects, std::span<const int> w
                    std::span<const char> present, std::span<const Region> regions,
                    const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses, std::span<int> region_of);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 // A disc seen from above.
-ObjectShape disc(double radius) {
-  ObjectShape shape;
+episode::ObjectShape disc(double radius) {
+  episode::ObjectShape shape;
   for (int k = 0; k < 16; ++k) {
     const double angle = k * std::numbers::pi / 8;
     shape.points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
@@ -25,7 +25,7 @@ ObjectShape disc(double radius) {
 // Places three discs on a strip, all in the target area. Returns the distance between the closest
 // two.
 double nearest_of_three(double radius, std::uint64_t seed, const LayoutCfg& cfg) {
-  const ObjectShape shape = disc(radius);
+  const episode::ObjectShape shape = disc(radius);
   const Quat upright{};
   const std::vector<PlacedObject> objects(3, PlacedObject{&shape, {&upright, 1}});
   const std::array<int, 3> wanted{0, 1, 2};
@@ -56,7 +56,7 @@ TEST(Layout, RestartsIfThereIsNoRoom) {
 }
 
 TEST(Layout, TargetsArePlacedInRegionsForTargets) {
-  const ObjectShape shape = disc(0.02);
+  const episode::ObjectShape shape = disc(0.02);
   const Quat upright{};
   const std::vector<PlacedObject> objects(3, PlacedObject{&shape, {&upright, 1}});
   const std::array<int, 1> wanted{1};
@@ -85,4 +85,4 @@ TEST(Layout, UsesTheLayoutWithLeastOverlap) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

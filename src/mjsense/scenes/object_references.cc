@@ -10,7 +10,7 @@
 
 #include "mjsense/scenes/colour_words.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 // An object differs in size if its longest edge and its volume are larger by these factors.
@@ -259,4 +259,4 @@ std::string draw_reference(const References& references, Rng& rng) {
   return (*of)[rng.below(static_cast<std::uint32_t>(of->size()))];
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

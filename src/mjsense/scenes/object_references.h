@@ -17,7 +17,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A group per kind of phrase: names; colour, material and size; place relative to another object or
 // on a piece of furniture; extreme place among objects of the same name.
@@ -43,4 +43,4 @@ std::string one_of(std::span<const char* const> sentences, Rng& rng, const Args&
 // the name without its first words, or the first part of "box of tea".
 bool may_be_called(std::string_view name, std::string_view phrase);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

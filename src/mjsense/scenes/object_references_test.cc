@@ -6,7 +6,7 @@
 
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using ::testing::Contains;
@@ -26,7 +26,7 @@ struct DataDelete {
 //          y = 0.3          0             -0.2
 struct Table {
   std::unique_ptr<EpisodeScene> scene;
-  std::unique_ptr<Scene> compiled;
+  std::unique_ptr<scene::Scene> compiled;
   std::unique_ptr<mjData, DataDelete> data;
 
   explicit Table(const char* small_rgba = "0.8 0.1 0.1 1") {
@@ -45,7 +45,7 @@ struct Table {
                <geom type="cylinder" size="0.03 0.04" rgba="0.1 0.55 0.56 1"/></body>
            </worldbody></mujoco>)";
     cfg.models = [xml] {
-      SceneCfg models;
+      scene::SceneCfg models;
       models.base.xml = xml;
       return models;
     };
@@ -61,9 +61,9 @@ struct Table {
     add("plate", "plate");
     add("mug", "mug");
     scene = std::make_unique<EpisodeScene>(cfg);
-    SceneCfg whole = scene->scene_cfg("robot_0");
+    scene::SceneCfg whole = scene->scene_cfg("robot_0");
     std::erase_if(whole.entities, [](const auto& entity) { return entity.first == "robot_0"; });
-    compiled = std::make_unique<Scene>(std::move(whole));
+    compiled = std::make_unique<scene::Scene>(std::move(whole));
     scene->initialize(compiled->model(), 1, "robot_0/");
     data.reset(mj_makeData(compiled->model()));
     mj_forward(compiled->model(), data.get());
@@ -136,4 +136,4 @@ TEST(ObjectReferences, KindsWithoutPhrasesAreNotDrawn) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

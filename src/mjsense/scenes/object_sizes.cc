@@ -12,7 +12,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/object_meshes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 void scale(const double* from, double factor, int n, double* to) {
@@ -37,7 +37,7 @@ ObjectSizes::Own<T> ObjectSizes::own(mjBatch* batch, const char* field, const T*
   return all;
 }
 
-ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
+ObjectSizes::ObjectSizes(sim::Simulation& simulation, std::span<const int> bodies,
                          std::vector<std::vector<double>> sizes, std::string_view context)
     : m_(simulation.scene().model()), sizes_(std::move(sizes)) {
   mjBatch* batch = simulation.worlds().batch();
@@ -64,18 +64,19 @@ ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
     object.body = bodies[i];
     object.dof = m_->body_dofadr[bodies[i]];
     for (int b = bodies[i]; b < m_->nbody; ++b) {
-      if (!is_descendant_or_self(m_, b, bodies[i])) continue;
+      if (!observe::is_descendant_or_self(m_, b, bodies[i])) continue;
       if (b != bodies[i] && m_->body_jntnum[b] > 0)
         throw ValueError(fmt::format(
             "{}: object '{}' has a moving part, '{}', so it cannot be scaled: sizes must be [1, 1]",
-            context, name_of(m_, mjOBJ_BODY, bodies[i]), name_of(m_, mjOBJ_BODY, b)));
+            context, scene::name_of(m_, mjOBJ_BODY, bodies[i]), scene::name_of(m_, mjOBJ_BODY, b)));
       object.bodies.push_back(b);
     }
     for (int s = 0; s < m_->nsite; ++s) {
-      if (is_descendant_or_self(m_, m_->site_bodyid[s], bodies[i])) object.sites.push_back(s);
+      if (observe::is_descendant_or_self(m_, m_->site_bodyid[s], bodies[i]))
+        object.sites.push_back(s);
     }
     for (int g = 0; g < m_->ngeom; ++g) {
-      if (!is_descendant_or_self(m_, m_->geom_bodyid[g], bodies[i])) continue;
+      if (!observe::is_descendant_or_self(m_, m_->geom_bodyid[g], bodies[i])) continue;
       object.geoms.push_back(g);
       if (m_->geom_type[g] != mjGEOM_MESH || sizes_[i].size() < 2) continue;
       MeshGeom& mesh = object.meshes.emplace_back();
@@ -180,4 +181,4 @@ void ObjectSizes::set_object(int world, const Object& object, int step, double s
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -12,7 +12,7 @@
 
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 class ObjectSizes {
  public:
@@ -24,7 +24,7 @@ class ObjectSizes {
 
   // `bodies` have a free joint, `sizes` are the sizes of each, and their meshes were added by
   // ObjectMeshes. Throws ValueError for an object with moving parts.
-  ObjectSizes(Simulation& simulation, std::span<const int> bodies,
+  ObjectSizes(sim::Simulation& simulation, std::span<const int> bodies,
               std::vector<std::vector<double>> sizes, std::string_view context);
 
   double size(int object, int step) const { return sizes_[object][step]; }
@@ -70,4 +70,4 @@ class ObjectSizes {
   Own<int> geom_dataid_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

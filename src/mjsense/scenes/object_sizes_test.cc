@@ -15,7 +15,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using ::testing::HasSubstr;
@@ -83,29 +83,30 @@ struct Files {
 
 struct Played {
   EpisodeScene scene;
-  std::shared_ptr<Simulation> sim;
+  std::shared_ptr<sim::Simulation> sim;
 
   explicit Played(SceneFileCfg cfg, int worlds = 1, int threads = 1) : scene(std::move(cfg)) {
-    SceneCfg whole = scene.scene_cfg("robot_0");
+    scene::SceneCfg whole = scene.scene_cfg("robot_0");
     std::erase_if(whole.entities, [](const auto& entity) { return entity.first == "robot_0"; });
-    sim = std::make_shared<Simulation>(std::make_shared<Scene>(whole),
-                                       SimulationCfg{.num_worlds = worlds, .threads = threads});
+    sim = std::make_shared<sim::Simulation>(
+        std::make_shared<scene::Scene>(whole),
+        sim::SimulationCfg{.num_worlds = worlds, .threads = threads});
     scene.bind(*sim);
     scene.initialize(sim->model(), worlds, "robot_0/");
   }
   void start(std::uint64_t episode, int world = 0) {
     Rng rng(3, 0, stream_of("places"), episode);
     if (scene.vary(world, 3, episode)) sim->worlds().model_changed();
-    scene.sample(world, 0, 3, episode, rng, state_row(sim->worlds(), world));
+    scene.sample(world, 0, 3, episode, rng, robots::state_row(sim->worlds(), world));
     sim->forward();
   }
   std::vector<double> state(int world) const {
-    const StateRow row = state_row(sim->worlds(), world);
+    const robots::StateRow row = robots::state_row(sim->worlds(), world);
     return {row.qpos, row.qpos + sim->model()->nq};
   }
   // This world's model, as MuJoCo returns it.
-  ModelPtr model(int world) const {
-    ModelPtr copy(mj_copyModel(nullptr, sim->model()));
+  scene::ModelPtr model(int world) const {
+    scene::ModelPtr copy(mj_copyModel(nullptr, sim->model()));
     mjb_getModel(sim->worlds().batch(), world, copy.get());
     return copy;
   }
@@ -168,10 +169,11 @@ TEST(ObjectSizes, ObjectEqualsTheCompiledOne) {
     if (!seen.insert(size).second) continue;
     const Files other(size);
     Played compiled(other.cfg);
-    const ModelPtr model = played.model(0);
+    const scene::ModelPtr model = played.model(0);
     expect_same(model.get(), compiled.sim->model());
     EXPECT_NEAR(model->body_subtreemass[0], compiled.sim->model()->body_subtreemass[0], 1e-9);
-    const ObjectShape &shape = played.scene.shape(0, 0), &wanted = compiled.scene.shape(0, 0);
+    const episode::ObjectShape &shape = played.scene.shape(0, 0),
+                               &wanted = compiled.scene.shape(0, 0);
     EXPECT_NEAR(shape.low, wanted.low, 1e-6);
     EXPECT_NEAR(shape.high, wanted.high, 1e-6);
     EXPECT_NEAR(shape.reach, wanted.reach, 1e-6);
@@ -196,7 +198,7 @@ TEST(ObjectSizes, ObjectFallsLikeTheCompiledOne) {
     const auto lift = [](Played& one, const double* from) {
       const mjModel* m = one.sim->model();
       const int q = m->jnt_qposadr[m->body_jntadr[one.scene.objects()[0].body]];
-      double* qpos = state_row(one.sim->worlds(), 0).qpos + q;
+      double* qpos = robots::state_row(one.sim->worlds(), 0).qpos + q;
       if (from) std::memcpy(qpos, from, 7 * sizeof(double));
       qpos[2] += from ? 0 : .05;
       one.sim->forward();
@@ -222,7 +224,7 @@ TEST(ObjectSizes, StartsDependOnTheEpisodeOnlyWithoutCollisions) {
     const int world = static_cast<int>(episode) % 8;
     one.start(episode);
     many.start(episode, world);
-    struct Hooks final : WorldHooks {
+    struct Hooks final : worlds::WorldHooks {
       const EpisodeScene* scene;
       std::string fault;
       void substep(const World& /*world*/) override {}
@@ -230,7 +232,7 @@ TEST(ObjectSizes, StartsDependOnTheEpisodeOnlyWithoutCollisions) {
       void refreshed(const World& world) override { fault += scene->fault(world); }
     } hooks;
     hooks.scene = &one.scene;
-    one.sim->worlds().visit(all_worlds, hooks);
+    one.sim->worlds().visit(worlds::all_worlds, hooks);
     EXPECT_EQ(hooks.fault, "");
     one.sim->step(40);
     many.sim->step(40);
@@ -264,14 +266,14 @@ TEST(ObjectSizes, ObjectsMoveWithFurniture) {
   double minimum = 1e9, maximum = -1e9;
   for (std::uint64_t episode = 0; episode < 20; ++episode) {
     played.start(episode);
-    const ModelPtr here = played.model(0);
+    const scene::ModelPtr here = played.model(0);
     const double* at = here->body_pos + 3 * body;
     EXPECT_LE(std::abs(at[0] - 1), .3);
     EXPECT_LE(std::abs(at[2]), .1);
     minimum = std::min(minimum, at[2]);
     maximum = std::max(maximum, at[2]);
     EXPECT_NEAR(played.scene.support_height(0), .51 + at[2], 1e-12);
-    const double* qpos = state_row(played.sim->worlds(), 0).qpos;
+    const double* qpos = robots::state_row(played.sim->worlds(), 0).qpos;
     for (const SceneObject& object : played.scene.objects()) {
       const double* p = qpos + m->jnt_qposadr[m->body_jntadr[object.body]];
       EXPECT_LE(std::abs(p[0] - at[0]), .5);
@@ -328,4 +330,4 @@ TEST(ObjectSizes, FaultsNameTheSetting) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

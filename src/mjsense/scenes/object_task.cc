@@ -5,10 +5,10 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 void ObjectTask::begin(const World& world) {
-  Task::begin(world);
+  episode::Task::begin(world);
   const int body = object(world.id).body;
   subjects_[world.id].start = {vec3(world.data->xpos + 3 * body),
                                quat(world.data->xquat + 4 * body)};
@@ -27,9 +27,9 @@ void ObjectTask::begin_with(int body, const std::string& name, bool thin) {
 }
 
 void ObjectTask::set_object(int world, int body, const std::string& name) {
-  TaskObject& object = subjects_[world].object;
+  episode::TaskObject& object = subjects_[world].object;
   object.body = body;
   object.name = name;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

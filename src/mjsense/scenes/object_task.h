@@ -10,15 +10,15 @@
 
 #include "mjsense/scenes/scene_task.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 class ObjectTask : public SceneTask {
  public:
   // `role` is the role of the object and must outlive the task.
-  ObjectTask(TaskCfg cfg, std::string_view own_scene, std::string_view role)
+  ObjectTask(episode::TaskCfg cfg, std::string_view own_scene, std::string_view role)
       : SceneTask(std::move(cfg), own_scene), role_(role) {}
   void begin(const World& world) override;
-  std::span<const TaskObject> objects(int world) const override {
+  std::span<const episode::TaskObject> objects(int world) const override {
     return {&subjects_[world].object, 1};
   }
   Pose start_pose(int world, std::string_view role) const override;
@@ -30,17 +30,17 @@ class ObjectTask : public SceneTask {
   // Sets each world's object until an episode selects another. `name`: name in instructions.
   void begin_with(int body, const std::string& name, bool thin = false);
   void set_object(int world, int body, const std::string& name);
-  const TaskObject& object(int world) const { return subjects_[world].object; }
+  const episode::TaskObject& object(int world) const { return subjects_[world].object; }
   // Pose of the object at the first observation.
   const Pose& start(int world) const { return subjects_[world].start; }
 
  private:
   struct Subject {
-    TaskObject object;
+    episode::TaskObject object;
     Pose start;
   };
   std::string_view role_;
   std::vector<Subject> subjects_;  // [B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr int kRound = 16;  // corners of a circle's polygon
@@ -316,4 +316,4 @@ bool Footprint::fits(const OccupancyGrid& floor, double x, double y, double yaw,
   return true;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -11,7 +11,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct OccupancyCfg {
   double cell = 0.05;             // m
@@ -79,4 +79,4 @@ class Footprint {
   double radius_ = 0, height_ = 0;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -9,7 +9,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scenes/base_planner.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -46,16 +46,16 @@ struct Floor {
       : model(compile_text(xml)), data(mj_makeData(model.get())) {
     mj_kinematics(model.get(), data.get());
   }
-  static ModelPtr compile_text(const std::string& xml) {
-    ModelSource source;
+  static scene::ModelPtr compile_text(const std::string& xml) {
+    scene::ModelSource source;
     source.xml = xml;
-    const SpecPtr spec = parse_model(source, "test");
-    return compile(spec.get(), Vfs());
+    const scene::SpecPtr spec = scene::parse_model(source, "test");
+    return scene::compile(spec.get(), scene::Vfs());
   }
   OccupancyGrid occupancy() const {
     return {model.get(), data.get(), [](int) { return true; }, {}};
   }
-  ModelPtr model;
+  scene::ModelPtr model;
   std::unique_ptr<mjData, DataDelete> data;
 };
 
@@ -86,7 +86,7 @@ TEST(OccupancyGrid, MarksMeshesBetweenTheirVertices) {
       points += std::to_string(0.3 * std::cos(a)) + " " + std::to_string(0.3 * std::sin(a)) + " " +
                 std::to_string(z) + " ";
   }
-  const ModelPtr model =
+  const scene::ModelPtr model =
       Floor::compile_text("<mujoco><asset><mesh name='pillar' vertex='" + points +
                           "'/></asset><worldbody><geom type='plane' size='2 2 .1'/>"
                           "<geom type='mesh' mesh='pillar' pos='0 0 1.25'/></worldbody></mujoco>");
@@ -260,4 +260,4 @@ TEST(BaseRoute, TimesRespectSpeedAndAccelerationLimits) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/scenes/referring_expressions.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
-std::vector<Referral> referring_expressions(const SceneObject& object) {
-  std::vector<Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
+std::vector<episode::Referral> referring_expressions(const SceneObject& object) {
+  std::vector<episode::Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
   double left = 0.5;
   for (std::size_t i = 0; i < object.others.size(); ++i) {
     const double share = i + 1 == object.others.size() ? left : 0.6 * left;
@@ -14,4 +14,4 @@ std::vector<Referral> referring_expressions(const SceneObject& object) {
   return texts;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -7,9 +7,9 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // The usual name has probability one half; further names have decreasing probabilities.
-std::vector<Referral> referring_expressions(const SceneObject& object);
+std::vector<episode::Referral> referring_expressions(const SceneObject& object);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

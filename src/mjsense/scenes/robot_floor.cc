@@ -8,16 +8,17 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kHeadroom = 0.05;  // m
 
 }  // namespace
 
-int driving_base(const Robot& robot) {
-  const auto is_one = [](const MoveGroup& group) {
-    return group.kind == GroupKind::kBase && group.command_size == 3 && group.target_size == 3;
+int driving_base(const robots::Robot& robot) {
+  const auto is_one = [](const robots::MoveGroup& group) {
+    return group.kind == robots::GroupKind::kBase && group.command_size == 3 &&
+           group.target_size == 3;
   };
   const auto at = std::ranges::find_if(robot.groups(), is_one);
   return at == robot.groups().end() ? -1 : static_cast<int>(at - robot.groups().begin());
@@ -36,7 +37,7 @@ std::optional<double> ground_height(const mjModel* m) {
   return {};
 }
 
-RestingRobot::RestingRobot(const mjModel* model, const Robot& robot)
+RestingRobot::RestingRobot(const mjModel* model, const robots::Robot& robot)
     : model_(model), robot_(robot), data_(call_mujoco(mj_makeData, model)) {
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const auto& init = robot.cfg().groups[g].init;
@@ -47,9 +48,10 @@ RestingRobot::RestingRobot(const mjModel* model, const Robot& robot)
 
 bool RestingRobot::of_robot(int geom) const {
   const int body = model_->geom_bodyid[geom];
-  if (!robot_.prefix().empty() && name_of(model_, mjOBJ_BODY, body).starts_with(robot_.prefix()))
+  if (!robot_.prefix().empty() &&
+      scene::name_of(model_, mjOBJ_BODY, body).starts_with(robot_.prefix()))
     return true;
-  return robot_.base_body() > 0 && is_descendant_or_self(model_, body, robot_.base_body());
+  return robot_.base_body() > 0 && observe::is_descendant_or_self(model_, body, robot_.base_body());
 }
 
 Footprint RestingRobot::footprint() const {
@@ -60,16 +62,18 @@ Footprint RestingRobot::footprint() const {
 
 Footprint RestingRobot::trunk() const {
   const int base = robot_.base_body();
-  return {model_, data_.get(),
-          [this](int g) {
-            const auto holds = [&](const MoveGroup& group) {
-              const bool limb = group.kind == GroupKind::kArm || group.kind == GroupKind::kGripper;
-              return limb && group.root_body > 0 &&
-                     is_descendant_or_self(model_, model_->geom_bodyid[g], group.root_body);
-            };
-            return of_robot(g) && std::ranges::none_of(robot_.groups(), holds);
-          },
-          pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
+  return {
+      model_, data_.get(),
+      [this](int g) {
+        const auto holds = [&](const robots::MoveGroup& group) {
+          const bool limb =
+              group.kind == robots::GroupKind::kArm || group.kind == robots::GroupKind::kGripper;
+          return limb && group.root_body > 0 &&
+                 observe::is_descendant_or_self(model_, model_->geom_bodyid[g], group.root_body);
+        };
+        return of_robot(g) && std::ranges::none_of(robot_.groups(), holds);
+      },
+      pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
 }
 
 OccupancyGrid RestingRobot::occupancy(double height,
@@ -88,4 +92,4 @@ OccupancyGrid RestingRobot::occupancy(double height,
           cfg};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

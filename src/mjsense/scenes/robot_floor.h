@@ -11,10 +11,10 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/occupancy_grid.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Index of the group that commands x, y (m) and yaw (rad) of a mobile base; -1: none.
-int driving_base(const Robot& robot);
+int driving_base(const robots::Robot& robot);
 
 // Height (m) of the level plane under the wheels; empty if there is none.
 std::optional<double> ground_height(const mjModel* model);
@@ -22,7 +22,7 @@ std::optional<double> ground_height(const mjModel* model);
 // The compiled model with the robot's groups at their start positions, with its own mjData.
 class RestingRobot {
  public:
-  RestingRobot(const mjModel* model, const Robot& robot);
+  RestingRobot(const mjModel* model, const robots::Robot& robot);
   const mjData* data() const { return data_.get(); }
   Footprint footprint() const;
   // Footprint without the arms.
@@ -41,8 +41,8 @@ class RestingRobot {
   bool of_robot(int geom) const;
 
   const mjModel* model_;
-  const Robot& robot_;
+  const robots::Robot& robot_;
   std::unique_ptr<mjData, Delete> data_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -5,7 +5,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 void check_area(const std::array<double, 4>& area, const std::string& who) {
@@ -75,4 +75,4 @@ void validate(const SceneFileCfg& cfg, std::string_view context) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

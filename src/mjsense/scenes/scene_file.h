@@ -16,7 +16,7 @@
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct SceneEntityCfg {
   std::string name;
@@ -132,9 +132,9 @@ void visit_fields(V& v, SceneRobotCfg& c) {
 }
 
 enum class VaryKind { kLight, kMaterial, kGeom, kBody };
-template <>
-inline constexpr std::array<std::string_view, 4> kEnumNames<VaryKind>{"light", "material", "geom",
-                                                                      "body"};
+constexpr std::array<std::string_view, 4> enum_names(VaryKind) {
+  return {"light", "material", "geom", "body"};
+}
 
 struct SceneVaryCfg {
   NamedEnum<VaryKind> what;
@@ -169,7 +169,7 @@ void visit_fields(V& v, SceneVaryCfg& c) {
 }
 
 struct SceneSkyCfg {
-  std::array<double, 3> top = kSkyTop, bottom = kSkyBottom;
+  std::array<double, 3> top = scene::kSkyTop, bottom = scene::kSkyBottom;
 };
 template <class V>
 void visit_fields(V& v, SceneSkyCfg& c) {
@@ -206,14 +206,14 @@ struct SceneFileCfg {
   std::vector<SceneVaryCfg> vary;
   std::optional<SceneSkyCfg> sky;
   std::optional<SceneHeadlightCfg> headlight;
-  OptionsCfg options;
+  scene::OptionsCfg options;
   std::optional<double> extent;
   std::array<double, 2> sizes{1, 1};
   double gap = 0.02, target_gap = 0.07;
   double drop = 0.0003;
   std::array<int, 2> count{-1, -1};
   // Function that creates the models; replaces `base` and `entities`. Called for every compilation.
-  std::function<SceneCfg()> models;
+  std::function<scene::SceneCfg()> models;
 };
 template <class V>
 void visit_fields(V& v, SceneFileCfg& c) {
@@ -273,4 +273,4 @@ void visit_fields(V& v, SceneFileCfg& c) {
 // Checks relations between the fields. Throws ValueError.
 void validate(const SceneFileCfg& cfg, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

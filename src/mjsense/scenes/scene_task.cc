@@ -7,12 +7,12 @@
 #include "mjsense/scenes/robot_floor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
-SceneTask::SceneTask(TaskCfg cfg, std::string_view own_scene)
-    : Task(std::move(cfg)), scene_(task_scene(this->cfg(), own_scene)) {}
+SceneTask::SceneTask(episode::TaskCfg cfg, std::string_view own_scene)
+    : episode::Task(std::move(cfg)), scene_(task_scene(this->cfg(), own_scene)) {}
 
-void SceneTask::bind(const std::shared_ptr<Simulation>& simulation) {
+void SceneTask::bind(const std::shared_ptr<sim::Simulation>& simulation) {
   simulation_ = simulation;
   scene_.bind(*simulation);
 }
@@ -25,17 +25,17 @@ void SceneTask::initialize_task() {
 }
 
 void SceneTask::vary_scene(int world) {
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  const std::shared_ptr<sim::Simulation> simulation = simulation_.lock();
   if (scene_.vary(world, cfg().seed, static_cast<std::uint64_t>(episode(world))) && simulation)
     simulation->worlds().model_changed();
 }
 
 mjModel SceneTask::world_model(int world) const {
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  const std::shared_ptr<sim::Simulation> simulation = simulation_.lock();
   return simulation ? simulation->worlds().model_of(world) : *model();
 }
 
-std::vector<int> SceneTask::adopt_scene(int world, const StateRow& state) {
+std::vector<int> SceneTask::adopt_scene(int world, const robots::StateRow& state) {
   return scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), state);
 }
 
@@ -43,4 +43,4 @@ std::string SceneTask::context() const {
   return fmt::format("task '{}': scene '{}'", name(), scene_.cfg().name);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

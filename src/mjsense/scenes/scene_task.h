@@ -9,14 +9,14 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/scenes/episode_scene.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
-class SceneTask : public Task {
+class SceneTask : public episode::Task {
  public:
   // Throws the errors of task_scene().
-  SceneTask(TaskCfg cfg, std::string_view own_scene);
-  SceneCfg scene_cfg() const override { return scene_.scene_cfg(robot_entity()); }
-  void bind(const std::shared_ptr<Simulation>& simulation) override;
+  SceneTask(episode::TaskCfg cfg, std::string_view own_scene);
+  scene::SceneCfg scene_cfg() const override { return scene_.scene_cfg(robot_entity()); }
+  void bind(const std::shared_ptr<sim::Simulation>& simulation) override;
   std::string start_error(const World& world) const override { return scene_.fault(world); }
   std::vector<int> absentees() const override { return scene_.absentees(); }
   bool present(int world, int body) const override { return scene_.body_present(world, body); }
@@ -31,13 +31,13 @@ class SceneTask : public Task {
   // Worlds::model_of(), or the compiled model if there are no worlds.
   mjModel world_model(int world) const;
   // Calls EpisodeScene::adopt() for this world's episode.
-  std::vector<int> adopt_scene(int world, const StateRow& state);
+  std::vector<int> adopt_scene(int world, const robots::StateRow& state);
   // Prefix of error messages: "task 'pick': scene 'table'".
   std::string context() const;
 
  private:
   EpisodeScene scene_;
-  std::weak_ptr<Simulation> simulation_;
+  std::weak_ptr<sim::Simulation> simulation_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -13,7 +13,7 @@
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 mjtObj object_type(VaryKind what) {
@@ -71,14 +71,14 @@ void shift_colour(double hue, double saturation, double brightness, float rgb[3]
   }
 }
 
-SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation,
+SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, sim::Simulation& simulation,
                                std::string_view context)
     : model_(simulation.model()) {
   mjBatch* batch = simulation.worlds().batch();
   for (SceneVaryCfg& one : cfg) {
     Part part;
     const mjtObj type = object_type(one.what);
-    const std::vector<std::string> names = model_names(model_, type);
+    const std::vector<std::string> names = scene::model_names(model_, type);
     const std::string who = fmt::format("{}, vary {}", context, one.what.text());
     const Regex pattern(one.pattern, who);
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -86,7 +86,7 @@ SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simula
     }
     if (part.ids.empty()) throw_unknown(who, one.what.text(), one.pattern, names);
     for (const std::string& texture : one.textures)
-      part.textures.push_back(resolve(model_, mjOBJ_TEXTURE, texture, who));
+      part.textures.push_back(scene::resolve(model_, mjOBJ_TEXTURE, texture, who));
     const bool colours =
         one.brightness != std::array<double, 2>{1, 1} || one.hue > 0 || one.saturation > 0;
     if (colours && one.what == VaryKind::kLight)
@@ -180,4 +180,4 @@ void SceneVariation::vary(int world, Rng& rng) const {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

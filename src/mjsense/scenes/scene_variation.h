@@ -10,13 +10,14 @@
 #include "mjsense/scenes/scene_file.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 class SceneVariation {
  public:
   // Throws KeyError for a pattern that matches nothing or an unknown texture, and ValueError for a
   // body that moves. `context` is the prefix of messages.
-  SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view context);
+  SceneVariation(std::vector<SceneVaryCfg> cfg, sim::Simulation& simulation,
+                 std::string_view context);
 
   bool varies() const { return !parts_.empty(); }
   // body_pos of this world; the model's own array if body positions do not vary.
@@ -44,4 +45,4 @@ class SceneVariation {
 // rgb in [0, 1].
 void shift_colour(double hue, double saturation, double brightness, float rgb[3]);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

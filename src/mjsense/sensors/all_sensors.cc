@@ -3,7 +3,12 @@
 
 #include <vector>
 
-namespace mjsense {
+#include "mjsense/effects/effect_sensor.h"
+
+namespace mjsense::sensors {
+
+// Defined here because effects/ precedes sensors/ in the order of rooms.
+SensorKind effect_kind() { return sensor_kind<effects::EffectSensorCfg>(); }
 
 #define MJSENSE_DECLARE(name) SensorKind name##_kind();
 MJSENSE_SENSORS(MJSENSE_DECLARE)
@@ -16,4 +21,4 @@ std::span<const SensorKind> sensor_kinds() {
   return kKinds;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/fields/sensor_fields.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // One line per sensor. Its folder defines `SensorKind <name>_kind()` and, for tests, `SensorCfgs
 // <name>_examples()` in testing/example.cc.
@@ -23,4 +23,4 @@ namespace mjsense {
 
 std::span<const SensorKind> sensor_kinds();
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -18,7 +18,7 @@
 #include "mjsense/sensors/testing/every_sensor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::HasSubstr;
@@ -39,12 +39,12 @@ constexpr char kWorld[] = R"(
 </mujoco>)";
 
 struct Lab {
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
   explicit Lab(std::vector<std::shared_ptr<const SensorCfg>> sensors, int worlds = 1) {
-    SceneCfg s;
-    EntityCfg e;
+    scene::SceneCfg s;
+    scene::EntityCfg e;
     e.model.xml = kWorld;
     s.entities.emplace_back("w", e);
     s.spec_fn = [](mjSpec* spec) {
@@ -52,8 +52,8 @@ struct Lab {
       spec->visual.map.force = 0.01;
     };
     s.sensors = std::move(sensors);
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, SimulationCfg{.num_worlds = worlds});
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, sim::SimulationCfg{.num_worlds = worlds});
   }
   DebugShapes draw(std::string_view name, int world = 0) {
     Sensor* sensor[] = {&scene->sensor(name)};
@@ -246,7 +246,8 @@ TEST(Draw, DrawingComputesOneWorldAndIsNotARead) {
 }
 
 TEST(Draw, EverySensorDrawsOrThrows) {
-  Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2, .decimation = 3});
+  sim::Simulation sim(std::make_shared<scene::Scene>(every_sensor_scene()),
+                      {.num_worlds = 2, .decimation = 3});
   sim.step(3);
   for (const auto& s : sim.scene().sensors()) {
     Sensor* sensor[] = {s.get()};
@@ -260,4 +261,4 @@ TEST(Draw, EverySensorDrawsOrThrows) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -14,14 +14,14 @@
 #include "mjsense/sensors/testing/every_sensor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr int kWorlds = 16, kSteps = 12;
 
 // Row `row` simulates world `w`, with its random numbers (those of a reset too) and its start
 // state.
-void begin(Simulation& sim, int row, int w) {
+void begin(sim::Simulation& sim, int row, int w) {
   sim.worlds().rekey(row, static_cast<std::uint32_t>(w));
   const int ids[] = {row};
   sim.reset(ids);
@@ -30,13 +30,13 @@ void begin(Simulation& sim, int row, int w) {
   for (int i = 0; i < sim.model()->nv; ++i) v[i] = std::sin(1.7 * i + w);
 }
 
-void control(Simulation& sim, int row, int w, int step) {
+void control(sim::Simulation& sim, int row, int w, int step) {
   const ArrayView ctrl = sim.worlds().state_component("ctrl");
   auto* u = reinterpret_cast<double*>(ctrl.data + row * ctrl.strides[0]);
   for (int i = 0; i < sim.model()->nu; ++i) u[i] = std::sin(0.4 * step + w + i);
 }
 
-std::vector<Sensor*> sensors(Simulation& sim) {
+std::vector<Sensor*> sensors(sim::Simulation& sim) {
   std::vector<Sensor*> list;
   for (const auto& s : sim.scene().sensors()) list.push_back(s.get());
   return list;
@@ -44,8 +44,8 @@ std::vector<Sensor*> sensors(Simulation& sim) {
 
 // Bytes of every field of every sensor in every step; rows[i] is that of world `first` + i.
 std::vector<std::string> play(int first, int worlds, int threads) {
-  Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
-                 {.num_worlds = worlds, .decimation = 3, .threads = threads});
+  sim::Simulation sim(std::make_shared<scene::Scene>(every_sensor_scene()),
+                      {.num_worlds = worlds, .decimation = 3, .threads = threads});
   std::vector<std::string> rows(worlds);
   for (int row = 0; row < worlds; ++row) begin(sim, row, first + row);
   sim.forward();
@@ -75,8 +75,8 @@ TEST(Lockstep, RowsDoNotDependOnBatchSizeOrThreads) {
 }
 
 TEST(Lockstep, PartialResetAffectsItsWorldsOnly) {
-  Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
-                 {.num_worlds = 3, .decimation = 3, .threads = 2});
+  sim::Simulation sim(std::make_shared<scene::Scene>(every_sensor_scene()),
+                      {.num_worlds = 3, .decimation = 3, .threads = 2});
   const std::vector<Sensor*> all = sensors(sim);
   for (int row = 0; row < 3; ++row) begin(sim, row, row);
   sim.step(5);
@@ -99,8 +99,8 @@ TEST(Lockstep, PartialResetAffectsItsWorldsOnly) {
 }
 
 TEST(Lockstep, StepDoesNotAllocate) {
-  Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
-                 {.num_worlds = 4, .decimation = 3, .threads = 2});
+  sim::Simulation sim(std::make_shared<scene::Scene>(every_sensor_scene()),
+                      {.num_worlds = 4, .decimation = 3, .threads = 2});
   const std::vector<Sensor*> all = sensors(sim);
   auto step = [&] {
     sim.step();
@@ -118,7 +118,7 @@ TEST(Lockstep, StepDoesNotAllocate) {
 }
 
 TEST(EverySensor, HasAnExampleAndTheDeclaredFields) {
-  Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2});
+  sim::Simulation sim(std::make_shared<scene::Scene>(every_sensor_scene()), {.num_worlds = 2});
   for (const SensorKind& kind : sensor_kinds()) {
     int examples = 0;
     for (const Sensor* s : sensors(sim)) {
@@ -138,4 +138,4 @@ TEST(EverySensor, HasAnExampleAndTheDeclaredFields) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

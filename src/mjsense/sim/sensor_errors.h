@@ -13,7 +13,7 @@
 #include "mjsense/core/row_error.h"
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 
 // A lack of memory in a sensor, with the sensor's name. It allocates nothing.
 class SensorOutOfMemory : public std::bad_alloc {
@@ -54,4 +54,4 @@ void guarded(const Sensor& sensor, Body&& body) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sim

@@ -14,7 +14,7 @@
 #include "mjsense/sim/simulation_hooks.h"
 #include "mjsense/sim/simulation_slots.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 namespace {
 
 // Runs `first`, then `next` until it returns false, even if they throw RowError, so that all
@@ -42,12 +42,12 @@ void after_all(First&& first, Next&& next) {
 
 }  // namespace
 
-Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
+Simulation::Simulation(std::shared_ptr<scene::Scene> scene, const SimulationCfg& cfg)
     : cfg_(cfg), scene_(std::move(scene)) {
   if (cfg.decimation < 1)
     throw ValueError(fmt::format("decimation is {}: must be at least 1", cfg.decimation));
   claim_ = scene_->claim();
-  worlds_ = std::make_unique<Worlds>(scene_->model(), cfg.num_worlds, cfg.threads);
+  worlds_ = std::make_unique<worlds::Worlds>(scene_->model(), cfg.num_worlds, cfg.threads);
   worlds_->seed(cfg.seed);
   // Not worlds_->threads(): MuJoCo's pool is limited to the number of worlds, but a single image
   // has many tiles.
@@ -146,19 +146,19 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
   }
 }
 
-void Simulation::step(int control_steps, WorldIds ids) {
+void Simulation::step(int control_steps, worlds::WorldIds ids) {
   if (control_steps < 1)
     throw ValueError(fmt::format("step({}): must be at least 1", control_steps));
   for (int k = 0; k < control_steps; ++k)
     advance(ids, Change::kStep, cfg_.decimation, k + 1 == control_steps);
 }
 
-void Simulation::follow(int substeps, WorldIds ids) {
+void Simulation::follow(int substeps, worlds::WorldIds ids) {
   advance(ids, Change::kFollow, substeps, true);
 }
 
 // If `last`, also computes the sensors that were read since the last call.
-void Simulation::advance(WorldIds ids, Change change, int substeps, bool last) {
+void Simulation::advance(worlds::WorldIds ids, Change change, int substeps, bool last) {
   Borrowed due(*this);
   collect(due->slots, [last](Slot& s) {
     const bool wanted = s.sensor->needs_every_step() || (last && s.read);
@@ -177,7 +177,7 @@ void Simulation::set_control(int every, Control control) {
   control_every_ = control_ ? every : 0;
 }
 
-void Simulation::reset(WorldIds ids, int key) {
+void Simulation::reset(worlds::WorldIds ids, int key) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
   collect(due->slots, [](Slot& s) { return s.sensor->needs_every_step(); });
@@ -185,7 +185,7 @@ void Simulation::reset(WorldIds ids, int key) {
   compute(due->slots, sorted, Change::kReset, key);
 }
 
-void Simulation::forward(WorldIds ids) {
+void Simulation::forward(worlds::WorldIds ids) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
   collect(due->slots, [](Slot& s) { return s.sensor->needs_every_step(); });
@@ -201,10 +201,10 @@ void Simulation::step_raw(int substeps) {
 void Simulation::update_sensors(double dt) {
   Hooks hooks(*this, Hooks::Only::kSubstep, dt);
   invalidate();
-  worlds_->visit(all_worlds, hooks);
+  worlds_->visit(worlds::all_worlds, hooks);
 }
 
-void Simulation::reset_sensors(WorldIds ids) {
+void Simulation::reset_sensors(worlds::WorldIds ids) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Hooks hooks(*this, Hooks::Only::kReset);
   mark_stale(sorted);
@@ -220,15 +220,15 @@ double Simulation::ray_scene_cost() const {
   return std::accumulate(rays_s_.begin(), rays_s_.end(), 0.0);
 }
 
-void Simulation::invalidate(WorldIds ids) { mark_stale(worlds_->checked_ids(ids)); }
+void Simulation::invalidate(worlds::WorldIds ids) { mark_stale(worlds_->checked_ids(ids)); }
 
-void Simulation::refresh(std::span<Sensor* const> sensors, WorldIds ids) {
+void Simulation::refresh(std::span<Sensor* const> sensors, worlds::WorldIds ids) {
   make_current(sensors, ids);
   // only after they were computed successfully
   for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;
 }
 
-void Simulation::make_current(std::span<Sensor* const> sensors, WorldIds ids) {
+void Simulation::make_current(std::span<Sensor* const> sensors, worlds::WorldIds ids) {
   Borrowed due(*this);
   for (const Sensor* sensor : sensors) {
     slot_of(*sensor).wanted = true;
@@ -242,7 +242,7 @@ void Simulation::make_current(std::span<Sensor* const> sensors, WorldIds ids) {
   if (!due->ids.empty()) compute(due->slots, due->ids, Change::kNone);
 }
 
-class Simulation::DrawHooks final : public WorldHooks {
+class Simulation::DrawHooks final : public worlds::WorldHooks {
  public:
   DrawHooks(std::span<Sensor* const> sensors, DebugShapes& shapes)
       : sensors_(sensors), shapes_(shapes) {}
@@ -273,4 +273,4 @@ DebugShapes Simulation::draw(int world, std::span<Sensor* const> sensors) {
   return shapes;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sim

@@ -19,7 +19,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/worlds/worlds.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 
 struct SimulationCfg {
   int num_worlds = 1;
@@ -32,14 +32,14 @@ class Simulation {
  public:
   // All worlds start reset, at the model's defaults. Throws RuntimeError if another simulation uses
   // this scene.
-  Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg);
+  Simulation(std::shared_ptr<scene::Scene> scene, const SimulationCfg& cfg);
   ~Simulation();
   Simulation(const Simulation&) = delete;
   Simulation& operator=(const Simulation&) = delete;
 
-  Scene& scene() { return *scene_; }
-  const std::shared_ptr<Scene>& scene_ptr() const { return scene_; }
-  Worlds& worlds() { return *worlds_; }
+  scene::Scene& scene() { return *scene_; }
+  const std::shared_ptr<scene::Scene>& scene_ptr() const { return scene_; }
+  worlds::Worlds& worlds() { return *worlds_; }
   ThreadPool& pool() { return *pool_; }
   // The model that is simulated; it has none of the values that differ between worlds.
   const mjModel* model() const { return worlds_->model(); }
@@ -56,23 +56,23 @@ class Simulation {
   void set_control(int every, Control control);
 
   // Steps the worlds `ids`; all others keep their state.
-  void step(int control_steps = 1, WorldIds ids = all_worlds);
+  void step(int control_steps = 1, worlds::WorldIds ids = worlds::all_worlds);
   // The caller has stepped these worlds itself, `substeps` times each, and has written the resulting
   // states. Equivalent to step(), without the physics.
-  void follow(int substeps, WorldIds ids = all_worlds);
+  void follow(int substeps, worlds::WorldIds ids = worlds::all_worlds);
   // Resets to keyframe `key`; -1: the model's defaults; Worlds::kWrittenState: the state as written.
-  void reset(WorldIds ids = all_worlds, int key = -1);
+  void reset(worlds::WorldIds ids = worlds::all_worlds, int key = -1);
   // Restarts the random numbers from this seed. Usually followed by reset().
   void seed(std::uint64_t seed) { worlds_->seed(seed); }
   // Computes derived fields and sensors after the state was written.
-  void forward(WorldIds ids = all_worlds);
+  void forward(worlds::WorldIds ids = worlds::all_worlds);
 
   // mjlab's order of calls: plain mj_step, then one update of the sensors' per-substep state.
   void step_raw(int substeps);
   // dt: s, duration that this update represents; 0: the timestep
   void update_sensors(double dt = 0.0);
   // Resets the sensors of these worlds without changing the physics.
-  void reset_sensors(WorldIds ids = all_worlds);
+  void reset_sensors(worlds::WorldIds ids = worlds::all_worlds);
 
   // Adds and initializes a sensor that is not part of the scene (observation sensors, user-defined
   // sensors).
@@ -83,12 +83,12 @@ class Simulation {
     Sensor* one[] = {&sensor};
     refresh(one);
   }
-  void refresh(std::span<Sensor* const> sensors, WorldIds ids = all_worlds);
+  void refresh(std::span<Sensor* const> sensors, worlds::WorldIds ids = worlds::all_worlds);
   // Debug visualisation of these sensors in the current state of one world; empty: all sensors with
   // debug_vis. Drawing does not count as reading.
   [[nodiscard]] DebugShapes draw(int world, std::span<Sensor* const> sensors = {});
   // Marks all rows of these worlds as stale after the caller changed the state.
-  void invalidate(WorldIds ids = all_worlds);
+  void invalidate(worlds::WorldIds ids = worlds::all_worlds);
 
   // Time spent on a sensor since measure_cost(true).
   struct Cost {
@@ -101,8 +101,8 @@ class Simulation {
   double ray_scene_cost() const;
 
   // Worlds that failed in the last step, reset or forward. Only these worlds were reset.
-  const std::vector<Failure>& failures() const { return worlds_->failures(); }
-  RayScene& rays();  // created on first use
+  const std::vector<worlds::Failure>& failures() const { return worlds_->failures(); }
+  rays::RayScene& rays();  // created on first use
 
  private:
   struct Slot;
@@ -118,9 +118,9 @@ class Simulation {
   // kStep and kFollow.
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change,
                int argument = 0);
-  void advance(WorldIds ids, Change change, int substeps, bool last);
+  void advance(worlds::WorldIds ids, Change change, int substeps, bool last);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
-  void make_current(std::span<Sensor* const> sensors, WorldIds ids);
+  void make_current(std::span<Sensor* const> sensors, worlds::WorldIds ids);
   template <class Wanted>
   void collect(std::vector<Slot*>& slots, Wanted&& wanted);
   void mark_stale(std::span<const int> ids);
@@ -133,11 +133,11 @@ class Simulation {
 
   SimulationCfg cfg_;
   SharedCache shared_;
-  std::shared_ptr<Scene> scene_;
+  std::shared_ptr<scene::Scene> scene_;
   std::shared_ptr<void> claim_;  // reserves the scene
-  std::unique_ptr<Worlds> worlds_;
+  std::unique_ptr<worlds::Worlds> worlds_;
   std::unique_ptr<ThreadPool> pool_;
-  std::unique_ptr<RayScene> rays_;
+  std::unique_ptr<rays::RayScene> rays_;
   std::vector<std::shared_ptr<Sensor>> added_;
   std::vector<std::unique_ptr<Slot>> slots_;  // scene sensors, then added sensors
   std::vector<std::int64_t> version_;         // of each world's state
@@ -151,4 +151,4 @@ class Simulation {
   Control control_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sim

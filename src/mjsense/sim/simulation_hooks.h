@@ -12,7 +12,7 @@
 #include "mjsense/sim/simulation.h"
 #include "mjsense/sim/simulation_slots.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 
 // Measures seconds since its construction. If off, returns 0 and does not read the clock, which
 // takes 25 ns, as much as a small sensor.
@@ -32,7 +32,7 @@ class Timer {
 };
 
 // Sensor callbacks of the parallel pass of MuJoCo's threads over the worlds.
-class Simulation::Hooks final : public WorldHooks {
+class Simulation::Hooks final : public worlds::WorldHooks {
  public:
   enum class Only { kNothing, kSubstep, kReset };
   Hooks(Simulation& sim, std::span<Slot* const> slots, int phase)
@@ -103,4 +103,4 @@ class Simulation::Hooks final : public WorldHooks {
   bool rays_ = false;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sim

@@ -10,7 +10,7 @@
 #include "mjsense/sim/simulation.h"
 #include "mjsense/sim/simulation_slots.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 
 // Initializes in the order of the registry, except that a sensor follows those that it reads.
 void Simulation::initialize_scene() {
@@ -34,8 +34,8 @@ void Simulation::initialize_scene() {
   for (auto& sensor : scene_->sensors()) visit(*sensor);
 }
 
-RayScene& Simulation::rays() {
-  if (!rays_) rays_ = std::make_unique<RayScene>(scene_->model(), cfg_.num_worlds);
+rays::RayScene& Simulation::rays() {
+  if (!rays_) rays_ = std::make_unique<rays::RayScene>(scene_->model(), cfg_.num_worlds);
   return *rays_;
 }
 
@@ -77,4 +77,4 @@ Simulation::Slot& Simulation::slot_of(const Sensor& sensor) const {
                                sensor.name()));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sim

@@ -11,7 +11,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 
 // A sensor and the state of its rows.
 struct Simulation::Slot {
@@ -56,4 +56,4 @@ class Simulation::Borrowed {
   std::unique_ptr<Scratch> scratch_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sim

@@ -17,7 +17,7 @@
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sim {
 namespace {
 
 using ::testing::Each;
@@ -31,11 +31,11 @@ constexpr char kXml[] = R"(
   </worldbody>
 </mujoco>)";
 
-std::shared_ptr<Scene> scene() {
-  SceneCfg cfg;
-  cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
-  cfg.terrain = TerrainCfg{};
-  return std::make_shared<Scene>(cfg);
+std::shared_ptr<scene::Scene> scene() {
+  scene::SceneCfg cfg;
+  cfg.entities.emplace_back("robot", scene::EntityCfg{.model = {.xml = kXml}});
+  cfg.terrain = scene::TerrainCfg{};
+  return std::make_shared<scene::Scene>(cfg);
 }
 
 // Height of the ball. Counts the calls of its functions.
@@ -509,7 +509,7 @@ TEST(Simulation, FollowsStatesThatWereWritten) {
   stepped.add(a);
   follower.add(b);
   copy_state();
-  follower.reset(all_worlds, Worlds::kWrittenState);
+  follower.reset(worlds::all_worlds, worlds::Worlds::kWrittenState);
   for (int k = 0; k < 20; ++k) {
     stepped.step();
     copy_state();
@@ -528,7 +528,7 @@ TEST(Simulation, FollowsStatesThatWereWritten) {
   EXPECT_EQ(b->last_dt, 3 * timestep);
   EXPECT_DOUBLE_EQ(follower.worlds().time(0), 20 * timestep);
   EXPECT_DOUBLE_EQ(follower.worlds().time(1), 23 * timestep);
-  follower.reset(one, Worlds::kWrittenState);
+  follower.reset(one, worlds::Worlds::kWrittenState);
   EXPECT_EQ(follower.worlds().time(1), 0);
   follower.refresh(*b);
   EXPECT_EQ(a->row(1), b->row(1)) << "the state stays";
@@ -536,15 +536,15 @@ TEST(Simulation, FollowsStatesThatWereWritten) {
 }
 
 TEST(Simulation, RaysUseTheCurrentState) {
-  SceneCfg cfg;
-  cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
-  cfg.terrain = TerrainCfg{};
-  auto scan = std::make_shared<RayCastSensorCfg>();
+  scene::SceneCfg cfg;
+  cfg.entities.emplace_back("robot", scene::EntityCfg{.model = {.xml = kXml}});
+  cfg.terrain = scene::TerrainCfg{};
+  auto scan = std::make_shared<sensors::RayCastSensorCfg>();
   scan->name = "scan";
   scan->frame = {{"body", "world", ""}};
-  scan->pattern = UserPattern{.offsets = {{0, 0, 5}}, .directions = {{0, 0, -1}}};
+  scan->pattern = sensors::UserPattern{.offsets = {{0, 0, 5}}, .directions = {{0, 0, -1}}};
   cfg.sensors = {scan};
-  const auto made = std::make_shared<Scene>(std::move(cfg));
+  const auto made = std::make_shared<scene::Scene>(std::move(cfg));
   Simulation sim(made, {.num_worlds = 2});
   Sensor& sensor = made->sensor("scan");
   sim.refresh(sensor);
@@ -595,7 +595,7 @@ TEST(Simulation, EmptyListOfWorldsMeansNone) {
   sim.invalidate();
   sim.refresh(one, none);
   EXPECT_EQ(h->computes, computes);
-  sim.reset(all_worlds);
+  sim.reset(worlds::all_worlds);
   EXPECT_THAT(h->resets, ElementsAre(1, 1, 1));
 }
 
@@ -639,4 +639,4 @@ TEST(Simulation, ReadsOfForeignSensorsAreErrors) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sim

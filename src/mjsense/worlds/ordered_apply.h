@@ -9,7 +9,7 @@
 #include <sanitizer/tsan_interface.h>
 #endif
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 // MuJoCo's thread pool is not instrumented. These functions tell the thread sanitizer which
 // accesses its atomics order. They do nothing in other builds.
@@ -32,4 +32,4 @@ inline void apply_ordered(mjBatch* batch, const int* ids, int n, mjfBatchFunc ru
   ordered_after(call);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

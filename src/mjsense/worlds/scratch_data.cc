@@ -3,7 +3,7 @@
 
 #include "mjsense/core/mujoco_call.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 ScratchData::~ScratchData() {
   for (mjData* data : unused_) mj_deleteData(data);
@@ -26,4 +26,4 @@ void ScratchData::release(mjData* data) {
   unused_.push_back(data);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 // Lends each mjData to one caller at a time. Thread-safe. An mjData is created when needed and
 // reused by later callers, who find it as the previous one left it. The pool must outlive all
@@ -36,4 +36,4 @@ class ScratchData {
   std::vector<mjData*> unused_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

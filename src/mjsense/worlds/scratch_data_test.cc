@@ -8,7 +8,7 @@
 
 #include "mjsense/core/system/thread_pool.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 namespace {
 
 std::unique_ptr<mjModel, decltype(&mj_deleteModel)> slide() {
@@ -52,4 +52,4 @@ TEST(ScratchData, ThreadsNeverShareData) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/worlds/worlds.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 namespace {
 
 struct Component {
@@ -70,4 +70,4 @@ ArrayView Worlds::state_component(std::string_view name) {
   throw_unknown("simulation", "state component", name, names);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

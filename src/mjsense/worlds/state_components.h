@@ -7,7 +7,7 @@
 
 #include <string_view>
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 // Not one of MuJoCo's warnings: the state that was written contains NaN or infinity.
 inline constexpr int kBadState = mjNWARNING;
@@ -15,4 +15,4 @@ inline constexpr int kBadState = mjNWARNING;
 // Name of the first state component that contains NaN or infinity; "" if there is none.
 std::string_view bad_component(mjBatch* batch, int w);
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/worlds/step_stages.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 bool can_split_step(const mjModel* m) {
   const int whole = mjENBL_SLEEP | mjENBL_IPC | mjENBL_SPECULATIVE | mjENBL_FWDINV;
@@ -38,4 +38,4 @@ void step_from(mjtStage stage, const mjModel* m, mjData* d) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -4,7 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 // Whether mj_step may be split into stages, so that a step starts from stages that are already
 // computed and skips those that are not read. Otherwise mj_step is called as a whole: callbacks and
@@ -21,4 +21,4 @@ void position_and_velocity(const mjModel* m, mjData* d, bool sensors);
 // cannot be read between the stages before the integration and those after it.
 void step_from(mjtStage stage, const mjModel* m, mjData* d);
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -5,7 +5,7 @@
 #include <concepts>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 struct AllWorlds {};
 inline constexpr AllWorlds all_worlds;
@@ -26,4 +26,4 @@ class WorldIds {
   bool all_ = false;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

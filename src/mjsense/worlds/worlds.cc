@@ -14,7 +14,7 @@
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/worlds/ordered_apply.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 namespace {
 
 // Throws if the memory is insufficient. A world needs one mjData and three copies of its state. If
@@ -49,7 +49,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   if (threads < 0 || threads > kMaxThreads)
     throw ValueError(fmt::format("threads is {}: must be 0 (all) to {}", threads, kMaxThreads));
   check_memory(model, num_worlds);
-  install_warning_filter();
+  scene::install_warning_filter();
   mjBatchConfig config;
   mjb_defaultConfig(&config);
   config.nthread = threads > 0 ? threads : available_cpus();
@@ -193,13 +193,13 @@ void Worlds::run(const mjModel* m, mjData* d, int w, void* arg) {
   int before[mjNWARNING];
   for (int i = 0; i < mjNWARNING; ++i)
     before[i] = call.op == Op::kReset ? 0 : d->warning[i].number;  // a reset starts counting at 0
-  drop_warnings(true);
+  scene::drop_warnings(true);
   try {
     call.self->run_world(m, d, w, call);
   } catch (...) {
     call.self->exceptions_[w] = std::current_exception();
   }
-  drop_warnings(false);
+  scene::drop_warnings(false);
   call.self->count_warnings(d, w, before);
   orders_before(arg);
 }
@@ -213,7 +213,7 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
   if (call.op != Op::kVisit) failures_.clear();
   if (ids_.empty()) return;  // MuJoCo would interpret an empty list as all worlds
   apply_ordered(batch_, ids_.data(), static_cast<int>(ids_.size()), run, &call, save ? 1 : 0);
-  drop_warnings(false);  // an error leaves the flag set
+  scene::drop_warnings(false);  // an error leaves the flag set
   report_warnings();
   for (ScratchSlot& bench : scratch_slots_) {  // left as taken by an error
     if (bench.taken.exchange(false)) mj_resetData(model(), bench.data);
@@ -232,4 +232,4 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
   if (first) std::rethrow_exception(first);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -25,7 +25,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/worlds/world_ids.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 // Callbacks inside the parallel pass over worlds, on MuJoCo's threads. Exceptions are caught and
 // rethrown by the call. "Fresh" means that the derived fields up to the given stage belong to the
@@ -212,4 +212,4 @@ class Worlds {
   std::size_t ctrl_begin_ = 0, ctrl_end_ = 0;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

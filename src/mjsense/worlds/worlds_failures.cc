@@ -9,7 +9,7 @@
 #include "mjsense/worlds/state_components.h"
 #include "mjsense/worlds/worlds.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 void Worlds::count_warnings(const mjData* d, int w, const int* before) {
   for (int i = 0; i < mjNWARNING; ++i) {
@@ -75,7 +75,7 @@ std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
     const auto last =
         std::find_if(first, failed.end(), [&](int w) { return reset_key_[w] != call.key; });
     apply_ordered(batch_, &*first, static_cast<int>(last - first), run, &call, 1);
-    drop_warnings(false);
+    scene::drop_warnings(false);
     for (; first != last; ++first) {
       if (!broken_[*first]) continue;
       Failure& failure = *std::ranges::find(failures_, *first, &Failure::world);
@@ -89,4 +89,4 @@ std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
   return fmt::format("world {} {}", failures_[0].world, failures_[0].message);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -5,7 +5,7 @@
 
 #include "mjsense/worlds/worlds.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 
 mjModel Worlds::model_of(int world) const {
   mjModel mine = *model();
@@ -36,4 +36,4 @@ void Worlds::write_model(int world, mjModel* copy) const {
 #undef X
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -7,7 +7,7 @@
 #include "mjsense/worlds/step_stages.h"
 #include "mjsense/worlds/worlds.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 namespace {
 
 // Warnings after which the state of a world is invalid. A bad control is one of them, because
@@ -293,4 +293,4 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   call.hooks->refreshed(view(m, d, w));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::worlds

@@ -19,7 +19,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::worlds {
 namespace {
 
 using ModelPtr = std::unique_ptr<mjModel, decltype(&mj_deleteModel)>;
@@ -1070,4 +1070,4 @@ TEST(Hold, KeepsABodyInPlaceUntilTheReset) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::worlds

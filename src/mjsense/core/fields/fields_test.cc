@@ -11,8 +11,7 @@
 namespace mjsense {
 
 enum class Side { kLeft, kRight };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<Side>{"left", "right"};
+constexpr std::array<std::string_view, 2> enum_names(Side) { return {"left", "right"}; }
 
 namespace fields_test {
 

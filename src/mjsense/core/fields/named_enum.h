@@ -10,10 +10,15 @@
 
 namespace mjsense {
 
-// Words for the values of an enumeration that counts from 0. Specialise next to the enumeration:
-//  template <> inline constexpr std::array<std::string_view, 2> kEnumNames<Side>{"left", "right"};
+// Words for the values of an enumeration that counts from 0. Declare them next to the enumeration, in
+// its namespace:
+//   constexpr std::array<std::string_view, 2> enum_names(Side) { return {"left", "right"}; }
+// For an enumeration of MuJoCo, specialise kEnumNames.
 template <class E>
 inline constexpr std::nullptr_t kEnumNames = nullptr;
+template <class E>
+requires requires { enum_names(E{}); }
+inline constexpr auto kEnumNames<E> = enum_names(E{});
 
 template <class E>
 concept HasEnumNames =

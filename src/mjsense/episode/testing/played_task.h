@@ -9,12 +9,12 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/robots/load_robot.h"
 
-namespace mjsense {
+namespace mjsense::episode {
 
 // With the robot's own periods.
 inline TaskCfg task_cfg(const std::string& robot, const std::string& scene = "") {
   TaskCfg cfg;
-  cfg.robot = robot_cfg(robot);
+  cfg.robot = robots::robot_cfg(robot);
   cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
   cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
   cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
@@ -31,7 +31,7 @@ struct PlayedTask {
   // Starts the episode in world 0.
   void start(std::int64_t episode) {
     mj_resetData(model, data.get());
-    task.sample(0, episode, state_row(data.get()));
+    task.sample(0, episode, robots::state_row(data.get()));
     mj_forward(model, data.get());
     world = {.id = 0, .model = model, .data = data.get()};
     task.begin(world);
@@ -41,10 +41,10 @@ struct PlayedTask {
     void operator()(mjData* d) const { mj_deleteData(d); }
   };
   SomeTask task;
-  Scene scene;
+  scene::Scene scene;
   const mjModel* model = scene.model();
   std::unique_ptr<mjData, Delete> data{mj_makeData(model)};
   World world;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::episode

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::observe {
 
 class TestWorld {
  public:
@@ -52,4 +52,4 @@ std::vector<T> values(const Sensor& sensor, std::string_view field = "", int wor
   return {row.begin(), row.end()};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::observe

@@ -6,7 +6,7 @@
 
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kPressed = 0.86;  // fraction of the lever's range
@@ -38,11 +38,12 @@ Bar bar_of(const mjModel* m, const mjData* d, int g) {
 
 }  // namespace
 
-DoorGeometry::DoorGeometry(const mjModel* m, const mjData* d, const Door& door, Vec3 from) {
+DoorGeometry::DoorGeometry(const mjModel* m, const mjData* d, const scenes::Door& door, Vec3 from) {
   hinge = vec3(d->xanchor + 3 * door.joint);
   hinge_axis = vec3(d->xaxis + 3 * door.joint);
   angle = d->qpos[m->jnt_qposadr[door.joint]];
-  const Vec3 middle = leaf_middle(m, d, door), direction = opening_direction(m, d, door);
+  const Vec3 middle = scenes::leaf_middle(m, d, door),
+             direction = scenes::opening_direction(m, d, door);
   away = dot(from - middle, direction) > 0 ? direction : -direction;
   edge = hinge + 2.0 * Vec3{middle.x - hinge.x, middle.y - hinge.y, 0};
   if (door.handle_joint < 0) return;
@@ -67,13 +68,14 @@ Vec3 DoorGeometry::edge_at(double leaf) const {
   return turned_about(hinge, hinge_axis, leaf) * edge;
 }
 
-std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d, const Door& door,
-                                          const DoorGeometry& geometry, Vec3 closing_in_tool) {
-  const Vec3 middle = leaf_middle(m, d, door);
+std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d,
+                                          const scenes::Door& door, const DoorGeometry& geometry,
+                                          Vec3 closing_in_tool) {
+  const Vec3 middle = scenes::leaf_middle(m, d, door);
   Bar best;
   double longest = 0.02;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!is_descendant_or_self(m, m->geom_bodyid[g], door.handle) ||
+    if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], door.handle) ||
         (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0))
       continue;
     if (door.handle == door.body && m->geom_rbound[g] > 0.3) continue;  // this geom is the leaf
@@ -105,7 +107,7 @@ std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d, con
   return grasps;
 }
 
-Vec3 closing_direction(const mjData* d, const MoveGroup& gripper) {
+Vec3 closing_direction(const mjData* d, const robots::MoveGroup& gripper) {
   const Vec3 a = vec3(d->site_xpos + 3 * gripper.pad_sites[0]),
              b = vec3(d->site_xpos + 3 * gripper.pad_sites[1]);
   const Pose tool =
@@ -113,4 +115,4 @@ Vec3 closing_direction(const mjData* d, const MoveGroup& gripper) {
   return rotate(conjugate(tool.q), normalized(a - b));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -10,7 +10,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/doors.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // The geometry of a door in its current state, world frame, m.
 struct DoorGeometry {
@@ -22,7 +22,7 @@ struct DoorGeometry {
   Vec3 edge;               // free edge of the leaf, at the height of `hinge`
 
   // `from`: position of the robot.
-  DoorGeometry(const mjModel* model, const mjData* data, const Door& door, Vec3 from);
+  DoorGeometry(const mjModel* model, const mjData* data, const scenes::Door& door, Vec3 from);
   // The pose of something attached to the handle after the lever has rotated by `lever` and the
   // hinge by `leaf` rad.
   Pose carried(const Pose& pose, double lever, double leaf) const;
@@ -35,10 +35,10 @@ struct HandleGrasps {
   Pose poses[2];  // X_WT
 };
 std::optional<HandleGrasps> handle_grasps(const mjModel* model, const mjData* data,
-                                          const Door& door, const DoorGeometry& geometry,
+                                          const scenes::Door& door, const DoorGeometry& geometry,
                                           Vec3 closing_in_tool);
 
 // Closing direction of a gripper's pads at its current state, tool frame.
-Vec3 closing_direction(const mjData* data, const MoveGroup& gripper);
+Vec3 closing_direction(const mjData* data, const robots::MoveGroup& gripper);
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/observe/frame.h"
+#include "mjsense/robots/allowed_contact.h"
 #include "mjsense/scenes/robot_floor.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr int kReachIterations = 300;  // of inverse kinematics, for the first configuration
@@ -24,7 +24,7 @@ constexpr double kReachCost = 0.15;                   // joint motion on the pat
 constexpr double kGood = 6;                        // the search stops at a motion with a lower cost
 constexpr double kSwivel = 0.8, kMaxSwivel = 0.9;  // cost per rad^2; limit, rad
 
-Pose pose_of(const BasePose& base, double z) {
+Pose pose_of(const scenes::BasePose& base, double z) {
   return {{base.x, base.y, z}, axis_angle({0, 0, 1}, base.yaw)};
 }
 
@@ -48,7 +48,7 @@ void collide(const mjModel* m, mjData* d) {
 // Plans for one hand, one grasp of the handle and one base pose at the grasp.
 class DoorMotions::Attempt {
  public:
-  Attempt(const DoorMotions& motions, const World& world, const Door& door,
+  Attempt(const DoorMotions& motions, const World& world, const scenes::Door& door,
           const DoorGeometry& geometry, Hand hand, double margin, mjData* scratch)
       : motions_(motions),
         world_(world),
@@ -68,7 +68,7 @@ class DoorMotions::Attempt {
 
   // `swivel`: rotation of the hand about its closing direction, rad; a bar between flat pads
   // permits it.
-  bool run(const Pose& straight, double swivel, const BasePose& base, double leaf,
+  bool run(const Pose& straight, double swivel, const scenes::BasePose& base, double leaf,
            DoorMotion& out) {
     const Pose grasp = swivelled(straight, swivel);
     const DoorMotionCfg& cfg = motions_.cfg_;
@@ -76,7 +76,7 @@ class DoorMotions::Attempt {
     out.hand = hand_;
     out.grasp = grasp;
     const Pose before = moved(grasp, -cfg.before * rotate(grasp.q, {0, 0, 1}));
-    RobotValues values = start_;
+    robots::RobotValues values = start_;
     if (!solve(before, base, values, kReachIterations)) return false;
     reference_ = values;
     for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
@@ -94,7 +94,7 @@ class DoorMotions::Attempt {
         return false;
     }
     const int steps = 1 + static_cast<int>(std::abs(leaf) / cfg.leaf_step);
-    BasePose at = base;
+    scenes::BasePose at = base;
     swivel_ = swivel;
     for (int i = 1; i <= steps; ++i) {
       if (!open_step(straight, leaf * i / steps, leaf * (i - 1) / steps, at, values, out))
@@ -117,11 +117,12 @@ class DoorMotions::Attempt {
     return {tool.p, normalized(axis_angle(rotate(tool.q, closing_), angle) * tool.q)};
   }
 
-  bool solve(const Pose& tool, const BasePose& base, RobotValues& values, int iterations) const {
+  bool solve(const Pose& tool, const scenes::BasePose& base, robots::RobotValues& values,
+             int iterations) const {
     return motions_.robot_.ik(hand_.tool, inverse(pose_of(base, z_)) * tool, values, iterations);
   }
 
-  double limit_cost(const RobotValues& values) const {
+  double limit_cost(const robots::RobotValues& values) const {
     const mjModel* m = motions_.model_;
     double cost = 0;
     for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
@@ -135,7 +136,7 @@ class DoorMotions::Attempt {
     return cost;
   }
 
-  double motion_cost(const RobotValues& from, const RobotValues& to) const {
+  double motion_cost(const robots::RobotValues& from, const robots::RobotValues& to) const {
     double cost = limit_cost(to);
     for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
       const double q = to[hand_.tool].values[i];
@@ -147,20 +148,22 @@ class DoorMotions::Attempt {
     return cost;
   }
 
-  DoorWaypoint waypoint(const RobotValues& values, const BasePose& base, double leaf) const {
+  DoorWaypoint waypoint(const robots::RobotValues& values, const scenes::BasePose& base,
+                        double leaf) const {
     const auto view = values[hand_.tool].values;
     return {
         {view.begin(), view.begin() + static_cast<std::ptrdiff_t>(arm_.joints.size())}, base, leaf};
   }
 
-  bool follow_line(const Pose& from, const Pose& to, const BasePose& base, double leaf,
-                   double lever, RobotValues& values, std::vector<DoorWaypoint>& out) {
+  bool follow_line(const Pose& from, const Pose& to, const scenes::BasePose& base, double leaf,
+                   double lever, robots::RobotValues& values, std::vector<DoorWaypoint>& out) {
     const int steps = 4;
     for (int i = 0; i <= steps; ++i) {
       Pose tool = from;
       tool.p = from.p + (static_cast<double>(i) / steps) * (to.p - from.p);
-      const RobotValues before = values;
-      if (!solve(tool, base, values, i == 0 ? kReachIterations : Chain::kTracking)) return false;
+      const robots::RobotValues before = values;
+      if (!solve(tool, base, values, i == 0 ? kReachIterations : robots::Chain::kTracking))
+        return false;
       if (i > 0 && motion_cost(before, values) > 1e8) return false;
       if (out.empty() && collides(values, base, leaf, lever)) return false;
       out.push_back(waypoint(values, base, leaf));
@@ -168,10 +171,10 @@ class DoorMotions::Attempt {
     return true;
   }
 
-  bool step(const Pose& tool, const BasePose& base, double leaf, double lever, RobotValues& values,
-            std::vector<DoorWaypoint>& out, double& cost) {
-    const RobotValues before = values;
-    if (!solve(tool, base, values, Chain::kTracking)) return false;
+  bool step(const Pose& tool, const scenes::BasePose& base, double leaf, double lever,
+            robots::RobotValues& values, std::vector<DoorWaypoint>& out, double& cost) {
+    const robots::RobotValues before = values;
+    if (!solve(tool, base, values, robots::Chain::kTracking)) return false;
     const double c = motion_cost(before, values);
     if (c > 1e8 || collides(values, base, leaf, lever)) return false;
     cost += c;
@@ -181,12 +184,12 @@ class DoorMotions::Attempt {
 
   // Opens the door by one step. Tries small motions of the base (with the door by 0, half or all of
   // its motion, sideways, rotated) and keeps the one with the lowest cost of the arm's motion.
-  bool open_step(const Pose& grasp, double leaf, double last, BasePose& base, RobotValues& values,
-                 DoorMotion& out) {
+  bool open_step(const Pose& grasp, double leaf, double last, scenes::BasePose& base,
+                 robots::RobotValues& values, DoorMotion& out) {
     struct Choice {
       double cost, swivel;
-      BasePose base;
-      RobotValues values;
+      scenes::BasePose base;
+      robots::RobotValues values;
     };
     const Pose straight = geometry_.carried(grasp, geometry_.press, leaf);
     // The base pose if the base were rigidly attached to the door.
@@ -200,12 +203,13 @@ class DoorMotions::Attempt {
       for (const auto& [dx, dy] :
            {std::pair{0.0, 0.0}, {0.06, 0.0}, {-0.06, 0.0}, {0.0, 0.06}, {0.0, -0.06}}) {
         for (const double spin : {0.0, 0.05, -0.05}) {
-          const BasePose b{base.x + with * (carried.x - base.x) + dx,
-                           base.y + with * (carried.y - base.y) + dy, base.yaw + with * yaw + spin};
+          const scenes::BasePose b{base.x + with * (carried.x - base.x) + dx,
+                                   base.y + with * (carried.y - base.y) + dy,
+                                   base.yaw + with * yaw + spin};
           const double room = motions_.clearance(geometry_, b, leaf);
           if (room < margin_) continue;
           const double drive = std::hypot(b.x - base.x, b.y - base.y),
-                       spun = wrapped(b.yaw - base.yaw);
+                       spun = scenes::wrapped(b.yaw - base.yaw);
           const double tight = std::max(0.0, kComfort - room);
           const double here = kDrive * drive * drive + kTurn * spun * spun + kNear * tight * tight;
           for (const double by : {0.0, 1.0, -1.0}) {
@@ -213,7 +217,7 @@ class DoorMotions::Attempt {
             if (std::abs(swivel) > kMaxSwivel) continue;
             Choice choice{here + kSwivel * (swivel * swivel - swivel_ * swivel_), swivel, b,
                           values};
-            if (!solve(swivelled(straight, swivel), b, choice.values, Chain::kTracking / 4))
+            if (!solve(swivelled(straight, swivel), b, choice.values, robots::Chain::kTracking / 4))
               continue;
             choice.cost += motion_cost(values, choice.values);
             if (choice.cost < 1e8) choices.push_back(choice);
@@ -236,18 +240,19 @@ class DoorMotions::Attempt {
 
   // True if the robot is in collision with anything; contact of the gripper with the handle is
   // allowed.
-  bool collides(const RobotValues& values, const BasePose& base, double leaf, double lever) {
+  bool collides(const robots::RobotValues& values, const scenes::BasePose& base, double leaf,
+                double lever) {
     const mjModel* m = world_.model;  // this world's model: furniture differs between worlds
     mjData* d = scratch_;
     mju_copy(d->qpos, world_.data->qpos, m->nq);
-    const MoveGroup& carrier = motions_.robot_.groups()[motions_.base_group_];
+    const robots::MoveGroup& carrier = motions_.robot_.groups()[motions_.base_group_];
     const double place[3] = {base.x, base.y, base.yaw};
     for (int i = 0; i < 3; ++i) d->qpos[carrier.qpos[i]] = place[i];
     for (std::size_t i = 0; i < arm_.qpos.size(); ++i)
       d->qpos[arm_.qpos[i]] = values[hand_.tool].values[i];
     for (const Hand& other : motions_.hands_) {
       if (other.tool == hand_.tool) continue;
-      const MoveGroup& arm = motions_.robot_.groups()[other.tool];
+      const robots::MoveGroup& arm = motions_.robot_.groups()[other.tool];
       const std::vector<double> q = motions_.tucked(other);
       for (std::size_t i = 0; i < q.size(); ++i) d->qpos[arm.qpos[i]] = q[i];
     }
@@ -255,7 +260,8 @@ class DoorMotions::Attempt {
     if (door_.handle_joint >= 0) d->qpos[m->jnt_qposadr[door_.handle_joint]] += lever;
     collide(m, d);
     const int root = m->body_rootid[motions_.robot_.base_body()];
-    const int palm = motions_.robot_.groups()[hand_.gripper].root_body;
+    const robots::AllowedContact grasp{motions_.robot_.groups()[hand_.gripper].root_body,
+                                       door_.handle};
     for (int c = 0; c < d->ncon; ++c) {
       const mjContact& contact = d->contact[c];
       if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > -motions_.cfg_.depth)
@@ -263,38 +269,35 @@ class DoorMotions::Attempt {
       const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
       const bool first = m->body_rootid[a] == root;
       if (first == (m->body_rootid[b] == root)) continue;
-      const int mine = first ? a : b, other = first ? b : a;
-      if (is_descendant_or_self(m, mine, palm) && is_descendant_or_self(m, other, door_.handle))
-        continue;
-      return true;
+      if (!grasp.permits(m, first ? a : b, first ? b : a)) return true;
     }
     return false;
   }
 
   const DoorMotions& motions_;
   const World& world_;
-  const Door& door_;
+  const scenes::Door& door_;
   const DoorGeometry& geometry_;
   Hand hand_;
   double margin_;
   mjData* scratch_;
-  const MoveGroup& arm_;
+  const robots::MoveGroup& arm_;
   double z_;
   Vec3 closing_;       // closing direction, tool frame
   double swivel_ = 0;  // rad, current rotation of the hand about closing_
-  RobotValues start_, reference_;
+  robots::RobotValues start_, reference_;
 };
 
-DoorMotions::DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor,
+DoorMotions::DoorMotions(const mjModel* model, const robots::Robot& robot, DoorFloor floor,
                          DoorMotionCfg cfg)
-    : base_group_(driving_base(robot)),
+    : base_group_(scenes::driving_base(robot)),
       model_(model),
       robot_(robot),
       floor_(floor),
       cfg_(cfg),
       scratch_(model) {
   for (const Hand& hand : hands_of(robot, model)) {
-    if (robot.groups()[hand.tool].kind == GroupKind::kArm &&
+    if (robot.groups()[hand.tool].kind == robots::GroupKind::kArm &&
         robot.groups()[hand.gripper].pad_sites[0] >= 0)
       hands_.push_back(hand);
   }
@@ -309,12 +312,12 @@ std::vector<double> DoorMotions::tucked(const Hand& hand) const {
   return q;
 }
 
-double DoorMotions::clearance(const DoorGeometry& geometry, const BasePose& base,
+double DoorMotions::clearance(const DoorGeometry& geometry, const scenes::BasePose& base,
                               double leaf) const {
   double minimum = floor_.footprint->clearance(*floor_.floor, base.x, base.y, base.yaw);
   const Vec3 edge = geometry.edge_at(leaf);
   const double c = std::cos(base.yaw), s = std::sin(base.yaw);
-  for (const Disc& disc : floor_.footprint->discs()) {
+  for (const scenes::Disc& disc : floor_.footprint->discs()) {
     const double x = base.x + c * disc.x - s * disc.y, y = base.y + s * disc.x + c * disc.y;
     minimum = std::min(minimum,
                        distance_to_segment(x, y, geometry.hinge, edge) - kLeafHalf - disc.radius);
@@ -322,7 +325,8 @@ double DoorMotions::clearance(const DoorGeometry& geometry, const BasePose& base
   return minimum;
 }
 
-std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) const {
+std::vector<scenes::BasePose> DoorMotions::places(const World& world,
+                                                  const scenes::Door& door) const {
   const DoorGeometry geometry(model_, world.data, door, robot_.base_pose(world).p);
   const Vec3 handle = vec3(world.data->xpos + 3 * door.handle);
   const Vec3 hinge_side =
@@ -330,9 +334,9 @@ std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) 
   // To push the door, the base drives through the doorway; to pull it, the base stays clear of the
   // leaf's path. Preferred offset towards the hinge, m.
   const double wanted =
-      dot(geometry.away, opening_direction(model_, world.data, door)) < 0 ? 0.3 : -0.2;
+      dot(geometry.away, scenes::opening_direction(model_, world.data, door)) < 0 ? 0.3 : -0.2;
   struct Place {
-    BasePose base;
+    scenes::BasePose base;
     double cost;
   };
   std::vector<Place> places;
@@ -340,7 +344,8 @@ std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) 
     for (const double aside : {-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45}) {
       for (const double turned : {0.0, 0.35, -0.35}) {
         const Vec3 p = handle + far * geometry.away + aside * hinge_side;
-        const BasePose base{p.x, p.y, std::atan2(-geometry.away.y, -geometry.away.x) + turned};
+        const scenes::BasePose base{p.x, p.y,
+                                    std::atan2(-geometry.away.y, -geometry.away.x) + turned};
         if (clearance(geometry, base, 0) < cfg_.margin) continue;
         places.push_back(
             {base, std::abs(far - 0.76) + 0.7 * std::abs(aside - wanted) + 0.3 * std::abs(turned)});
@@ -348,15 +353,15 @@ std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) 
     }
   }
   std::ranges::stable_sort(places, {}, &Place::cost);
-  std::vector<BasePose> out;
+  std::vector<scenes::BasePose> out;
   for (const Place& place : places) out.push_back(place.base);
   return out;
 }
 
-std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door,
-                                            const BasePose& base, double leaf, double margin,
-                                            int tool) const {
-  const ScratchData::Loan scratch = scratch_.borrow();
+std::optional<DoorMotion> DoorMotions::plan(const World& world, const scenes::Door& door,
+                                            const scenes::BasePose& base, double leaf,
+                                            double margin, int tool) const {
+  const worlds::ScratchData::Loan scratch = scratch_.borrow();
   mju_copy(scratch->mocap_pos, world.data->mocap_pos, 3 * model_->nmocap);
   mju_copy(scratch->mocap_quat, world.data->mocap_quat, 4 * model_->nmocap);
   const DoorGeometry geometry(model_, world.data, door, robot_.base_pose(world).p);
@@ -380,4 +385,4 @@ std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door
   return best;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

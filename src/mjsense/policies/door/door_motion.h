@@ -14,7 +14,7 @@
 #include "mjsense/scenes/base_planner.h"
 #include "mjsense/worlds/scratch_data.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct DoorMotionCfg {
   double before = 0.10;      // m, from the pregrasp to the handle
@@ -26,7 +26,7 @@ struct DoorMotionCfg {
 
 struct DoorWaypoint {
   std::vector<double> q;  // arm joint positions
-  BasePose base;
+  scenes::BasePose base;
   double leaf = 0;  // rad, hinge rotation since the start
 };
 
@@ -41,38 +41,40 @@ struct DoorMotion {
 
 // The floor without the door leaf, and the footprint of the base.
 struct DoorFloor {
-  const OccupancyGrid* floor;
-  const Footprint* footprint;
+  const scenes::OccupancyGrid* floor;
+  const scenes::Footprint* footprint;
 };
 
 class DoorMotions {
  public:
-  DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor, DoorMotionCfg cfg = {});
+  DoorMotions(const mjModel* model, const robots::Robot& robot, DoorFloor floor,
+              DoorMotionCfg cfg = {});
 
   std::span<const Hand> hands() const { return hands_; }
   // The motion that opens the door by `leaf` rad from its current angle, with the base at `base`
   // for the grasp and at least `margin` m away from walls and leaf afterwards. It is the cheapest
   // over the hands (`tool` >= 0: only this arm) and both grasps of the handle; the other arms are
   // tucked in. Empty if there is none.
-  std::optional<DoorMotion> plan(const World& world, const Door& door, const BasePose& base,
-                                 double leaf, double margin, int tool = -1) const;
+  std::optional<DoorMotion> plan(const World& world, const scenes::Door& door,
+                                 const scenes::BasePose& base, double leaf, double margin,
+                                 int tool = -1) const;
   // Joint positions of an arm that is not used: all at 0, clipped to their ranges.
   std::vector<double> tucked(const Hand& hand) const;
   // Base poses in front of the door from which to grasp the handle, the most promising first.
-  std::vector<BasePose> places(const World& world, const Door& door) const;
+  std::vector<scenes::BasePose> places(const World& world, const scenes::Door& door) const;
   // Clearance (m) of a base at this pose from walls and from the leaf, with the leaf rotated by
   // `leaf` rad.
-  double clearance(const DoorGeometry& geometry, const BasePose& base, double leaf) const;
+  double clearance(const DoorGeometry& geometry, const scenes::BasePose& base, double leaf) const;
 
  private:
   class Attempt;
   int base_group_;
   const mjModel* model_;
-  const Robot& robot_;
+  const robots::Robot& robot_;
   DoorFloor floor_;
   DoorMotionCfg cfg_;
   std::vector<Hand> hands_;
-  mutable ScratchData scratch_;
+  mutable worlds::ScratchData scratch_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -12,17 +12,17 @@
 #include "mjsense/scenes/robot_floor.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
-constexpr Phase kPhases[] = {{"NAVIGATE_TO_DOOR", DoorPlanner::kNavigate},
-                             {"REACH_PRE_GRASP", DoorPlanner::kPregrasp},
-                             {"REACH_GRASP", DoorPlanner::kReach},
-                             {"GRASP_HANDLE", DoorPlanner::kGrasp},
-                             {"OPEN_DOOR", DoorPlanner::kOpen},
-                             {"RELEASE_HANDLE", DoorPlanner::kRelease},
-                             {"COMPLETE", DoorPlanner::kComplete},
-                             {"RECOVERY", DoorPlanner::kRecovery}};
+constexpr episode::Phase kPhases[] = {{"NAVIGATE_TO_DOOR", DoorPlanner::kNavigate},
+                                      {"REACH_PRE_GRASP", DoorPlanner::kPregrasp},
+                                      {"REACH_GRASP", DoorPlanner::kReach},
+                                      {"GRASP_HANDLE", DoorPlanner::kGrasp},
+                                      {"OPEN_DOOR", DoorPlanner::kOpen},
+                                      {"RELEASE_HANDLE", DoorPlanner::kRelease},
+                                      {"COMPLETE", DoorPlanner::kComplete},
+                                      {"RECOVERY", DoorPlanner::kRecovery}};
 constexpr double kThere = 0.06, kThereYaw = 0.1;  // m and rad, from the desired base pose
 constexpr int kPlaces = 2;                        // further base poses tried before a retry
 constexpr std::size_t kReachParts = 16;           // waypoints on the path to the pregrasp
@@ -30,14 +30,14 @@ constexpr std::size_t kParts = 5;  // segments of the opening; progress is check
 
 }  // namespace
 
-std::span<const Phase> DoorPlanner::phases() const { return kPhases; }
+std::span<const episode::Phase> DoorPlanner::phases() const { return kPhases; }
 
 void DoorPlanner::initialize_planner() {
-  door_ = dynamic_cast<const DoorOpeningTask*>(&task());
+  door_ = dynamic_cast<const tasks::DoorOpeningTask*>(&task());
   if (!door_)
     throw ValueError(
         fmt::format("the door planner opens doors; it cannot do task '{}'", task().name()));
-  group_ = driving_base(robot());
+  group_ = scenes::driving_base(robot());
   if (group_ < 0 || !door_->routes())
     throw ValueError(
         fmt::format("the door planner needs a mobile base; robot '{}' has none "
@@ -54,14 +54,14 @@ void DoorPlanner::initialize_planner() {
   margin_.assign(task().num_worlds(), cfg_.margin);
 }
 
-BasePose DoorPlanner::base(const World& world) const {
+scenes::BasePose DoorPlanner::base(const World& world) const {
   const Pose pose = robot().base_pose(world);
   const Vec3 ahead = rotate(pose.q, {1, 0, 0});
   return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
 }
 
 double DoorPlanner::remaining_leaf_angle(const World& world, double goal) const {
-  const Door& door = door_->door(world.id);
+  const scenes::Door& door = door_->door(world.id);
   return door.shut + goal * (door.open - door.shut) -
          world.data->qpos[world.model->jnt_qposadr[door.joint]];
 }
@@ -98,14 +98,14 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
 // Releases the handle, drives back, and returns the arms to their start positions.
 void DoorPlanner::recover(const World& world, Plan& plan) const {
   plan.more = true;
-  const BasePose here = base(world);
+  const scenes::BasePose here = base(world);
   const DoorGeometry geometry(world.model, world.data, door_->door(world.id),
                               robot().base_pose(world).p);
   Segment& open = plan.wait(kRecovery, 0.5);
   std::vector<CommandPath> paths;
   for (const Hand& hand : motions_->hands()) {
     open.grip(hand.gripper, robot().groups()[hand.gripper].open_command);
-    const MoveGroup& arm = robot().groups()[hand.tool];
+    const robots::MoveGroup& arm = robot().groups()[hand.tool];
     CommandPath path;
     path.group = hand.tool;
     path.times = {0, 2.5};
@@ -115,9 +115,10 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
     if (path.points.size() == 2 * arm.qpos.size()) paths.push_back(std::move(path));
   }
   for (const double back : {0.25, 0.12}) {
-    const BasePose off{here.x + back * geometry.away.x, here.y + back * geometry.away.y, here.yaw};
+    const scenes::BasePose off{here.x + back * geometry.away.x, here.y + back * geometry.away.y,
+                               here.yaw};
     if (motions_->clearance(geometry, off, 0) < 0) continue;
-    const BasePose path[] = {here, off};
+    const scenes::BasePose path[] = {here, off};
     plan.move_groups(kRecovery, {base_path(group_, path, cfg_.speeds)});
     break;
   }
@@ -126,17 +127,17 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
 
 // Plans the drive to the first base pose from which the door can be opened.
 bool DoorPlanner::approach(const World& world, double goal, double margin, Plan& plan) {
-  const BasePose here = base(world);
-  const Door& door = door_->door(world.id);
+  const scenes::BasePose here = base(world);
+  const scenes::Door& door = door_->door(world.id);
   int tried = 0;
-  for (const BasePose& place : motions_->places(world, door)) {
+  for (const scenes::BasePose& place : motions_->places(world, door)) {
     if (tried++ >= cfg_.max_places) break;
     const std::optional<DoorMotion> motion =
         motions_->plan(world, door, place, remaining_leaf_angle(world, goal), margin);
     if (!motion) continue;
-    std::vector<BasePose> path;
+    std::vector<scenes::BasePose> path;
     if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
-        std::abs(wrapped(place.yaw - here.yaw)) > kThereYaw) {
+        std::abs(scenes::wrapped(place.yaw - here.yaw)) > kThereYaw) {
       path = door_->routes()->find(here, place);
       // The start or the goal is outside the free floor (in the doorway, next to the open leaf):
       // drive straight.
@@ -176,14 +177,14 @@ void DoorPlanner::tuck(const World& world, const Hand& hand, Segment& segment) c
 
 // Duration (s) of the motion to each waypoint from the previous one.
 std::vector<double> DoorPlanner::seconds(std::span<const DoorWaypoint> waypoints,
-                                         std::span<const double> from, const BasePose& at,
+                                         std::span<const double> from, const scenes::BasePose& at,
                                          double joint_speed) const {
   std::vector<double> out;
   for (std::size_t k = 0; k < waypoints.size(); ++k) {
-    const BasePose& before = k == 0 ? at : waypoints[k - 1].base;
-    const BasePose& base = waypoints[k].base;
+    const scenes::BasePose& before = k == 0 ? at : waypoints[k - 1].base;
+    const scenes::BasePose& base = waypoints[k].base;
     double t = std::max({0.05, std::hypot(base.x - before.x, base.y - before.y) / cfg_.base_speed,
-                         std::abs(wrapped(base.yaw - before.yaw)) / cfg_.base_turn});
+                         std::abs(scenes::wrapped(base.yaw - before.yaw)) / cfg_.base_turn});
     if (k > 0)
       t = std::max(t, std::abs(waypoints[k].leaf - waypoints[k - 1].leaf) / cfg_.leaf_speed);
     for (std::size_t i = 0; i < waypoints[k].q.size(); ++i) {
@@ -198,7 +199,7 @@ std::vector<double> DoorPlanner::seconds(std::span<const DoorWaypoint> waypoints
 // Adds a segment that follows the waypoints.
 void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
                            std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,
-                           std::vector<double>& from, BasePose& at) const {
+                           std::vector<double>& from, scenes::BasePose& at) const {
   CommandPath arm, base;
   arm.group = motion.hand.tool;
   base.group = group_;
@@ -213,7 +214,7 @@ void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
   for (std::size_t k = 0; k < waypoints.size(); ++k) {
     const DoorWaypoint& next = waypoints[k];
     from = next.q;
-    at = {next.base.x, next.base.y, at.yaw + wrapped(next.base.yaw - at.yaw)};
+    at = {next.base.x, next.base.y, at.yaw + scenes::wrapped(next.base.yaw - at.yaw)};
     time += seconds[k];
     add();
   }
@@ -221,12 +222,12 @@ void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
 }
 
 void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& plan) {
-  const MoveGroup& gripper = robot().groups()[motion.hand.gripper];
+  const robots::MoveGroup& gripper = robot().groups()[motion.hand.gripper];
   plan.grasp = motion.grasp;
   std::vector<double> q;
   for (int address : robot().groups()[motion.hand.tool].qpos)
     q.push_back(world.data->qpos[address]);
-  BasePose at = base(world);
+  scenes::BasePose at = base(world);
   const auto add = [&](int phase, std::span<const DoorWaypoint> waypoints,
                        double speed) -> Segment& {
     std::vector<double> times = seconds(waypoints, q, at, speed);
@@ -280,7 +281,7 @@ bool DoorPlanner::gone_wrong(const World& world) const {
   }
   // Once the door is open, a lag no longer matters.
   const double fraction = door_->fraction(world);
-  return fraction < DoorOpeningTask::kOpen + 0.02 && fraction < wanted - cfg_.lag;
+  return fraction < tasks::DoorOpeningTask::kOpen + 0.02 && fraction < wanted - cfg_.lag;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -10,9 +10,11 @@
 #include "mjsense/policies/door/door_motion.h"
 #include "mjsense/policies/planner/task_planner.h"
 
-namespace mjsense {
-
+namespace mjsense::tasks {
 class DoorOpeningTask;
+}  // namespace mjsense::tasks
+
+namespace mjsense::policies {
 
 struct DoorPlannerCfg {
   double open = 0.76;    // goal, fraction of the door's range
@@ -24,7 +26,7 @@ struct DoorPlannerCfg {
   double reach_speed = 1.2, slow_speed = 0.6, press_speed = 0.5, joint_speed = 0.9;
   double leaf_speed = 0.28;  // rad/s
   double close_time = 0.7;   // s
-  BaseSpeeds speeds{0.4, 0.7, 0.4, 0.8};
+  scenes::BaseSpeeds speeds{0.4, 0.7, 0.4, 0.8};
   double base_speed = 0.16, base_turn = 0.3;  // m/s, rad/s, while moving the door
   int max_places = 60;                        // base poses that are tried
 };
@@ -34,7 +36,7 @@ class DoorPlanner final : public TaskPlanner {
   enum PhaseNumber { kNavigate, kPregrasp, kReach, kGrasp, kOpen, kRelease, kComplete, kRecovery };
 
   explicit DoorPlanner(DoorPlannerCfg cfg = {}) : cfg_(cfg) {}
-  std::span<const Phase> phases() const override;
+  std::span<const episode::Phase> phases() const override;
 
  protected:
   void initialize_planner() override;
@@ -46,20 +48,20 @@ class DoorPlanner final : public TaskPlanner {
     int segment;
     double fraction;
   };
-  BasePose base(const World& world) const;
+  scenes::BasePose base(const World& world) const;
   double remaining_leaf_angle(const World& world, double goal) const;
   void recover(const World& world, Plan& plan) const;
   bool approach(const World& world, double goal, double margin, Plan& plan);
   void tuck(const World& world, const Hand& hand, Segment& segment) const;
   void open_door(const World& world, const DoorMotion& motion, Plan& plan);
   std::vector<double> seconds(std::span<const DoorWaypoint> waypoints, std::span<const double> from,
-                              const BasePose& at, double joint_speed) const;
+                              const scenes::BasePose& at, double joint_speed) const;
   void add_path(Plan& plan, int phase, const DoorMotion& motion,
                 std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,
-                std::vector<double>& from, BasePose& at) const;
+                std::vector<double>& from, scenes::BasePose& at) const;
 
   DoorPlannerCfg cfg_;
-  const DoorOpeningTask* door_ = nullptr;
+  const tasks::DoorOpeningTask* door_ = nullptr;
   int group_ = -1;  // move group of the base
   std::unique_ptr<DoorMotions> motions_;
   std::vector<int> tool_;       // [B] arm that is to grasp the handle
@@ -69,4 +71,4 @@ class DoorPlanner final : public TaskPlanner {
   std::vector<std::vector<Expected>> expected_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -10,12 +10,12 @@
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
-struct DoorPlan : testing::Test, PlayedTask<DoorOpeningTask> {
-  static TaskCfg cfg() {
-    TaskCfg cfg = task_cfg("rby1");
+struct DoorPlan : testing::Test, episode::PlayedTask<tasks::DoorOpeningTask> {
+  static episode::TaskCfg cfg() {
+    episode::TaskCfg cfg = episode::task_cfg("rby1");
     cfg.horizon = 400;
     return cfg;
   }
@@ -25,7 +25,7 @@ struct DoorPlan : testing::Test, PlayedTask<DoorOpeningTask> {
 // DoorGeometry::carried() agrees with MuJoCo's kinematics of the door joints.
 TEST_F(DoorPlan, HandleMotionAgreesWithMuJoCosKinematics) {
   start(0);
-  const Door& door = task.door(0);
+  const scenes::Door& door = task.door(0);
   const DoorGeometry geometry(model, data.get(), door, task.robot().base_pose(world).p);
   const Pose handle{vec3(data->xpos + 3 * door.handle), quat(data->xquat + 4 * door.handle)};
   const double leaf = 0.6 * (door.open - door.shut);
@@ -42,14 +42,14 @@ TEST_F(DoorPlan, GraspsCloseAcrossTheBarOnTheRobotsSide) {
   for (int episode = 0; episode < 8; ++episode) {
     start(episode);
     sides.insert(task.push(0));
-    const Door& door = task.door(0);
+    const scenes::Door& door = task.door(0);
     const DoorGeometry geometry(model, data.get(), door, task.robot().base_pose(world).p);
-    const MoveGroup& gripper = task.robot().group("right_gripper");
+    const robots::MoveGroup& gripper = task.robot().group("right_gripper");
     const Vec3 closing = closing_direction(data.get(), gripper);
     const auto grasps = handle_grasps(model, data.get(), door, geometry, closing);
     ASSERT_TRUE(grasps);
     for (const Pose& pose : grasps->poses) {
-      EXPECT_GT(dot(pose.p - leaf_middle(model, data.get(), door), geometry.away), 0.04);
+      EXPECT_GT(dot(pose.p - scenes::leaf_middle(model, data.get(), door), geometry.away), 0.04);
       EXPECT_NEAR(dot(rotate(pose.q, {0, 0, 1}), geometry.away), -1, 1e-9)
           << "the approach is perpendicular to the leaf";
       EXPECT_NEAR(std::abs(rotate(pose.q, closing).z), 1, 1e-6)
@@ -72,4 +72,4 @@ TEST_F(DoorPlan, OpensTheDoor) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -11,30 +11,31 @@
 #include "mjsense/scenes/robot_floor.h"
 #include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
-constexpr Phase kPhases[] = {{"navigate", 0}};
+constexpr episode::Phase kPhases[] = {{"navigate", 0}};
 constexpr double kLook = 0.4;        // rad, turn to each side
 constexpr double kElsewhere = 0.35;  // m, minimum distance from poses that were tried
 constexpr int kLooks = 2;
 
 }  // namespace
 
-CommandPath base_path(int group, std::span<const BasePose> poses, const BaseSpeeds& speeds) {
+CommandPath base_path(int group, std::span<const scenes::BasePose> poses,
+                      const scenes::BaseSpeeds& speeds) {
   CommandPath path;
   path.group = group;
-  for (const TimedBasePose& one : timed(poses, speeds)) {
+  for (const scenes::TimedBasePose& one : scenes::timed(poses, speeds)) {
     path.times.push_back(one.time);
     path.points.insert(path.points.end(), {one.pose.x, one.pose.y, one.pose.yaw});
   }
   return path;
 }
 
-std::span<const Phase> NavPlanner::phases() const { return kPhases; }
+std::span<const episode::Phase> NavPlanner::phases() const { return kPhases; }
 
 void NavPlanner::initialize_planner() {
-  nav_ = dynamic_cast<const NavToObjTask*>(&task());
+  nav_ = dynamic_cast<const tasks::NavToObjTask*>(&task());
   if (!nav_)
     throw ValueError(fmt::format("the navigation planner drives to objects; it cannot do task '{}'",
                                  task().name()));
@@ -43,23 +44,23 @@ void NavPlanner::initialize_planner() {
         fmt::format("the navigation planner needs a mobile base; robot '{}' has none "
                     "(see `mjsense robots`)",
                     robot().name()));
-  group_ = driving_base(robot());
+  group_ = scenes::driving_base(robot());
   tried_.assign(task().num_worlds(), {});
 }
 
-BasePose NavPlanner::base(const World& world) const {
+scenes::BasePose NavPlanner::base(const World& world) const {
   const Pose pose = robot().base_pose(world);
   const Vec3 ahead = rotate(pose.q, {1, 0, 0});
   return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
 }
 
-bool NavPlanner::is_goal_pose(const World& world, const BasePose& there, const Pose& camera_in_base,
-                              double arrive, double facing) const {
+bool NavPlanner::is_goal_pose(const World& world, const scenes::BasePose& there,
+                              const Pose& camera_in_base, double arrive, double facing) const {
   if (nav_->distance(world, there.x, there.y) > arrive) return false;
   const double* at = world.data->xpos + 3 * nav_->objects(world.id)[0].body;
-  if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > facing)
+  if (std::abs(scenes::wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > facing)
     return false;
-  for (const BasePose& tried : tried_[world.id]) {
+  for (const scenes::BasePose& tried : tried_[world.id]) {
     if (std::hypot(tried.x - there.x, tried.y - there.y) < kElsewhere) return false;
   }
   const Pose base{{there.x, there.y, 0}, axis_angle({0, 0, 1}, there.yaw)};
@@ -69,7 +70,7 @@ bool NavPlanner::is_goal_pose(const World& world, const BasePose& there, const P
 void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   auto& tried = tried_[world.id];
   if (request.stage == 0 && request.attempt == 0) tried.clear();
-  const BasePose here = base(world);
+  const scenes::BasePose here = base(world);
   const Pose camera_in_base = inverse(robot().base_pose(world)) * nav_->camera_pose(world);
   if (nav_->distance(world, here.x, here.y) < cfg_.arrive + 0.2 &&
       nav_->sees(world, nav_->camera_pose(world))) {
@@ -78,26 +79,27 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   }
   plan.more = true;
   if (request.stage > 0 && request.stage % (kLooks + 1) != 0) {
-    const BasePose aside{here.x, here.y, here.yaw + (request.stage % 2 == 1 ? kLook : -2 * kLook)};
+    const scenes::BasePose aside{here.x, here.y,
+                                 here.yaw + (request.stage % 2 == 1 ? kLook : -2 * kLook)};
     if (nav_->routes()->free_between(here, aside)) {
-      const BasePose path[] = {here, aside};
+      const scenes::BasePose path[] = {here, aside};
       plan.move_groups(0, {base_path(group_, path, cfg_.speeds)}, 0.2);
       return;
     }
   }
   if (request.stage > 0) tried.push_back(here);
-  std::vector<BasePose> path;
+  std::vector<scenes::BasePose> path;
   // The last resort is any pose that counts as success: farther away, or with the object near the
   // image border.
   struct Wanted {
     double arrive, facing;
   };
   for (const Wanted& wanted : {Wanted{cfg_.arrive, cfg_.facing}, Wanted{cfg_.reach, cfg_.facing},
-                               Wanted{NavToObjTask::kNearby, std::numbers::pi}}) {
+                               Wanted{tasks::NavToObjTask::kNearby, std::numbers::pi}}) {
     if (path.size() > 1) break;
     path = nav_->routes()->find(
         here,
-        [&](const BasePose& p) {
+        [&](const scenes::BasePose& p) {
           return is_goal_pose(world, p, camera_in_base, wanted.arrive, wanted.facing);
         },
         [&](double x, double y) {
@@ -113,10 +115,10 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
 }
 
 bool NavPlanner::gone_wrong(const World& world) const {
-  const GroupValues& target = robot().targets(world.id)[group_];
+  const robots::GroupValues& target = robot().targets(world.id)[group_];
   if (!target.given || target.size < 2) return false;
-  const BasePose here = base(world);
+  const scenes::BasePose here = base(world);
   return std::hypot(target.values[0] - here.x, target.values[1] - here.y) > cfg_.astray;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -11,22 +11,24 @@
 #include "mjsense/policies/planner/task_planner.h"
 #include "mjsense/scenes/base_planner.h"
 
-namespace mjsense {
-
+namespace mjsense::tasks {
 class NavToObjTask;
+}  // namespace mjsense::tasks
+
+namespace mjsense::policies {
 
 struct NavPlannerCfg {
   double arrive = 1.1;   // m, distance to the object at the goal
   double reach = 1.4;    // m, maximum distance if the base cannot come closer
   double facing = 0.45;  // rad, maximum angle between heading and object
   double astray = 0.35;  // m, distance of the base from its command that triggers a new plan
-  BaseSpeeds speeds;
+  scenes::BaseSpeeds speeds;
 };
 
 class NavPlanner final : public TaskPlanner {
  public:
   explicit NavPlanner(NavPlannerCfg cfg = {}) : cfg_(cfg) {}
-  std::span<const Phase> phases() const override;
+  std::span<const episode::Phase> phases() const override;
   bool has_grasp_pose() const override { return false; }
 
  protected:
@@ -35,17 +37,19 @@ class NavPlanner final : public TaskPlanner {
   bool gone_wrong(const World& world) const override;
 
  private:
-  BasePose base(const World& world) const;
-  bool is_goal_pose(const World& world, const BasePose& there, const Pose& camera_in_base,
+  scenes::BasePose base(const World& world) const;
+  bool is_goal_pose(const World& world, const scenes::BasePose& there, const Pose& camera_in_base,
                     double arrive, double facing) const;
 
   NavPlannerCfg cfg_;
-  const NavToObjTask* nav_ = nullptr;
-  int group_ = -1;                            // move group of the base
-  std::vector<std::vector<BasePose>> tried_;  // [B] poses from which the object was not visible
+  const tasks::NavToObjTask* nav_ = nullptr;
+  int group_ = -1;  // move group of the base
+  std::vector<std::vector<scenes::BasePose>>
+      tried_;  // [B] poses from which the object was not visible
 };
 
 // Timed path of the base group's commands (x, y, yaw) through the poses `poses`.
-CommandPath base_path(int group, std::span<const BasePose> poses, const BaseSpeeds& speeds);
+CommandPath base_path(int group, std::span<const scenes::BasePose> poses,
+                      const scenes::BaseSpeeds& speeds);
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

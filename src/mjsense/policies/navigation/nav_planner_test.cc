@@ -9,17 +9,17 @@
 #include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 #include "mjsense/tasks/pick/pick.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
-TaskCfg of(const char* robot) {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg(robot);
+episode::TaskCfg of(const char* robot) {
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg(robot);
   cfg.policy_dt_ms = 200;
   return cfg;
 }
 
-struct Driven : PlayedTask<NavToObjTask> {
+struct Driven : episode::PlayedTask<tasks::NavToObjTask> {
   explicit Driven(const char* robot) : PlayedTask(of(robot)) { task.register_policy(planner); }
   NavPlanner planner;
 };
@@ -50,10 +50,10 @@ TEST(NavPlanner, PlansAgainIfTheBaseIsFarFromItsCommand) {
   Driven d("rby1");
   d.start(0);
   d.planner.reset(d.world);
-  Action action;
+  robots::Action action;
   d.planner.act(d.world, action);
-  d.task.apply(d.world, action, state_row(d.data.get()));
-  const GroupValues& sent = d.task.robot().targets(0)[d.task.robot().group_index("base")];
+  d.task.apply(d.world, action, robots::state_row(d.data.get()));
+  const robots::GroupValues& sent = d.task.robot().targets(0)[d.task.robot().group_index("base")];
   const auto& base = d.task.robot().group("base").qpos;
   for (const double push : {0.3, 0.4}) {
     d.data->qpos[base[0]] = sent.values[0] + push;
@@ -65,17 +65,17 @@ TEST(NavPlanner, PlansAgainIfTheBaseIsFarFromItsCommand) {
 }
 
 TEST(NavPlanner, RejectsUnsupportedTasksAndRobots) {
-  PickTask pick(of("mobile_franka"));
-  Scene scene(pick.scene_cfg_with_robot());
+  tasks::PickTask pick(of("mobile_franka"));
+  scene::Scene scene(pick.scene_cfg_with_robot());
   pick.initialize(scene.model(), 1);
   NavPlanner planner;
   EXPECT_THROW(pick.register_policy(planner), ValueError);
-  NavToObjTask task(of("franka"));
-  Scene floor(task.scene_cfg_with_robot());
+  tasks::NavToObjTask task(of("franka"));
+  scene::Scene floor(task.scene_cfg_with_robot());
   task.initialize(floor.model(), 1);
   NavPlanner other;
   EXPECT_THROW(task.register_policy(other), ValueError) << "the base is not mobile";
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -8,7 +8,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/navigation/nav_planner.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kStep = 0.12;               // m, grid of base poses
@@ -19,7 +19,7 @@ constexpr int kMaxTried = 16;                // reachable base poses for which w
 constexpr double kMargin = 0.015;            // m, clearance along the path
 constexpr double kFloor = 0.05;              // m; the base drives over what is lower
 constexpr double kSettle = 0.3;              // s
-constexpr BaseSpeeds kSpeeds{0.25, 0.5, 0.25, 0.5};
+constexpr scenes::BaseSpeeds kSpeeds{0.25, 0.5, 0.25, 0.5};
 
 struct Shift {
   double x, y, turn;  // in the base's frame
@@ -41,10 +41,10 @@ std::vector<Shift> nearest_first() {
 
 }  // namespace
 
-BaseReposition::BaseReposition(const mjModel* model, const Robot& robot)
+BaseReposition::BaseReposition(const mjModel* model, const robots::Robot& robot)
     : model_(model),
       robot_(robot),
-      group_(driving_base(robot)),
+      group_(scenes::driving_base(robot)),
       collisions_(model, robot, robot.groups()[group_].joints),
       scratch_(model) {}
 
@@ -59,7 +59,7 @@ bool BaseReposition::plan(const World& world, int phase, const std::optional<Hel
   if (held) query.hold(held->hand.tool, held->hand.gripper, held->body, held->tool_object);
   query.set_margin(kMargin);
   if (!query.free(from)) query.set_margin(0);
-  const ScratchData::Loan scratch = scratch_.borrow();
+  const worlds::ScratchData::Loan scratch = scratch_.borrow();
   World there = world;
   there.data = scratch.get();
   scratch->time = world.data->time;
@@ -80,7 +80,7 @@ bool BaseReposition::plan(const World& world, int phase, const std::optional<Hel
       mj_kinematics(world.model, scratch.get());
     }
     if (works(there)) {
-      const BasePose path[] = {{from[0], from[1], from[2]}, {to[0], to[1], to[2]}};
+      const scenes::BasePose path[] = {{from[0], from[1], from[2]}, {to[0], to[1], to[2]}};
       Segment& segment = plan.move_groups(phase, {base_path(group_, path, kSpeeds)}, kSettle);
       if (held) segment.holds(held->hand.gripper);
       return true;
@@ -90,4 +90,4 @@ bool BaseReposition::plan(const World& world, int phase, const std::optional<Hel
   return false;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

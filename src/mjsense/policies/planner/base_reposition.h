@@ -10,7 +10,7 @@
 #include "mjsense/policies/planner/plan_follower.h"
 #include "mjsense/scenes/robot_floor.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 class BaseReposition {
  public:
@@ -20,7 +20,8 @@ class BaseReposition {
     Pose tool_object;  // X_TO
   };
 
-  BaseReposition(const mjModel* model, const Robot& robot);  // requires driving_base(robot) >= 0
+  BaseReposition(const mjModel* model,
+                 const robots::Robot& robot);  // requires driving_base(robot) >= 0
 
   // Adds a segment that drives to the nearest base pose for which `works` returns true and whose
   // path is free of collisions. `works` receives a world with the base at that pose, in which only
@@ -30,10 +31,10 @@ class BaseReposition {
 
  private:
   const mjModel* model_;
-  const Robot& robot_;
+  const robots::Robot& robot_;
   int group_;
   CollisionModel collisions_;
-  ScratchData scratch_;
+  worlds::ScratchData scratch_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -6,7 +6,7 @@
 #include "mjsense/policies/planner/testing/table_scene.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 // RB-Y1 in front of a table.
@@ -47,7 +47,7 @@ TEST_F(Shifted, RejectsPosesInsideTheTable) {
 
 TEST_F(Shifted, HeldObjectsMoveWithTheBase) {
   const mjModel* m = stage.world.model;
-  const int block = object_id(m, mjOBJ_BODY, "test", "red_block/red_block");
+  const int block = observe::object_id(m, mjOBJ_BODY, "test", "red_block/red_block");
   const Hand hand = hands_of(stage.robot(), m).at(0);
   const Pose tool_object{{0, 0, 0.02}, {}};
   Plan plan;
@@ -63,4 +63,4 @@ TEST_F(Shifted, HeldObjectsMoveWithTheBase) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -6,7 +6,7 @@
 
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kTurnStep = 0.04;    // rad between two configurations that are checked
@@ -37,7 +37,8 @@ double distance(const mjModel* m, mjData* d, int a, int b, double maximum) {
 
 }  // namespace
 
-CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::vector<int> joints)
+CollisionModel::CollisionModel(const mjModel* model, const robots::Robot& robot,
+                               std::vector<int> joints)
     : robot_(&robot), joints_(std::move(joints)), scratch_(model) {
   const int root = model->body_rootid[robot.base_body()];
   std::vector<char> moves(model->nbody, 0);
@@ -56,7 +57,7 @@ CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::ve
     if (!of_robot && !moves[body]) scene_.push_back(g);
   }
   // Pairs of links in contact at the start configuration are exempt from collision checks.
-  const ScratchData::Loan loan = scratch_.borrow();
+  const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* d = loan.get();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const auto& init = robot.cfg().groups[g].init;
@@ -86,7 +87,8 @@ CollisionQuery::CollisionQuery(CollisionModel& model, const World& world)
 }
 
 void CollisionQuery::ignore(int body) {
-  std::erase_if(scene_, [&](int g) { return is_descendant_or_self(m_, m_->geom_bodyid[g], body); });
+  std::erase_if(
+      scene_, [&](int g) { return observe::is_descendant_or_self(m_, m_->geom_bodyid[g], body); });
 }
 
 void CollisionQuery::ignore_below(double height) {
@@ -101,8 +103,7 @@ void CollisionQuery::ignore_below(double height) {
 }
 
 void CollisionQuery::allow(int gripper, int body) {
-  allowed_gripper_.push_back(cm_.robot_->groups()[gripper].root_body);
-  allowed_body_.push_back(body);
+  allowed_.push_back({cm_.robot_->groups()[gripper].root_body, body});
 }
 
 void CollisionQuery::hold(int tool, int gripper, int body, const Pose& tool_object) {
@@ -110,12 +111,11 @@ void CollisionQuery::hold(int tool, int gripper, int body, const Pose& tool_obje
   mj_kinematics(m_, d_);
   Held& held = held_.emplace_back();
   held.site = cm_.robot_->groups()[tool].leaf_site;
-  held.gripper_body = cm_.robot_->groups()[gripper].root_body;
-  held.body = body;
+  held.contact = {cm_.robot_->groups()[gripper].root_body, body};
   held.tool_object = tool_object;
   const Pose object{vec3(d_->xpos + 3 * body), quat(d_->xquat + 4 * body)};
   for (int g = 0; g < m_->ngeom; ++g) {
-    if (!is_solid(m_, g) || !is_descendant_or_self(m_, m_->geom_bodyid[g], body)) continue;
+    if (!is_solid(m_, g) || !observe::is_descendant_or_self(m_, m_->geom_bodyid[g], body)) continue;
     held.geoms.push_back(g);
     held.object_geom.push_back(inverse(object) *
                                pose_from_mat(d_->geom_xpos + 3 * g, d_->geom_xmat + 9 * g));
@@ -123,12 +123,12 @@ void CollisionQuery::hold(int tool, int gripper, int body, const Pose& tool_obje
 }
 
 void CollisionQuery::open(int gripper) {
-  const MoveGroup& group = cm_.robot_->groups()[gripper];
+  const robots::MoveGroup& group = cm_.robot_->groups()[gripper];
   const auto& init = cm_.robot_->cfg().groups[gripper].init;
   for (int j = 0; j < m_->njnt; ++j) {
     const int type = m_->jnt_type[j];
     if ((type != mjJNT_HINGE && type != mjJNT_SLIDE) ||
-        !is_descendant_or_self(m_, m_->jnt_bodyid[j], group.root_body))
+        !observe::is_descendant_or_self(m_, m_->jnt_bodyid[j], group.root_body))
       continue;
     const int qpos = m_->jnt_qposadr[j];
     d_->qpos[qpos] = m_->qpos0[qpos];
@@ -183,21 +183,17 @@ bool CollisionQuery::hit(int a, int b) {
   return true;
 }
 
-bool CollisionQuery::is_robot_allowed(int geom, int other) const {
-  for (std::size_t i = 0; i < allowed_body_.size(); ++i) {
-    if (is_descendant_or_self(m_, m_->geom_bodyid[other], allowed_body_[i]) &&
-        is_descendant_or_self(m_, m_->geom_bodyid[geom], allowed_gripper_[i]))
-      return true;
-  }
-  return false;
-}
-
 bool CollisionQuery::free_here() {
   mj_kinematics(m_, d_);
   move_held();
+  const auto is_allowed = [&](int g, int other) {
+    return std::ranges::any_of(allowed_, [&](const robots::AllowedContact& contact) {
+      return contact.permits(m_, m_->geom_bodyid[g], m_->geom_bodyid[other]);
+    });
+  };
   for (int g : cm_.moving_) {
     for (int other : scene_) {
-      if (may_touch(m_, g, other) && hit(g, other) && !is_robot_allowed(g, other)) return false;
+      if (may_touch(m_, g, other) && hit(g, other) && !is_allowed(g, other)) return false;
     }
   }
   for (const auto& [a, b] : cm_.self_) {
@@ -209,7 +205,7 @@ bool CollisionQuery::free_here() {
         if (may_touch(m_, g, other) && hit(g, other)) return false;
       }
       for (int other : cm_.moving_) {
-        if (!is_descendant_or_self(m_, m_->geom_bodyid[other], held.gripper_body) && hit(g, other))
+        if (!held.contact.permits(m_, m_->geom_bodyid[other], m_->geom_bodyid[g]) && hit(g, other))
           return false;
       }
     }
@@ -240,4 +236,4 @@ bool CollisionQuery::free_between(std::span<const double> from, std::span<const 
   return true;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

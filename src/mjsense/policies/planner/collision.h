@@ -9,28 +9,29 @@
 #include <utility>
 #include <vector>
 
+#include "mjsense/robots/allowed_contact.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/worlds/scratch_data.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // The pairs of geoms to check for a robot whose planned joints move, and scratch data for queries.
 class CollisionModel {
  public:
   // `joints`: ids of hinges and slides; a configuration is their positions in this order. A free
   // joint cannot be one of them; CollisionQuery::place_base moves it.
-  CollisionModel(const mjModel* model, const Robot& robot, std::vector<int> joints);
+  CollisionModel(const mjModel* model, const robots::Robot& robot, std::vector<int> joints);
 
   std::span<const int> joints() const { return joints_; }
 
  private:
   friend class CollisionQuery;
 
-  const Robot* robot_;
+  const robots::Robot* robot_;
   std::vector<int> joints_;
   std::vector<int> moving_, scene_;        // geom ids
   std::vector<std::pair<int, int>> self_;  // link geoms that are not in contact at the start
-  ScratchData scratch_;
+  worlds::ScratchData scratch_;
 };
 
 // Queries about the current state of one world, for use by one thread.
@@ -67,17 +68,17 @@ class CollisionQuery {
   void move_held();
   bool near_enough(int moving, int other) const;
   bool hit(int a, int b);
-  bool is_robot_allowed(int geom, int other) const;
 
   CollisionModel& cm_;
   const mjModel* m_;
-  ScratchData::Loan loan_;
+  worlds::ScratchData::Loan loan_;
   mjData* d_;
   double margin_ = 0;
   std::vector<int> scene_;  // geoms that are checked
-  std::vector<int> allowed_gripper_, allowed_body_;
+  std::vector<robots::AllowedContact> allowed_;
   struct Held {
-    int site = -1, gripper_body = -1, body = -1;
+    int site = -1;
+    robots::AllowedContact contact;
     Pose tool_object;
     std::vector<int> geoms;
     std::vector<Pose> object_geom;  // X_OG
@@ -87,4 +88,4 @@ class CollisionQuery {
   std::pair<int, int> touching_{-1, -1};
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

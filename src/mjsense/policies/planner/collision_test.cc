@@ -9,14 +9,14 @@
 #include "mjsense/policies/planner/testing/table_scene.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 // Reference: mj_collision on the whole model, counting penetrating contacts between robot and
 // scene.
 bool mujoco_says_free(const TableStage& stage, std::span<const double> q, mjData* d) {
   const mjModel* m = stage.world.model;
-  const Robot& robot = stage.robot();
+  const robots::Robot& robot = stage.robot();
   mju_copy(d->qpos, stage.world.data->qpos, m->nq);
   mju_copy(d->mocap_pos, stage.world.data->mocap_pos, 3 * m->nmocap);
   mju_copy(d->mocap_quat, stage.world.data->mocap_quat, 4 * m->nmocap);
@@ -39,8 +39,8 @@ bool mujoco_says_free(const TableStage& stage, std::span<const double> q, mjData
 // ones are self-collisions of the robot.
 TEST(Collision, AgreesWithMuJoCo) {
   TableStage stage("franka");
-  const Robot& robot = stage.robot();
-  const Chain& chain = robot.chain(robot.arm());
+  const robots::Robot& robot = stage.robot();
+  const robots::Chain& chain = robot.chain(robot.arm());
   CollisionModel model(stage.world.model, robot, {chain.joints().begin(), chain.joints().end()});
   CollisionQuery query(model, stage.world);
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> d(mj_makeData(stage.world.model),
@@ -67,25 +67,26 @@ TEST(Collision, AgreesWithMuJoCo) {
 TEST(Collision, StartConfigurationsAreCollisionFree) {
   for (const char* name : {"franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "rby1"}) {
     TableStage stage(name);
-    const Robot& robot = stage.robot();
-    const Chain& chain = robot.chain(robot.arm());
+    const robots::Robot& robot = stage.robot();
+    const robots::Chain& chain = robot.chain(robot.arm());
     CollisionModel model(stage.world.model, robot, {chain.joints().begin(), chain.joints().end()});
     CollisionQuery query(model, stage.world);
     EXPECT_TRUE(query.free_here())
-        << name << ": " << name_of(stage.world.model, mjOBJ_GEOM, query.touching().first) << ", "
-        << name_of(stage.world.model, mjOBJ_GEOM, query.touching().second);
+        << name << ": " << scene::name_of(stage.world.model, mjOBJ_GEOM, query.touching().first)
+        << ", " << scene::name_of(stage.world.model, mjOBJ_GEOM, query.touching().second);
   }
 }
 
 // A held block is free 3 cm above the table and in collision 3 cm below its surface.
 TEST(Collision, AHeldObjectMovesWithTheTool) {
   TableStage stage("franka");
-  const Robot& robot = stage.robot();
+  const robots::Robot& robot = stage.robot();
   const int arm = robot.arm(), gripper = robot.gripper();
-  const Chain& chain = robot.chain(arm);
-  const int block = object_id(stage.world.model, mjOBJ_BODY, "test", "red_block/red_block");
+  const robots::Chain& chain = robot.chain(arm);
+  const int block =
+      observe::object_id(stage.world.model, mjOBJ_BODY, "test", "red_block/red_block");
   const Pose down{{0.5, 0.0, 0.75}, {0, 1, 0, 0}};
-  RobotValues values;
+  robots::RobotValues values;
   robot.read_qpos(stage.world, values);
   ASSERT_TRUE(robot.ik(arm, down, values));
   CollisionModel model(stage.world.model, robot, {chain.joints().begin(), chain.joints().end()});
@@ -104,4 +105,4 @@ TEST(Collision, AHeldObjectMovesWithTheTool) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 class FailedGrasps {
  public:
@@ -29,4 +29,4 @@ class FailedGrasps {
   std::vector<Pose> grasps_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 TEST(FailedGrasps, MatchesSimilarGraspsAndSwappedFingers) {
@@ -23,4 +23,4 @@ TEST(FailedGrasps, MatchesSimilarGraspsAndSwappedFingers) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

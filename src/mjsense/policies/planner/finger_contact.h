@@ -9,7 +9,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 constexpr double kSideGap = 0.006;      // m, gap on each side of the object before closing
 constexpr double kMinSideGap = 0.0025;  // m, the same for grippers with a small maximum opening
@@ -72,4 +72,4 @@ inline FingerContact measure_finger_contact(std::span<const Vec3> points, Vec3 c
   return s;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kRadius = 0.016, kHalfWidth = 0.008, kHalfLength = 0.009;  // m
@@ -53,4 +53,4 @@ TEST(FingerContact, SlopeIsInfiniteForOneRowOfPoints) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -12,7 +12,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/planner/finger_contact.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using std::numbers::pi;
@@ -31,9 +31,9 @@ struct DataDelete {
 
 }  // namespace
 
-GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper) {
-  const MoveGroup& group = robot.groups()[gripper];
-  const MoveGroupCfg& cfg = robot.cfg().groups[gripper];
+GripperShape::GripperShape(const mjModel* model, const robots::Robot& robot, int gripper) {
+  const robots::MoveGroup& group = robot.groups()[gripper];
+  const robots::MoveGroupCfg& cfg = robot.cfg().groups[gripper];
   const std::unique_ptr<mjData, DataDelete> data(call_mujoco(mj_makeData, model));
   for (std::size_t i = 0; i < cfg.init.size(); ++i) data->qpos[group.qpos[i]] = cfg.init[i];
   mj_kinematics(model, data.get());
@@ -52,7 +52,7 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   Vec3 low{1, 1, 1}, high{-1, -1, -1};
   for (int g = 0; g < model->ngeom; ++g) {
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    if (!is_descendant_or_self(model, model->geom_bodyid[g], group.root_body)) continue;
+    if (!observe::is_descendant_or_self(model, model->geom_bodyid[g], group.root_body)) continue;
     const double* aabb = model->geom_aabb + 6 * g;
     const Pose pose = inverse(world_tool) *
                       pose_from_mat(data->geom_xpos + 3 * g, data->geom_xmat + 9 * g) *
@@ -78,7 +78,7 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   if (high.z < pad_half_length - kSameEnd) pad_middle = high.z - pad_half_length;
 }
 
-bool GripperShape::hits(const Pose& tool, const Pose& object, const ObjectShape& shape,
+bool GripperShape::hits(const Pose& tool, const Pose& object, const episode::ObjectShape& shape,
                         double margin) const {
   const Pose tool_object = inverse(tool) * object;
   if (norm(tool_object.p - center) > radius + shape.reach + margin) return false;
@@ -101,7 +101,7 @@ bool GripperShape::hits(const Pose& tool, const Pose& object, const ObjectShape&
   return false;
 }
 
-std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape& shape,
+std::vector<Grasp> propose_grasps(const GripperShape& gripper, const episode::ObjectShape& shape,
                                   const Pose& object, double support_height, const Pose& tool) {
   std::vector<Vec3> points;
   points.reserve(shape.points.size());
@@ -156,4 +156,4 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
   return grasps;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

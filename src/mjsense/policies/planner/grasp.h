@@ -12,7 +12,7 @@
 #include "mjsense/episode/object_shape.h"
 #include "mjsense/robots/robot.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // The open gripper: boxes in the tool frame.
 struct GripperShape {
@@ -34,11 +34,12 @@ struct GripperShape {
   Quat turn;  // q_TG
 
   // From the colliding geoms of the gripper group at its start configuration.
-  GripperShape(const mjModel* model, const Robot& robot, int gripper);
+  GripperShape(const mjModel* model, const robots::Robot& robot, int gripper);
   // Height (m) of the lowest corner of a box in the world.
   double lowest(const Pose& tool) const;
   // True if a point of the object is within `margin` of a box.
-  bool hits(const Pose& tool, const Pose& object, const ObjectShape& shape, double margin) const;
+  bool hits(const Pose& tool, const Pose& object, const episode::ObjectShape& shape,
+            double margin) const;
 };
 
 struct Grasp {
@@ -50,14 +51,15 @@ struct Grasp {
 // Candidates from above, sorted by cost = distance to the tool (m) + 0.01 * turn (deg) + 2 *
 // approach_z + 8 * distance to the object's origin (m). Each closes on two opposite faces that are
 // wide enough to resist rotation.
-std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape& shape,
+std::vector<Grasp> propose_grasps(const GripperShape& gripper, const episode::ObjectShape& shape,
                                   const Pose& object, double support_height, const Pose& tool);
 
 // Grasps of an object in its own frame, regardless of its support: closing directions over the
 // whole sphere with sixteen approaches each, filtered by the same criterion for faces. The open
 // gripper does not collide with the object. `cost` is 8 * distance to the object's origin (m) + 4 *
 // slope of the faces (without the slope RB-Y1 retried 6 of 50 picks instead of 1).
-std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectShape& shape);
+std::vector<Grasp> grasps_all_around(const GripperShape& gripper,
+                                     const episode::ObjectShape& shape);
 
 // The grasps of an object at X_WO in the world frame, sorted by cost = distance to the tool (m) +
 // 0.01 * turn (deg) - 2 * (approach . wanted) + 8 * distance to the object's origin (m). With
@@ -66,4 +68,4 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
 std::vector<Grasp> rank_grasps(std::span<const Grasp> of_object, const Pose& object,
                                const Pose& tool, Vec3 wanted);
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -8,7 +8,7 @@
 #include "mjsense/policies/planner/finger_contact.h"
 #include "mjsense/policies/planner/grasp.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using std::numbers::pi;
@@ -59,7 +59,8 @@ double GripperShape::lowest(const Pose& tool) const {
   return z;
 }
 
-std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectShape& shape) {
+std::vector<Grasp> grasps_all_around(const GripperShape& gripper,
+                                     const episode::ObjectShape& shape) {
   std::vector<Vec3> points;
   const std::size_t stride = shape.points.size() / kPoints + 1;
   for (std::size_t i = 0; i < shape.points.size(); i += stride) points.push_back(shape.points[i]);
@@ -128,4 +129,4 @@ std::vector<Grasp> rank_grasps(std::span<const Grasp> of_object, const Pose& obj
   return grasps;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

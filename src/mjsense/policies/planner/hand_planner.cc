@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kJump = 0.15;    // rad per step of a line: 1.5 rad/s at 0.2 m/s
@@ -13,21 +13,22 @@ constexpr int kParts = 10;        // steps of reach_along()
 constexpr double kDetour = 0.25;  // m upwards, of a floating hand whose straight line is blocked
 
 // The joints of the hand's arm; for a floating hand the joints of the base.
-std::vector<int> planned_joints(const Robot& robot, const Hand& hand) {
+std::vector<int> planned_joints(const robots::Robot& robot, const Hand& hand) {
   if (hand.tool != hand.gripper) return robot.groups()[hand.tool].joints;
-  for (const MoveGroup& group : robot.groups()) {
-    if (group.kind == GroupKind::kBase) return group.joints;
+  for (const robots::MoveGroup& group : robot.groups()) {
+    if (group.kind == robots::GroupKind::kBase) return group.joints;
   }
   return {};
 }
 
 }  // namespace
 
-HandPlanner::HandPlanner(const mjModel* model, const Robot& robot, Hand hand, HandPlannerCfg cfg)
+HandPlanner::HandPlanner(const mjModel* model, const robots::Robot& robot, Hand hand,
+                         HandPlannerCfg cfg)
     : robot_(&robot), hand_(hand), cfg_(cfg) {
   collisions_ = std::make_unique<CollisionModel>(model, robot, planned_joints(robot, hand));
   if (floats()) {
-    RobotValues none;
+    robots::RobotValues none;
     tool_base_ = inverse(robot.fk(hand.gripper, none));
     return;
   }
@@ -133,7 +134,7 @@ bool HandPlanner::add_path(const World& world, CollisionQuery& query, Plan& plan
                         }};
   const std::vector<double> path = find_path(space_, joints(from), joints(to), space, rng);
   if (path.empty()) return false;
-  RobotValues values = from.joints;
+  robots::RobotValues values = from.joints;
   const auto tool_position = [&](std::span<const double> q) {
     std::ranges::copy(q, values[hand_.tool].values.begin());
     return robot_->fk(hand_.tool, values).p;
@@ -143,4 +144,4 @@ bool HandPlanner::add_path(const World& world, CollisionQuery& query, Plan& plan
   return true;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -10,7 +10,7 @@
 #include "mjsense/policies/planner/joint_path.h"
 #include "mjsense/policies/planner/plan_follower.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct HandPlannerCfg {
   double joint_speed = 1.5, joint_acceleration = 4.0;  // rad/s, rad/s^2
@@ -23,12 +23,12 @@ struct HandPlannerCfg {
 // A pose of the hand: its tool pose and the joint positions for it.
 struct HandPose {
   Pose tool;  // X_WT
-  RobotValues joints;
+  robots::RobotValues joints;
 };
 
 class HandPlanner {
  public:
-  HandPlanner(const mjModel* model, const Robot& robot, Hand hand, HandPlannerCfg cfg = {});
+  HandPlanner(const mjModel* model, const robots::Robot& robot, Hand hand, HandPlannerCfg cfg = {});
 
   const Hand& hand() const { return hand_; }
   bool floats() const { return hand_.tool == hand_.gripper; }
@@ -39,7 +39,7 @@ class HandPlanner {
   // Inverse kinematics for the tool at X_WT, starting from `near`. `iterations` above
   // Chain::kTracking also searches farther away.
   bool reach(const World& world, const Pose& tool, const HandPose& near, HandPose& out,
-             int iterations = Chain::kTracking) const;
+             int iterations = robots::Chain::kTracking) const;
   // Joint positions at the end of a screw from `from` to X_WT, without collision checks. They are
   // continuous with `from`; reach() could end in a contorted posture of a redundant arm.
   bool reach_along(const World& world, const Pose& tool, const HandPose& from, HandPose& out) const;
@@ -61,7 +61,7 @@ class HandPlanner {
   std::span<const double> joints(const HandPose& at) const { return at.joints[hand_.tool].view(); }
   Pose base_of(const Pose& tool) const { return tool * tool_base_; }
 
-  const Robot* robot_;
+  const robots::Robot* robot_;
   Hand hand_;
   HandPlannerCfg cfg_;
   JointSpace space_;
@@ -69,4 +69,4 @@ class HandPlanner {
   std::unique_ptr<CollisionModel> collisions_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

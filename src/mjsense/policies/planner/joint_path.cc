@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using Config = std::span<const double>;
@@ -182,4 +182,4 @@ CommandPath time_path(const JointSpace& space, int group, std::span<const double
   return out;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -11,7 +11,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/policies/planner/plan.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // Limits of n joints.
 struct JointSpace {
@@ -48,4 +48,4 @@ CommandPath time_path(const JointSpace& space, int group, std::span<const double
                       const std::function<Vec3(std::span<const double>)>& extra = {},
                       double extra_speed = 0, double dt = 0.02, const MotionCfg& cfg = {});
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -15,7 +15,7 @@
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using Config = std::span<const double>;
@@ -27,25 +27,25 @@ struct Problem {
 };
 
 struct Clutter {
-  std::unique_ptr<Task> task;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<episode::Task> task;
+  std::unique_ptr<scene::Scene> scene;
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
   std::unique_ptr<HandPlanner> hand;
   std::vector<Problem> problems;
   JointSpace joints;
 
   Clutter() {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg("franka");
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg("franka");
     cfg.scene = "clutter";
-    set_task_defaults("pick", cfg);
-    task = make_task("pick", cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
+    rollout::set_task_defaults("pick", cfg);
+    task = rollout::make_task("pick", cfg);
+    scene = std::make_unique<scene::Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), 1);
     data.reset(mj_makeData(scene->model()));
-    task->sample(0, 0, state_row(data.get()));
+    task->sample(0, 0, robots::state_row(data.get()));
     mj_forward(scene->model(), data.get());
-    const Robot& robot = task->robot();
+    const robots::Robot& robot = task->robot();
     hand = std::make_unique<HandPlanner>(scene->model(), robot, hands_of(robot, scene->model())[0]);
     for (const int j : robot.groups()[hand->hand().tool].joints) {
       joints.low.push_back(scene->model()->jnt_range[2 * j]);
@@ -139,4 +139,4 @@ void paths(benchmark::State& state) {
 BENCHMARK(paths)->Name("Ways")->Iterations(3)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -17,7 +17,7 @@
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/scenes/robot_floor.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 struct Case {
@@ -46,15 +46,15 @@ int number(const char* name, int otherwise) {
 
 struct Stage {
   Stage(const Case& c, double perturb, bool noise) {
-    TaskCfg cfg = task_cfg(c.robot, c.scene);
-    set_task_defaults(c.task, cfg);
+    episode::TaskCfg cfg = episode::task_cfg(c.robot, c.scene);
+    rollout::set_task_defaults(c.task, cfg);
     cfg.action_noise = noise;
     cfg.perturb = perturb;
     cfg.seed = c.seed;
-    task = make_task(c.task, cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
+    task = rollout::make_task(c.task, cfg);
+    scene = std::make_unique<scene::Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), 1);
-    policy = make_policy("planner");
+    policy = rollout::make_policy("planner");
     task->register_policy(*policy);
     data.reset(mj_makeData(scene->model()));
   }
@@ -69,8 +69,8 @@ struct Stage {
     MotionQuality::Greatest speed;
     const EpisodeResult result =
         run_episode(*task, *policy, data.get(), 0, episode, {}, {}, [&](const World& world) {
-          for (const MoveGroup& group : task->robot().groups()) {
-            if (group.kind != GroupKind::kArm) continue;
+          for (const robots::MoveGroup& group : task->robot().groups()) {
+            if (group.kind != robots::GroupKind::kArm) continue;
             for (int dof : group.dofs)
               speed.see(std::abs(world.data->qvel[dof]), world.time(), planner().phase(0));
           }
@@ -78,11 +78,13 @@ struct Stage {
     *success = result.success;
     return speed;
   }
-  const PlannerPolicy& planner() const { return dynamic_cast<const PlannerPolicy&>(*policy); }
+  const episode::PlannerPolicy& planner() const {
+    return dynamic_cast<const episode::PlannerPolicy&>(*policy);
+  }
   int retries() const { return planner().num_retries(0); }
-  std::unique_ptr<Task> task;
-  std::unique_ptr<Scene> scene;
-  std::unique_ptr<Policy> policy;
+  std::unique_ptr<episode::Task> task;
+  std::unique_ptr<scene::Scene> scene;
+  std::unique_ptr<episode::Policy> policy;
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
 };
 
@@ -107,7 +109,7 @@ TEST_P(MotionLimits, CommandsStayWithinTheLimits) {
     };
     below(q.joint_speed, kSpeed, "speed of a joint");
     below(q.joint_acceleration, kAcceleration, "acceleration of a joint");
-    const bool drives = driving_base(stage.task->robot()) >= 0;
+    const bool drives = scenes::driving_base(stage.task->robot()) >= 0;
     below(q.base_speed, drives ? kBaseSpeed : kHandSpeed, "speed of the base");
     below(q.base_turn, drives ? kBaseTurnSpeed : kHandTurnSpeed, "angular speed of the base");
     below(q.base_acceleration, kBase, "acceleration of the base");
@@ -207,4 +209,4 @@ INSTANTIATE_TEST_SUITE_P(
 INSTANTIATE_TEST_SUITE_P(Tasks, NoisyMotion, testing::ValuesIn(noisy_cases()), name_of_case);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

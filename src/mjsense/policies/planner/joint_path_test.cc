@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using Config = std::span<const double>;
@@ -120,4 +120,4 @@ TEST(Motion, LineTakesTheTimeOfATrapezoidalProfile) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

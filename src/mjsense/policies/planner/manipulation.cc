@@ -5,18 +5,18 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
-const GraspScene& grasp_scene_of(const Task& task) {
-  if (const GraspScene* scene = task.grasp_scene()) return *scene;
+const episode::GraspScene& grasp_scene_of(const episode::Task& task) {
+  if (const episode::GraspScene* scene = task.grasp_scene()) return *scene;
   throw ValueError(fmt::format(
       "policy 'planner' supports picking tasks only; it cannot do task '{}'", task.name()));
 }
 
 }  // namespace
 
-Manipulation::Manipulation(const Task& task, const ManipulationPlannerCfg& cfg)
+Manipulation::Manipulation(const episode::Task& task, const ManipulationPlannerCfg& cfg)
     : task_(task), cfg_(cfg), scene_(grasp_scene_of(task)) {
   for (const Hand& hand : hands_of(robot(), task.model())) {
     hands_.push_back(std::make_unique<HandPlanner>(task.model(), robot(), hand, cfg.hand));
@@ -38,4 +38,4 @@ Rng Manipulation::rng(const World& world, const PlanRequest& request, std::strin
           stream_of(what), static_cast<std::uint64_t>(task_.episode(world.id))};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

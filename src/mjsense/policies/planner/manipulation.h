@@ -12,7 +12,7 @@
 #include "mjsense/policies/planner/hand_planner.h"
 #include "mjsense/policies/planner/task_planner.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct ManipulationPlannerCfg {
   TaskPlannerCfg planner;
@@ -46,20 +46,20 @@ inline Pose backed(const Pose& pose, double distance) { return pose * Pose{{0, 0
 class Manipulation {
  public:
   // Throws ValueError for a task without a GraspScene and for a robot without a hand.
-  Manipulation(const Task& task, const ManipulationPlannerCfg& cfg);
+  Manipulation(const episode::Task& task, const ManipulationPlannerCfg& cfg);
 
   const ManipulationPlannerCfg& cfg() const { return cfg_; }
-  const Robot& robot() const { return task_.robot(); }
-  const GraspScene& scene() const { return scene_; }
+  const robots::Robot& robot() const { return task_.robot(); }
+  const episode::GraspScene& scene() const { return scene_; }
   int num_hands() const { return static_cast<int>(hands_.size()); }
   HandPlanner& hand(int hand) const { return *hands_[hand]; }
   const GripperShape& gripper(int hand) const { return grippers_[hand]; }
-  const MoveGroup& gripper_group(const HandPlanner& hand) const {
+  const robots::MoveGroup& gripper_group(const HandPlanner& hand) const {
     return robot().groups()[hand.hand().gripper];
   }
 
   // The target object of this world.
-  const ObjectShape& target_shape(int world) const {
+  const episode::ObjectShape& target_shape(int world) const {
     return scene_.shape(world, scene_.target(world));
   }
   int target_body(int world) const { return scene_.all_objects()[scene_.target(world)].body; }
@@ -69,11 +69,11 @@ class Manipulation {
   Rng rng(const World& world, const PlanRequest& request, std::string_view what) const;
 
  private:
-  const Task& task_;
+  const episode::Task& task_;
   const ManipulationPlannerCfg& cfg_;
-  const GraspScene& scene_;
+  const episode::GraspScene& scene_;
   std::vector<std::unique_ptr<HandPlanner>> hands_;
   std::vector<GripperShape> grippers_;  // [hands]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

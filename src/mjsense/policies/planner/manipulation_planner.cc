@@ -3,14 +3,14 @@
 
 #include "mjsense/policies/planner/phases.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kSlipped = 0.05;  // m, displacement of the object in the hand since the grasp
 
 }  // namespace
 
-std::span<const Phase> ManipulationPlanner::phases() const { return kManipulationPhases; }
+std::span<const episode::Phase> ManipulationPlanner::phases() const { return kManipulationPhases; }
 
 int ManipulationPlanner::first_phase() const { return kOpenGripper; }
 
@@ -21,7 +21,7 @@ void ManipulationPlanner::initialize_planner() {
   if (shared_->scene().place_scene()) placing_.emplace(*shared_);
   picking_.emplace(*shared_, placing_ ? &*placing_ : nullptr);
   shift_.reset();
-  if (driving_base(robot()) >= 0) shift_.emplace(task().model(), robot());
+  if (scenes::driving_base(robot()) >= 0) shift_.emplace(task().model(), robot());
   states_.assign(task().num_worlds(), {});
 }
 
@@ -124,4 +124,4 @@ bool ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
   return placing_->put_back(world, follower(), hand, tool_object, plan);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

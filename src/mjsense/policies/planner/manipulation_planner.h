@@ -13,13 +13,13 @@
 #include "mjsense/policies/planner/base_reposition.h"
 #include "mjsense/policies/planner/picking.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 class ManipulationPlanner final : public TaskPlanner {
  public:
   explicit ManipulationPlanner(ManipulationPlannerCfg cfg = {})
       : TaskPlanner(cfg.planner), cfg_(cfg) {}
-  std::span<const Phase> phases() const override;
+  std::span<const episode::Phase> phases() const override;
 
  protected:
   void initialize_planner() override;  // throws ValueError without a GraspScene or a hand
@@ -50,4 +50,4 @@ class ManipulationPlanner final : public TaskPlanner {
   std::vector<State> states_;            // [B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -17,7 +17,7 @@
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/rollout.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
@@ -26,11 +26,11 @@ using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
 struct Play {
   Play(const std::string& task_name, const std::string& robot, const std::string& scene_name,
        int num_worlds, bool noise = false, double perturb = 0) {
-    TaskCfg cfg = task_cfg(robot, scene_name);
+    episode::TaskCfg cfg = episode::task_cfg(robot, scene_name);
     cfg.action_noise = noise;
     cfg.perturb = perturb;
-    task = make_task(task_name, cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
+    task = rollout::make_task(task_name, cfg);
+    scene = std::make_unique<scene::Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), num_worlds);
     if (task_name == "open")
       planner = std::make_unique<OpeningPlanner>();
@@ -44,8 +44,8 @@ struct Play {
                     const std::function<void(const World&)>& each_step = {}) {
     return run_episode(*task, *planner, data[world].get(), world, episode, each_step);
   }
-  std::unique_ptr<Task> task;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<episode::Task> task;
+  std::unique_ptr<scene::Scene> scene;
   std::unique_ptr<TaskPlanner> planner;
   std::vector<DataPtr> data;
 };
@@ -131,13 +131,13 @@ TEST(ManipulationPlanner, AnEpisodeIsTheSameInEveryWorld) {
 // The result is identical bit for bit for one and two threads, with other episodes in parallel.
 TEST(ManipulationPlanner, AnEpisodeDoesNotDependOnOtherWorldsOrThreads) {
   const auto play = [](int worlds, int threads) {
-    RolloutCfg cfg;
+    rollout::RolloutCfg cfg;
     cfg.task = "pick_and_place";
     cfg.num_worlds = worlds;
     cfg.threads = threads;
     cfg.cameras.emplace();
     cfg.perturb = 1;
-    Rollout rollout(cfg);
+    rollout::Rollout rollout(cfg);
     std::vector<int> ids(worlds);
     std::vector<std::int64_t> episodes(worlds);
     for (int w = 0; w < worlds; ++w) {
@@ -149,7 +149,7 @@ TEST(ManipulationPlanner, AnEpisodeDoesNotDependOnOtherWorldsOrThreads) {
       rollout.act();
       rollout.step();
     }
-    const StateRow row = state_row(rollout.simulation().worlds(), worlds - 1);
+    const robots::StateRow row = robots::state_row(rollout.simulation().worlds(), worlds - 1);
     return std::vector<double>(row.qpos, row.qpos + rollout.simulation().scene().model()->nq);
   };
   // The last of five worlds has episode 3.
@@ -164,11 +164,11 @@ TEST(ManipulationPlanner, TheNearerOfTwoArmsPicks) {
   for (int episode : {5, 12, 14, 18}) {
     std::string hand;
     const EpisodeResult result = play.run(0, episode, [&](const World&) {
-      const Action* action = play.task->last_action(0);
+      const robots::Action* action = play.task->last_action(0);
       for (std::size_t g = 0; action && g < play.task->robot().groups().size(); ++g) {
-        const MoveGroup& group = play.task->robot().groups()[g];
-        const GroupValues& command = action->commands[g];
-        if (group.kind == GroupKind::kGripper && command.given &&
+        const robots::MoveGroup& group = play.task->robot().groups()[g];
+        const robots::GroupValues& command = action->commands[g];
+        if (group.kind == robots::GroupKind::kGripper && command.given &&
             command.values[0] == group.closed_command)
           hand = group.name;
       }
@@ -201,4 +201,4 @@ TEST(ManipulationPlanner, RetriesSucceedAfterPerturbations) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -9,13 +9,13 @@
 #include "mjsense/core/error.h"
 #include "mjsense/policies/planner/phases.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
-std::span<const Phase> OpeningPlanner::phases() const { return kManipulationPhases; }
+std::span<const episode::Phase> OpeningPlanner::phases() const { return kManipulationPhases; }
 int OpeningPlanner::first_phase() const { return kOpenGripper; }
 
 void OpeningPlanner::initialize_planner() {
-  opening_ = dynamic_cast<const OpeningTask*>(&task());
+  opening_ = dynamic_cast<const tasks::OpeningTask*>(&task());
   if (!opening_)
     throw ValueError(
         fmt::format("policy 'planner': the opening planner supports tasks 'open' and 'close'; "
@@ -30,10 +30,10 @@ void OpeningPlanner::initialize_planner() {
 
 // Opens the grippers and retracts the hands before the next attempt.
 void OpeningPlanner::back_off(const World& world, Plan& plan) const {
-  for (const ArmAndHand& hand : opening_->reach().hands())
+  for (const tasks::ArmAndHand& hand : opening_->reach().hands())
     plan.wait(kOpenGripper, cfg_.close_time)
         .grip(hand.gripper, robot().groups()[hand.gripper].open_command);
-  for (const ArmAndHand& hand : opening_->reach().hands()) {
+  for (const tasks::ArmAndHand& hand : opening_->reach().hands()) {
     const Pose from = robot().tcp_pose(world, hand.arm);
     const Pose to = from * Pose{{0, 0, -cfg_.back}, {}};
     if (hand.floats()) {
@@ -46,15 +46,16 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   plan.more = true;
 }
 
-Segment& OpeningPlanner::add_move(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from,
-                                  const Pose& to, double speed, double settle) const {
+Segment& OpeningPlanner::add_move(Plan& plan, int phase, const tasks::ArmAndHand& hand,
+                                  const Pose& from, const Pose& to, double speed,
+                                  double settle) const {
   return plan.ease_tool(phase, hand.arm, from, to, speed, std::max(settle, cfg_.settle), cfg_.turn,
                         true);
 }
 
-void OpeningPlanner::plan_floating(const World& world, const HandlePath& path, bool with_approach,
-                                   Plan& plan) const {
-  const MoveGroup& gripper = robot().groups()[path.hand.gripper];
+void OpeningPlanner::plan_floating(const World& world, const tasks::HandlePath& path,
+                                   bool with_approach, Plan& plan) const {
+  const robots::MoveGroup& gripper = robot().groups()[path.hand.gripper];
   Pose at = robot().base_pose(world) * tool_target(world, path.hand.arm);
   if (with_approach) {
     plan.wait(kOpenGripper, 0).grip(path.hand.gripper, gripper.open_command);
@@ -72,11 +73,11 @@ void OpeningPlanner::plan_floating(const World& world, const HandlePath& path, b
 }
 
 // Timed joint positions and, with `driving`, poses of the mobile base; the tool moves at `speed`.
-std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const RobotValues> points,
+std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const robots::RobotValues> points,
                                                double speed, bool driving) const {
   const std::size_t n = robot().groups()[arm].qpos.size();
   const int base = opening_->reach().base();
-  const auto pose = [&](const RobotValues& q) {
+  const auto pose = [&](const robots::RobotValues& q) {
     const auto& at = q[base].values;
     return Pose{{at[0], at[1], 0}, axis_angle({0, 0, 1}, at[2])};
   };
@@ -120,12 +121,12 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
     if (task().evaluate(world).success) plan.wait(kLift, 0);
     return;
   }
-  const HandleReach& reach = opening_->reach();
-  const Articulation& one = opening_->target(world.id);
+  const tasks::HandleReach& reach = opening_->reach();
+  const tasks::Articulation& one = opening_->target(world.id);
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
-  HandlePath& path = paths_[world.id];
+  tasks::HandlePath& path = paths_[world.id];
   const auto start = reach.start_of(world);
-  std::optional<HandlePath> found;
+  std::optional<tasks::HandlePath> found;
   if (request.stage > first) {
     found = reach.again(start, one, from, to, path);
   } else {
@@ -146,7 +147,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
     return;
   }
   const int arm = path.hand.arm, hand = path.hand.gripper;
-  const MoveGroup& gripper = robot().groups()[hand];
+  const robots::MoveGroup& gripper = robot().groups()[hand];
   if (request.stage == first) {
     plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);
     plan.move_groups(kPregrasp, paths(arm, path.approach_joints, cfg_.approach_speed, false),
@@ -166,4 +167,4 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   plan.more = true;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

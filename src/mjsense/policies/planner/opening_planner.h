@@ -6,7 +6,7 @@
 #include "mjsense/policies/planner/task_planner.h"
 #include "mjsense/tasks/opening/opening.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct OpeningPlannerCfg {
   // m/s, speed of the tool: to the pregrasp, with the handle, with the handle while the base
@@ -24,7 +24,7 @@ class OpeningPlanner final : public TaskPlanner {
  public:
   explicit OpeningPlanner(OpeningPlannerCfg cfg = {}, TaskPlannerCfg planner = {})
       : TaskPlanner(planner), cfg_(cfg) {}
-  std::span<const Phase> phases() const override;
+  std::span<const episode::Phase> phases() const override;
 
  protected:
   void initialize_planner() override;  // throws ValueError for another task, or without a hand
@@ -32,18 +32,18 @@ class OpeningPlanner final : public TaskPlanner {
   int first_phase() const override;
 
  private:
-  std::vector<CommandPath> paths(int arm, std::span<const RobotValues> points, double speed,
+  std::vector<CommandPath> paths(int arm, std::span<const robots::RobotValues> points, double speed,
                                  bool driving) const;
   // Adds a screw of a floating hand, X_WT.
-  Segment& add_move(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from, const Pose& to,
-                    double speed, double settle = 0) const;
-  void plan_floating(const World& world, const HandlePath& path, bool with_approach,
+  Segment& add_move(Plan& plan, int phase, const tasks::ArmAndHand& hand, const Pose& from,
+                    const Pose& to, double speed, double settle = 0) const;
+  void plan_floating(const World& world, const tasks::HandlePath& path, bool with_approach,
                      Plan& plan) const;
   void back_off(const World& world, Plan& plan) const;
 
   OpeningPlannerCfg cfg_;
-  const OpeningTask* opening_ = nullptr;
-  std::vector<HandlePath> paths_;  // [B] the path that is followed
+  const tasks::OpeningTask* opening_ = nullptr;
+  std::vector<tasks::HandlePath> paths_;  // [B] the path that is followed
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

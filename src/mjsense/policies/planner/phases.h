@@ -4,7 +4,7 @@
 
 #include "mjsense/episode/policy.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 enum ManipulationPhase {
   kUnknownPhase = 0,
@@ -18,15 +18,15 @@ enum ManipulationPhase {
   kRetreat = 8,
   kGoHome = 9
 };
-inline constexpr Phase kManipulationPhases[] = {{"unknown", kUnknownPhase},
-                                                {"gripper-open", kOpenGripper},
-                                                {"pregrasp", kPregrasp},
-                                                {"grasp", kGrasp},
-                                                {"gripper-close", kCloseGripper},
-                                                {"lift", kLift},
-                                                {"preplace", kPreplace},
-                                                {"place", kPlace},
-                                                {"retreat", kRetreat},
-                                                {"go_home", kGoHome}};
+inline constexpr episode::Phase kManipulationPhases[] = {{"unknown", kUnknownPhase},
+                                                         {"gripper-open", kOpenGripper},
+                                                         {"pregrasp", kPregrasp},
+                                                         {"grasp", kGrasp},
+                                                         {"gripper-close", kCloseGripper},
+                                                         {"lift", kLift},
+                                                         {"preplace", kPreplace},
+                                                         {"place", kPlace},
+                                                         {"retreat", kRetreat},
+                                                         {"go_home", kGoHome}};
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

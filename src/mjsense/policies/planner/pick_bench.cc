@@ -11,25 +11,25 @@
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 struct Stage {
   explicit Stage(bool noise) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg("franka");
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg("franka");
     cfg.scene = "table";
     cfg.action_noise = noise;
-    task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
+    task = std::make_unique<tasks::PickTask>(cfg);
+    scene = std::make_unique<scene::Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), 1);
     policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);
     data.reset(mj_makeData(scene->model()));
   }
-  std::unique_ptr<Task> task;
-  std::unique_ptr<Scene> scene;
-  std::unique_ptr<Policy> policy;
+  std::unique_ptr<episode::Task> task;
+  std::unique_ptr<scene::Scene> scene;
+  std::unique_ptr<episode::Policy> policy;
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
 };
 
@@ -61,7 +61,7 @@ void pick_plan(benchmark::State& state) {
   World world{.id = 0, .model = stage.scene->model(), .data = data};
   std::int64_t episode = 0;
   for (auto _ : state) {
-    stage.task->sample(0, episode++, state_row(data));
+    stage.task->sample(0, episode++, robots::state_row(data));
     mj_forward(world.model, data);
     stage.task->begin(world);
     stage.policy->reset(world);
@@ -70,4 +70,4 @@ void pick_plan(benchmark::State& state) {
 BENCHMARK(pick_plan)->Name("PickPlan")->Iterations(100)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

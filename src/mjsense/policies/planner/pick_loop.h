@@ -11,11 +11,11 @@
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // The physics of one policy step with the controllers that run in it; afterwards derived fields are
 // current.
-inline void physics_steps(Task& task, World& world, mjData* data,
+inline void physics_steps(episode::Task& task, World& world, mjData* data,
                           const std::function<void(const World&)>& each_physics_step = {}) {
   const bool controlled = task.robot().controls_every_step();
   for (int i = 0; i < task.decimation(); ++i) {
@@ -39,14 +39,14 @@ struct EpisodeResult {
   double first_plan_s = 0;  // wall time
 };
 
-inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,
-                                 std::int64_t episode,
+inline EpisodeResult run_episode(episode::Task& task, episode::Policy& policy, mjData* data,
+                                 int world_id, std::int64_t episode,
                                  const std::function<void(const World&)>& each_step = {},
                                  const std::function<void(const World&)>& at_start = {},
                                  const std::function<void(const World&)>& each_physics_step = {}) {
   const mjModel* model = task.model();
   mj_resetData(model, data);
-  task.sample(world_id, episode, state_row(data));
+  task.sample(world_id, episode, robots::state_row(data));
   mj_forward(model, data);
   World world{.id = world_id, .model = model, .data = data};
   world.first = true;
@@ -57,15 +57,15 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
   policy.reset(world);
   result.first_plan_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
-  Action action;
+  robots::Action action;
   for (;;) {
     policy.act(world, action);
-    task.apply(world, action, state_row(data));
+    task.apply(world, action, robots::state_row(data));
     physics_steps(task, world, data, each_physics_step);
     world.first = false;
     ++result.steps;
     if (each_step) each_step(world);
-    const Evaluation e = task.evaluate(world);
+    const episode::Evaluation e = task.evaluate(world);
     result.success = e.success;
     result.reward = e.reward;
     result.truncated = e.truncated;
@@ -74,4 +74,4 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

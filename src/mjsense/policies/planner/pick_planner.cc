@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/policies/planner/phases.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 // m, clearance between gripper and all objects on the path to the pregrasp, including the target:
@@ -29,11 +29,11 @@ Pose object_pose(const World& world, int body) {
 
 }  // namespace
 
-std::span<const Phase> PickPlanner::phases() const { return kManipulationPhases; }
+std::span<const episode::Phase> PickPlanner::phases() const { return kManipulationPhases; }
 
 int PickPlanner::first_phase() const { return kOpenGripper; }
 
-bool PickPlanner::can_use(const Robot& robot) {
+bool PickPlanner::can_use(const robots::Robot& robot) {
   return robot.arm() >= 0 && robot.gripper() >= 0 && robot.groups()[robot.arm()].leaf_site >= 0 &&
          std::ranges::equal(robot.chain(robot.arm()).joints(), robot.groups()[robot.arm()].joints);
 }
@@ -82,14 +82,14 @@ void PickPlanner::make_plan(const World& world, const PlanRequest& /*request*/, 
 }
 
 bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
-  const Robot& robot = this->robot();
+  const robots::Robot& robot = this->robot();
   const auto objects = scene_->all_objects();
   const auto& target = objects[scene_->target(world.id)];
   const Pose tool = robot.leaf_pose(world, robot.arm()), base = robot.base_pose(world);
   const std::vector<Grasp> grasps =
       propose_grasps(*gripper_shape_, scene_->shape(world.id, scene_->target(world.id)),
                      object_pose(world, target.body), scene_->support_height(world.id), tool);
-  std::array<double, Chain::kMaxJoints> q;
+  std::array<double, robots::Chain::kMaxJoints> q;
   read_arm(world, q);
   int tried = 0;
   const Grasp* second_best = nullptr;  // reachable, but its path is blocked
@@ -117,16 +117,16 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
 }
 
 bool PickPlanner::reachable(const Pose& base, const Pose& grasp, std::span<const double> q) const {
-  const Chain& chain = robot().chain(robot().arm());
-  std::array<double, Chain::kMaxJoints> solution;
+  const robots::Chain& chain = robot().chain(robot().arm());
+  std::array<double, robots::Chain::kMaxJoints> solution;
   std::copy_n(q.begin(), chain.joints().size(), solution.begin());
   const std::span<double> s(solution.data(), chain.joints().size());
   const Pose to_base = inverse(base);
   // Solved in the order of the motion, each from the previous solution, as the follower does; so a
   // solution found here is found while following.
-  return chain.ik(to_base * raised(grasp, cfg_.pregrasp_height), s, Chain::kTracking) &&
-         chain.ik(to_base * grasp, s, Chain::kTracking) &&
-         chain.ik(to_base * raised(grasp, cfg_.lift_height), s, Chain::kTracking);
+  return chain.ik(to_base * raised(grasp, cfg_.pregrasp_height), s, robots::Chain::kTracking) &&
+         chain.ik(to_base * grasp, s, robots::Chain::kTracking) &&
+         chain.ik(to_base * raised(grasp, cfg_.lift_height), s, robots::Chain::kTracking);
 }
 
 bool PickPlanner::path_is_free(const World& world, const Pose& tool, const Pose& pregrasp) const {
@@ -144,4 +144,4 @@ bool PickPlanner::path_is_free(const World& world, const Pose& tool, const Pose&
   return true;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

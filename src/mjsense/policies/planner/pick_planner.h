@@ -9,7 +9,7 @@
 #include "mjsense/policies/planner/grasp.h"
 #include "mjsense/policies/planner/task_planner.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct PickPlannerCfg {
   TaskPlannerCfg planner;
@@ -24,8 +24,8 @@ class PickPlanner final : public TaskPlanner {
  public:
   explicit PickPlanner(PickPlannerCfg cfg = {}) : TaskPlanner(cfg.planner), cfg_(cfg) {}
   // True if the robot has a gripper on an arm and the arm's joints alone move the tool.
-  static bool can_use(const Robot& robot);
-  std::span<const Phase> phases() const override;
+  static bool can_use(const robots::Robot& robot);
+  std::span<const episode::Phase> phases() const override;
 
  protected:
   void initialize_planner() override;  // throws ValueError for a task without a GraspScene
@@ -39,8 +39,8 @@ class PickPlanner final : public TaskPlanner {
   void read_arm(const World& world, std::span<double> q) const;
 
   PickPlannerCfg cfg_;
-  const GraspScene* scene_ = nullptr;
+  const episode::GraspScene* scene_ = nullptr;
   std::unique_ptr<GripperShape> gripper_shape_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -13,7 +13,7 @@
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 struct DataDelete {
@@ -23,20 +23,20 @@ using DataPtr = std::unique_ptr<mjData, DataDelete>;
 
 struct Stage {
   explicit Stage(int num_worlds, bool noise = false) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg("franka");
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg("franka");
     cfg.scene = "table";
     cfg.action_noise = noise;
-    task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
+    task = std::make_unique<tasks::PickTask>(cfg);
+    scene = std::make_unique<scene::Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), num_worlds);
     policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);
     for (int w = 0; w < num_worlds; ++w) data.emplace_back(mj_makeData(scene->model()));
   }
-  std::unique_ptr<Task> task;
-  std::unique_ptr<Scene> scene;
-  std::unique_ptr<Policy> policy;
+  std::unique_ptr<episode::Task> task;
+  std::unique_ptr<scene::Scene> scene;
+  std::unique_ptr<episode::Policy> policy;
   std::vector<DataPtr> data;
 };
 
@@ -51,7 +51,7 @@ TEST(PickPlanner, PicksUpMostObjects) {
   pool.run(episodes, [&](int e, int w) {
     results[e] = run_episode(*stage.task, *stage.policy, stage.data[w].get(), w, e);
     text[e] = stage.task->description(w) + " retries " +
-              std::to_string(static_cast<PlannerPolicy&>(*stage.policy).num_retries(w));
+              std::to_string(static_cast<episode::PlannerPolicy&>(*stage.policy).num_retries(w));
   });
   int successes = 0;
   for (int e = 0; e < episodes; ++e) {
@@ -82,7 +82,7 @@ TEST(PickPlanner, AnEpisodeIsTheSameInEveryWorld) {
 struct Moved {
   Moved(Stage& stage, double x, double y)
       : world{.id = 0, .model = stage.scene->model(), .data = stage.data[0].get()} {
-    stage.task->sample(0, 0, state_row(world.data));
+    stage.task->sample(0, 0, robots::state_row(world.data));
     mj_forward(world.model, world.data);
     qpos = world.data->qpos +
            world.model->jnt_qposadr[world.model->body_jntadr[stage.task->objects(0)[0].body]];
@@ -103,8 +103,8 @@ struct Moved {
 // with it or, before closing, with the target; and the path down must be free if a free one exists.
 TEST(PickPlanner, ChoosesAGraspWithClearanceToNeighbours) {
   Stage stage(1);
-  const auto& pick = static_cast<PickTask&>(*stage.task);
-  const Robot& robot = pick.robot();
+  const auto& pick = static_cast<tasks::PickTask&>(*stage.task);
+  const robots::Robot& robot = pick.robot();
   const mjModel* model = stage.scene->model();
   const GripperShape gripper(model, robot, robot.gripper());
   mjData* data = stage.data[0].get();
@@ -112,7 +112,7 @@ TEST(PickPlanner, ChoosesAGraspWithClearanceToNeighbours) {
   for (int episode = 0; episode < 4; ++episode) {
     for (int side = 0; side < 8; ++side) {
       World world{.id = 0, .model = model, .data = data};
-      stage.task->sample(0, episode, state_row(data));
+      stage.task->sample(0, episode, robots::state_row(data));
       mj_forward(model, data);
       const auto objects = pick.all_objects();
       const int target = pick.target(0), other = target == 0 ? 1 : 0;
@@ -126,11 +126,11 @@ TEST(PickPlanner, ChoosesAGraspWithClearanceToNeighbours) {
       mj_forward(model, data);
       stage.task->begin(world);
       stage.policy->reset(world);
-      Action action;
+      robots::Action action;
       stage.policy->act(world, action);
       if (action.done) continue;
       ++planned;
-      const Pose grasp = static_cast<PlannerPolicy&>(*stage.policy).grasp_pose(0);
+      const Pose grasp = static_cast<episode::PlannerPolicy&>(*stage.policy).grasp_pose(0);
       for (std::size_t i = 0; i < objects.size(); ++i) {
         const Pose object{vec3(data->xpos + 3 * objects[i].body),
                           quat(data->xquat + 4 * objects[i].body)};
@@ -147,24 +147,24 @@ TEST(PickPlanner, ChoosesAGraspWithClearanceToNeighbours) {
 TEST(PickPlanner, GivesUpIfTheObjectIsOutOfReach) {
   Stage stage(1);
   Moved moved(stage, 2.0, 0.0);
-  Action action;
+  robots::Action action;
   stage.policy->act(moved.world, action);
   EXPECT_TRUE(action.done);
   ASSERT_TRUE(action.success.has_value());
   EXPECT_FALSE(*action.success);
-  for (const GroupValues& group : action.commands.groups) EXPECT_FALSE(group.given);
+  for (const robots::GroupValues& group : action.commands.groups) EXPECT_FALSE(group.given);
 }
 
 TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
   Stage stage(1);
   Moved moved(stage, 0.0, 0.0);
-  auto& planner = static_cast<PlannerPolicy&>(*stage.policy);
+  auto& planner = static_cast<episode::PlannerPolicy&>(*stage.policy);
   World& world = moved.world;
   std::vector<int> phases;
   int max_retries = 0;
   double side = 1;
   for (int step = 0; step < 400; ++step) {
-    Action action;
+    robots::Action action;
     planner.act(world, action);
     if (phases.empty() || phases.back() != planner.phase(0)) phases.push_back(planner.phase(0));
     if (planner.num_retries(0) > max_retries) {
@@ -180,7 +180,7 @@ TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
       EXPECT_EQ(std::vector<int>(phases.begin(), phases.begin() + 4), one);
       return;
     }
-    stage.task->apply(world, action, state_row(world.data));
+    stage.task->apply(world, action, robots::state_row(world.data));
     // The object moves away whenever the fingers are about to close.
     if (planner.phase(0) == 4 &&
         stage.task->robot().opening(world, stage.task->robot().gripper()) > 0.08) {
@@ -196,10 +196,10 @@ TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
 
 TEST(Grasp, ClosesOnOppositeFacesOfABox) {
   Stage stage(1);
-  const Robot& robot = stage.task->robot();
+  const robots::Robot& robot = stage.task->robot();
   const GripperShape gripper(stage.scene->model(), robot, robot.gripper());
   EXPECT_NEAR(gripper.tip, 0.019 + 0.005, 1e-3);
-  const auto& objects = static_cast<PickTask&>(*stage.task).all_objects();
+  const auto& objects = static_cast<tasks::PickTask&>(*stage.task).all_objects();
   const auto& block = objects[0];
   ASSERT_EQ(block.kind, "red_block");
   const double yaw = 0.4;
@@ -219,4 +219,4 @@ TEST(Grasp, ClosesOnOppositeFacesOfABox) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -12,7 +12,7 @@
 #include "mjsense/policies/planner/phases.h"
 #include "mjsense/policies/planner/rejections.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using std::numbers::pi;
@@ -41,7 +41,7 @@ struct Picking::Search {
 Picking::Picking(const Manipulation& shared, const Placing* placing)
     : m_(shared), placing_(placing) {}
 
-std::span<const Grasp> Picking::grasps(const ObjectShape& shape, int hand) {
+std::span<const Grasp> Picking::grasps(const episode::ObjectShape& shape, int hand) {
   Grasps* entry = nullptr;
   {
     const std::lock_guard lock(grasps_mutex_);
@@ -117,7 +117,7 @@ std::optional<Picking::Grip> Picking::plan_pick_with(const Search& search, int h
   const ManipulationPlannerCfg& cfg = m_.cfg();
   HandPlanner& hand = m_.hand(h);
   const int gripper = hand.hand().gripper;
-  const MoveGroup& group = m_.gripper_group(hand);
+  const robots::MoveGroup& group = m_.gripper_group(hand);
   const Pose object = m_.object_pose(world);
   const HandPose now = hand.now(world, search.follower);
 
@@ -138,7 +138,7 @@ std::optional<Picking::Grip> Picking::plan_pick_with(const Search& search, int h
   std::vector<Rejection> rejections(ranked.size());
   const auto say_why = [&] { plan.rejection = text_of("grasps", rejections, world.model); };
   for (const auto& [iterations, maximum] :
-       {std::pair(Chain::kTracking, search.max_near), std::pair(400, search.max_far)}) {
+       {std::pair(robots::Chain::kTracking, search.max_near), std::pair(400, search.max_far)}) {
     int tried = 0;
     for (std::size_t i = 0; i < ranked.size(); ++i) {
       const Grasp& grasp = ranked[i];
@@ -149,14 +149,15 @@ std::optional<Picking::Grip> Picking::plan_pick_with(const Search& search, int h
       }
       if (++tried > maximum || num_paths == cfg.max_paths) break;
       const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
-      if (iterations == Chain::kTracking && search.failed.has(inverse(object) * tool)) {
+      if (iterations == robots::Chain::kTracking && search.failed.has(inverse(object) * tool)) {
         rejection = {"failed before"};
         continue;
       }
       HandPose before, at;
       const Pose pregrasp = backed(tool, cfg.pregrasp);
       rejection = {"out of reach"};
-      if (!(iterations == Chain::kTracking && hand.reach_along(world, pregrasp, start, before)) &&
+      if (!(iterations == robots::Chain::kTracking &&
+            hand.reach_along(world, pregrasp, start, before)) &&
           !hand.reach(world, pregrasp, start, before, iterations))
         continue;
       query.set_margin(kMargin);
@@ -195,7 +196,7 @@ std::optional<Picking::Grip> Picking::plan_pick_with(const Search& search, int h
 }
 
 void Picking::plan_return_home(const World& world, const PlanRequest& request,
-                               const Follower& follower, const RobotValues& home,
+                               const Follower& follower, const robots::RobotValues& home,
                                Plan& plan) const {
   Rng path_rng = m_.rng(world, request, "planner/home");
   for (int h = 0; h < m_.num_hands(); ++h) {
@@ -239,4 +240,4 @@ bool Picking::lift(const World& world, HandPlanner& hand, const HandPose& at, Pl
   return false;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

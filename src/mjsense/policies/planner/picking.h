@@ -12,7 +12,7 @@
 #include "mjsense/policies/planner/manipulation.h"
 #include "mjsense/policies/planner/placing.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 class Picking {
  public:
@@ -36,7 +36,7 @@ class Picking {
   // paths exist. From other positions the arms may be unable to reach the object or may block each
   // other.
   void plan_return_home(const World& world, const PlanRequest& request, const Follower& follower,
-                        const RobotValues& home, Plan& plan) const;
+                        const robots::RobotValues& home, Plan& plan) const;
 
  private:
   struct Search;
@@ -48,7 +48,7 @@ class Picking {
   HandPose draw_back(const World& world, HandPlanner& hand, CollisionQuery& query,
                      const HandPose& start, Plan& plan) const;
   bool lift(const World& world, HandPlanner& hand, const HandPose& at, Plan& plan) const;
-  std::span<const Grasp> grasps(const ObjectShape& shape, int hand);
+  std::span<const Grasp> grasps(const episode::ObjectShape& shape, int hand);
 
   const Manipulation& m_;
   const Placing* placing_;
@@ -57,8 +57,8 @@ class Picking {
     std::vector<Grasp> of_object;
   };
   // By address of the shape and hand; computed on first use.
-  std::map<std::pair<const ObjectShape*, int>, Grasps> grasps_;
+  std::map<std::pair<const episode::ObjectShape*, int>, Grasps> grasps_;
   std::mutex grasps_mutex_;  // guards the map, not its values
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

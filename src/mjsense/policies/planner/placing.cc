@@ -8,7 +8,7 @@
 
 #include "mjsense/policies/planner/phases.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 using std::numbers::pi;
@@ -56,13 +56,14 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   return false;
 }
 
-double Placing::underside(const ObjectShape& shape, const Quat& object) const {
+double Placing::underside(const episode::ObjectShape& shape, const Quat& object) const {
   double low = std::numeric_limits<double>::infinity();
   for (Vec3 point : shape.points) low = std::min(low, rotate(object, point).z);
   return low;
 }
 
-Pose Placing::placed(const Pose& object, const ObjectShape& shape, Vec3 place, int k) const {
+Pose Placing::placed(const Pose& object, const episode::ObjectShape& shape, Vec3 place,
+                     int k) const {
   // Middle of the underside relative to the origin, at its current orientation.
   Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   for (Vec3 point : shape.points) {
@@ -136,7 +137,7 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
   if (!hand.is_free(query, start) || !hand.is_free(query, above)) query.set_margin(0);
   if (!hand.add_path(world, query, plan, kPreplace, start, above, rng)) return false;
   for (Segment& segment : plan.segments) segment.holds(gripper);
-  const MoveGroup& group = m_.gripper_group(hand);
+  const robots::MoveGroup& group = m_.gripper_group(hand);
   hand.add_line(world, plan, kPlace, above.tool, tool, cfg.slow, cfg.place_settle).holds(gripper);
   hand.add_line(world, plan, kPlace, tool, tool, cfg.slow, cfg.open_time)
       .grip(gripper, group.open_command);
@@ -185,4 +186,4 @@ void Placing::plan_return_home(const World& world, HandPlanner& hand, const Hand
   hand.add_path(world, query, plan, kGoHome, from, there, rng);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -6,14 +6,14 @@
 #include "mjsense/policies/planner/manipulation.h"
 #include "mjsense/policies/planner/rejections.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 class Placing {
  public:
   // Final pose of a hand, used if a collision-free path exists: joint positions of an arm, X_WT of
   // a floating hand.
   struct Home {
-    RobotValues joints;
+    robots::RobotValues joints;
     Pose tool;
   };
 
@@ -33,9 +33,9 @@ class Placing {
 
  private:
   // X_WO of the object at a place, with the k-th turn from its orientation in the hand.
-  Pose placed(const Pose& object, const ObjectShape& shape, Vec3 place, int k) const;
+  Pose placed(const Pose& object, const episode::ObjectShape& shape, Vec3 place, int k) const;
   // Height (m) of the object's lowest point above its origin, at orientation `object`.
-  double underside(const ObjectShape& shape, const Quat& object) const;
+  double underside(const episode::ObjectShape& shape, const Quat& object) const;
   // True if the open hand can retreat from the object released at X_WO; `away` is the pose after
   // that.
   bool retreat_is_free(const World& world, HandPlanner& hand, const HandPose& at,
@@ -49,4 +49,4 @@ class Placing {
   const Manipulation& m_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::policies {
 
 Segment& Plan::move_tool(int phase, int tool, const Pose& from, const Pose& to, double speed,
                          double settle, double turn) {
@@ -57,4 +57,4 @@ void ease(std::span<double> seconds) {
     seconds[i - 1] = std::max(seconds[i - 1], kChange * seconds[i]);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // Moves the tool of a group from one pose to another along a screw; afterwards it stays.
 struct ToolMove {
@@ -89,4 +89,4 @@ struct Plan {
 // change gradually: a handle or a held object can be heavy.
 void ease(std::span<double> seconds);
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -11,36 +11,37 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/scenes/base_planner.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 constexpr double kFade = 1.0;       // s, minimum duration of the fade of an offset
 constexpr double kFadeSpeed = 0.5;  // rad/s or m/s, maximum average speed of that fade
 
-int floating_base(const Robot& robot) {
+int floating_base(const robots::Robot& robot) {
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const MoveGroup& group = robot.groups()[g];
-    if (group.kind == GroupKind::kBase && group.command_size == 7) return static_cast<int>(g);
+    const robots::MoveGroup& group = robot.groups()[g];
+    if (group.kind == robots::GroupKind::kBase && group.command_size == 7)
+      return static_cast<int>(g);
   }
   return -1;
 }
 
 }  // namespace
 
-std::vector<Hand> hands_of(const Robot& robot, const mjModel* model) {
+std::vector<Hand> hands_of(const robots::Robot& robot, const mjModel* model) {
   const auto groups = robot.groups();
   std::vector<Hand> hands;
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const MoveGroup& gripper = groups[g];
-    if (gripper.kind != GroupKind::kGripper || gripper.leaf_site < 0) continue;
+    const robots::MoveGroup& gripper = groups[g];
+    if (gripper.kind != robots::GroupKind::kGripper || gripper.leaf_site < 0) continue;
     int arm = -1;
     for (std::size_t a = 0; a < groups.size() && arm < 0; ++a) {
-      if (groups[a].kind == GroupKind::kArm && groups[a].leaf_site == gripper.leaf_site)
+      if (groups[a].kind == robots::GroupKind::kArm && groups[a].leaf_site == gripper.leaf_site)
         arm = static_cast<int>(a);
     }
     for (std::size_t a = 0; a < groups.size() && arm < 0; ++a) {
-      if (groups[a].kind == GroupKind::kArm && groups[a].leaf_site >= 0 &&
-          is_descendant_or_self(model, gripper.root_body, groups[a].root_body))
+      if (groups[a].kind == robots::GroupKind::kArm && groups[a].leaf_site >= 0 &&
+          observe::is_descendant_or_self(model, gripper.root_body, groups[a].root_body))
         arm = static_cast<int>(a);
     }
     if (arm < 0 && floating_base(robot) >= 0) arm = static_cast<int>(g);
@@ -49,11 +50,12 @@ std::vector<Hand> hands_of(const Robot& robot, const mjModel* model) {
   return hands;
 }
 
-void Follower::initialize(const Robot& robot, const mjModel* model, int num_worlds, double dt) {
+void Follower::initialize(const robots::Robot& robot, const mjModel* model, int num_worlds,
+                          double dt) {
   robot_ = &robot;
   dt_ = dt;
   slides_.clear();
-  for (const MoveGroup& group : robot.groups()) {
+  for (const robots::MoveGroup& group : robot.groups()) {
     slides_.emplace_back();
     for (int joint : group.joints) slides_.back().push_back(model->jnt_type[joint] == mjJNT_SLIDE);
   }
@@ -69,7 +71,7 @@ void Follower::initialize(const Robot& robot, const mjModel* model, int num_worl
 }
 
 bool Follower::joints_are_commanded(int group) const {
-  const MoveGroup& g = robot_->groups()[group];
+  const robots::MoveGroup& g = robot_->groups()[group];
   return g.targets_are_qpos() && g.commands_are_targets;
 }
 
@@ -82,7 +84,7 @@ void Follower::reset(const World& world) {
     if (static_cast<int>(g) == floating_base_) {
       write_pose(robot_->base_pose(world), sent.values.data());
       sent.given = true;
-    } else if (robot_->groups()[g].kind != GroupKind::kGripper &&
+    } else if (robot_->groups()[g].kind != robots::GroupKind::kGripper &&
                joints_are_commanded(static_cast<int>(g))) {
       sent.values = state.joints[g].values;
       sent.given = true;
@@ -132,7 +134,7 @@ void Follower::read_free_joints(const World& world, State& state) const {
   for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
     if (state.commands[g].given && joints_are_commanded(static_cast<int>(g))) continue;
     const auto& address = robot_->groups()[g].qpos;
-    if (robot_->groups()[g].kind == GroupKind::kArm) continue;
+    if (robot_->groups()[g].kind == robots::GroupKind::kArm) continue;
     for (std::size_t i = 0; i < address.size(); ++i)
       state.joints[g].values[i] = world.data->qpos[address[i]];
   }
@@ -142,7 +144,8 @@ bool Follower::move_tool(const World& world, State& state, const ToolMove& move,
   const double s = move.seconds == 0 ? 1.0 : std::min(1.0, time / move.seconds);
   const Pose pose = move.from * exp6((move.eased ? s * s * (3 - 2 * s) : s) * move.screw);
   state.targets[move.tool] = {true, move.in_world, pose};
-  if (robot_->groups()[move.tool].kind == GroupKind::kGripper) {  // a floating base carries it
+  if (robot_->groups()[move.tool].kind ==
+      robots::GroupKind::kGripper) {  // a floating base carries it
     const Pose to = move.in_world ? pose : robot_->base_pose(world) * pose;
     const Pose base = to * inverse(robot_->tcp_pose(world, move.tool));
     double command[7];
@@ -151,7 +154,7 @@ bool Follower::move_tool(const World& world, State& state, const ToolMove& move,
     return true;
   }
   const Pose target = move.in_world ? inverse(robot_->base_pose(world)) * pose : pose;
-  const bool solved = robot_->ik(move.tool, target, state.joints, Chain::kTracking);
+  const bool solved = robot_->ik(move.tool, target, state.joints, robots::Chain::kTracking);
   // If inverse kinematics fails, the last command stays.
   state.commands[move.tool].set(
       {state.joints[move.tool].values.data(), robot_->groups()[move.tool].qpos.size()});
@@ -162,12 +165,12 @@ void Follower::move_group(State& state, const CommandPath& path, double time) {
   const std::size_t n = robot_->groups()[path.group].command_size;
   const auto next = std::ranges::upper_bound(path.times, time);
   const std::size_t b = next - path.times.begin();
-  GroupValues& command = state.commands[path.group];
+  robots::GroupValues& command = state.commands[path.group];
   if (b == 0 || b == path.times.size()) {
     command.set(std::span(path.points).subspan(b == 0 ? 0 : (b - 1) * n, n));
   } else {
     const double s = (time - path.times[b - 1]) / (path.times[b] - path.times[b - 1]);
-    std::array<double, GroupValues::kMaxSize> values;
+    std::array<double, robots::GroupValues::kMaxSize> values;
     for (std::size_t i = 0; i < n; ++i) {
       const double from = path.points[(b - 1) * n + i], to = path.points[b * n + i];
       values[i] = from + s * (to - from);
@@ -191,15 +194,15 @@ void Follower::move_group(State& state, const CommandPath& path, double time) {
 // With s = 3u^2 - 2u^3, u = t / T: dq/dt = q'(s) s' / T, d2q/dt2 = (q''(s) s'^2 + q'(s) s'') / T^2.
 double Follower::stretch(const World& world, const State& state, const ToolMove& move) const {
   constexpr int kParts = 12;
-  const MoveGroup& arm = robot_->groups()[move.tool];
+  const robots::MoveGroup& arm = robot_->groups()[move.tool];
   const std::size_t n = arm.qpos.size();
-  if (!move.eased || move.seconds <= 0 || arm.kind != GroupKind::kArm) return 1;
+  if (!move.eased || move.seconds <= 0 || arm.kind != robots::GroupKind::kArm) return 1;
   const Pose to_base = move.in_world ? inverse(robot_->base_pose(world)) : Pose{};
-  std::array<std::array<double, GroupValues::kMaxSize>, kParts + 1> q;
-  RobotValues at = state.joints;
+  std::array<std::array<double, robots::GroupValues::kMaxSize>, kParts + 1> q;
+  robots::RobotValues at = state.joints;
   for (int k = 0; k <= kParts; ++k) {
     const Pose tool = to_base * move.from * exp6((static_cast<double>(k) / kParts) * move.screw);
-    if (!robot_->ik(move.tool, tool, at, Chain::kTracking)) return 1;
+    if (!robot_->ik(move.tool, tool, at, robots::Chain::kTracking)) return 1;
     q[k] = at[move.tool].values;
   }
   double factor = 1;
@@ -238,13 +241,13 @@ void Follower::enter(const World& world, State& state, Segment& segment) const {
   }
   segment.duration += longer;
   for (const CommandPath& path : segment.paths) {
-    GroupValues& offset = state.offsets[path.group];
+    robots::GroupValues& offset = state.offsets[path.group];
     offset.given = state.commands[path.group].given && joints_are_commanded(path.group);
     if (!offset.given) continue;
     const std::size_t n = robot_->groups()[path.group].command_size;
     for (std::size_t i = 0; i < n; ++i) {
       offset.values[i] = state.joints[path.group].values[i] - path.points[i];
-      if (is_yaw(path.group, i)) offset.values[i] = wrapped(offset.values[i]);
+      if (is_yaw(path.group, i)) offset.values[i] = scenes::wrapped(offset.values[i]);
     }
   }
 }
@@ -285,12 +288,12 @@ Follower::Sent& Follower::Sending::at(double step) {
 
 // Yaw of a mobile base: plans use an angle between -pi and pi, regardless of full turns.
 bool Follower::is_yaw(int group, std::size_t joint) const {
-  return robot_->groups()[group].kind == GroupKind::kBase && !slides_[group][joint];
+  return robot_->groups()[group].kind == robots::GroupKind::kBase && !slides_[group][joint];
 }
 
 double Follower::max_acceleration(int group, std::size_t joint) const {
   const bool slide = slides_[group][joint];
-  if (robot_->groups()[group].kind == GroupKind::kBase)
+  if (robot_->groups()[group].kind == robots::GroupKind::kBase)
     return slide ? cfg_.max_base_acceleration : cfg_.max_base_turn_acceleration;
   return slide ? cfg_.max_slide_acceleration : cfg_.max_acceleration;
 }
@@ -301,12 +304,14 @@ void Follower::limit(int group, Sent& sent, std::span<double> command) const {
   sent.moved = true;
   for (std::size_t i = 0; i < command.size(); ++i) {
     const double maximum = max_acceleration(group, i);
-    if (const double away = command[i] - sent.values[i]; is_yaw(group, i) && wrapped(away) != away)
-      command[i] = sent.values[i] + wrapped(away);
+    if (const double away = command[i] - sent.values[i];
+        is_yaw(group, i) && scenes::wrapped(away) != away)
+      command[i] = sent.values[i] + scenes::wrapped(away);
     const double wanted = command[i], follow = (wanted - sent.wanted[i]) / dt_;
     const double behind = sent.wanted[i] - sent.values[i], rate = sent.rates[i];
     double next = (wanted - sent.values[i]) / dt_;
-    const bool turns = robot_->groups()[group].kind == GroupKind::kArm && !slides_[group][i];
+    const bool turns =
+        robot_->groups()[group].kind == robots::GroupKind::kArm && !slides_[group][i];
     const double fastest = turns ? cfg_.max_speed : std::numeric_limits<double>::infinity();
     if (behind != 0 || std::abs(next) > fastest || std::abs(next - rate) > maximum * dt_) {
       next = follow + closing_speed(behind, kBraking * maximum, dt_);
@@ -355,7 +360,7 @@ void Follower::limit_pose(Sent& sent, std::span<double> command) const {
   std::copy_n(command.begin(), 7, sent.values.begin());
 }
 
-bool Follower::brake(const World& world, Action& action) {
+bool Follower::brake(const World& world, robots::Action& action) {
   bool at_rest = true;
   for (std::size_t g = 0; g < robot_->groups().size(); ++g)
     at_rest = rest(world, static_cast<int>(g), action) && at_rest;
@@ -363,11 +368,11 @@ bool Follower::brake(const World& world, Action& action) {
 }
 
 // Brings a group without a command to rest. An arm then stays by command, a base without one.
-bool Follower::rest(const World& world, int group, Action& action) {
+bool Follower::rest(const World& world, int group, robots::Action& action) {
   Sent& sent = states_[world.id].sent[group].at(world.time());
   if (!sent.moved || group == floating_base_) return true;
   const std::size_t n = robot_->groups()[group].qpos.size();
-  if (robot_->groups()[group].kind == GroupKind::kBase &&
+  if (robot_->groups()[group].kind == robots::GroupKind::kBase &&
       std::ranges::all_of(sent.rates, [](double rate) { return rate == 0; }))
     return true;
   bool at_rest = true;
@@ -384,7 +389,7 @@ bool Follower::rest(const World& world, int group, Action& action) {
 
 Pose Follower::tool_target(const World& world, int tool) const {
   const State& state = states_[world.id];
-  if (robot_->groups()[tool].kind != GroupKind::kArm) {
+  if (robot_->groups()[tool].kind != robots::GroupKind::kArm) {
     const Target& target = state.targets[tool];
     if (!target.given) return robot_->tcp_pose(world, tool);
     return target.in_world ? inverse(robot_->base_pose(world)) * target.pose : target.pose;
@@ -393,7 +398,7 @@ Pose Follower::tool_target(const World& world, int tool) const {
   return robot_->fk(tool, state.joints);
 }
 
-void Follower::follow(const World& world, Action& action) {
+void Follower::follow(const World& world, robots::Action& action) {
   State& state = states_[world.id];
   auto& segments = state.plan.segments;
   const auto n = static_cast<int>(segments.size());
@@ -416,7 +421,8 @@ void Follower::follow(const World& world, Action& action) {
     for (const CommandPath& path : segment.paths) move_group(state, path, time);
     // Arms without a tool move: the target follows from their commanded joints.
     for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
-      const bool arm = robot_->groups()[g].kind == GroupKind::kArm && state.commands[g].given;
+      const bool arm =
+          robot_->groups()[g].kind == robots::GroupKind::kArm && state.commands[g].given;
       if (arm &&
           std::ranges::none_of(segment.tools, [&](const ToolMove& m) { return m.tool == int(g); }))
         state.targets[g] = {true, false, robot_->fk(static_cast<int>(g), state.joints)};
@@ -427,11 +433,11 @@ void Follower::follow(const World& world, Action& action) {
     state.ik_failures = solved ? 0 : state.ik_failures + 1;
   }
   for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
-    const MoveGroup& group = robot_->groups()[g];
-    const GroupValues& command = state.commands[g];
+    const robots::MoveGroup& group = robot_->groups()[g];
+    const robots::GroupValues& command = state.commands[g];
     if (command.given) {
       action.commands[g].set(command.view());
-      GroupValues& sent = action.commands[g];
+      robots::GroupValues& sent = action.commands[g];
       const std::span<double> values(sent.values.data(), static_cast<std::size_t>(sent.size));
       if (dt_ > 0 && state.sent[g].now.given) {
         Sent& last = state.sent[g].at(world.time());
@@ -441,7 +447,7 @@ void Follower::follow(const World& world, Action& action) {
           limit(static_cast<int>(g), last, values);
         }
       }
-    } else if (group.kind == GroupKind::kBase && !group.controlled()) {
+    } else if (group.kind == robots::GroupKind::kBase && !group.controlled()) {
       action.commands[g].set({});  // a mobile base gets no command: it holds
     } else {
       rest(world, static_cast<int>(g), action);
@@ -449,4 +455,4 @@ void Follower::follow(const World& world, Action& action) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

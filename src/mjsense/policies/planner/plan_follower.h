@@ -12,7 +12,7 @@
 #include "mjsense/policies/planner/plan.h"
 #include "mjsense/robots/robot.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 enum class PlanFailure {
   kNone,
@@ -23,9 +23,9 @@ enum class PlanFailure {
   kUnreachable,
   kAstray
 };
-template <>
-inline constexpr std::array<std::string_view, 7> kEnumNames<PlanFailure>{
-    "none", "unplanned", "tool_away", "tool_turned", "dropped", "unreachable", "astray"};
+constexpr std::array<std::string_view, 7> enum_names(PlanFailure) {
+  return {"none", "unplanned", "tool_away", "tool_turned", "dropped", "unreachable", "astray"};
+}
 
 struct FollowerCfg {
   double max_position_error = 0.1;     // m, of the tool from its target
@@ -51,7 +51,7 @@ struct Hand {
 };
 // The hands of a robot, in the order of its grippers. A gripper belongs to the arm with the same
 // leaf site, else to the arm whose root body is above it. A gripper that nothing moves is omitted.
-std::vector<Hand> hands_of(const Robot& robot, const mjModel* model);
+std::vector<Hand> hands_of(const robots::Robot& robot, const mjModel* model);
 
 // A function that takes a world accesses the state of that world only and may run in parallel with
 // calls for other worlds.
@@ -60,7 +60,7 @@ class Follower {
   explicit Follower(FollowerCfg cfg = {}) : cfg_(cfg) {}
   // Throws ValueError for an arm whose commands are not joint positions. `dt`: period of the
   // commands, s; 0: accelerations are not limited.
-  void initialize(const Robot& robot, const mjModel* model, int num_worlds, double dt = 0);
+  void initialize(const robots::Robot& robot, const mjModel* model, int num_worlds, double dt = 0);
 
   Plan& plan(int world) { return states_[world].plan; }
   const Plan& plan(int world) const { return states_[world].plan; }
@@ -74,10 +74,10 @@ class Follower {
   // How following has failed; kNone if it has not.
   PlanFailure failure(const World& world) const;
   // Commands for the next control step.
-  void follow(const World& world, Action& action);
+  void follow(const World& world, robots::Action& action);
   // Commands for a control step without a plan: moving groups are brought to rest. Returns true
   // once all are at rest.
-  bool brake(const World& world, Action& action);
+  bool brake(const World& world, robots::Action& action);
   bool finished(int world) const { return states_[world].finished; }
   int phase(int world) const { return states_[world].phase; }
   void set_phase(int world, int phase) { states_[world].phase = phase; }
@@ -87,7 +87,7 @@ class Follower {
   // Commanded X_BT of a group's tool; the measured one if there is no command.
   Pose tool_target(const World& world, int tool) const;
   // Commanded joint positions; measured ones for groups without such commands.
-  const RobotValues& joints(int world) const { return states_[world].joints; }
+  const robots::RobotValues& joints(int world) const { return states_[world].joints; }
 
  private:
   struct Target {
@@ -99,7 +99,7 @@ class Follower {
   struct Sent {
     bool given = false;  // commands of this group are limited
     bool moved = false;  // was commanded in this episode
-    std::array<double, GroupValues::kMaxSize> values{}, wanted{}, rates{};
+    std::array<double, robots::GroupValues::kMaxSize> values{}, wanted{}, rates{};
   };
   // A step may be planned and commanded more than once; each time starts from what the previous
   // step sent.
@@ -115,17 +115,17 @@ class Follower {
     bool finished = false;
     int phase = 0;
     int ik_failures = 0;
-    RobotValues joints, commands;
+    robots::RobotValues joints, commands;
     // Joint offsets from the start of the path that is followed; `given` if there are any.
-    RobotValues offsets;
-    std::array<Target, RobotValues::kMaxGroups> targets;  // per tool group
-    std::array<Sending, RobotValues::kMaxGroups> sent;
+    robots::RobotValues offsets;
+    std::array<Target, robots::RobotValues::kMaxGroups> targets;  // per tool group
+    std::array<Sending, robots::RobotValues::kMaxGroups> sent;
   };
   void read_free_joints(const World& world, State& state) const;
   bool move_tool(const World& world, State& state, const ToolMove& move, double time);
   void move_group(State& state, const CommandPath& path, double time);
   void enter(const World& world, State& state, Segment& segment) const;
-  bool rest(const World& world, int group, Action& action);
+  bool rest(const World& world, int group, robots::Action& action);
   double stretch(const World& world, const State& state, const ToolMove& move) const;
   bool is_yaw(int group, std::size_t joint) const;
   double max_acceleration(int group, std::size_t joint) const;
@@ -135,11 +135,11 @@ class Follower {
   bool joints_are_commanded(int group) const;
 
   FollowerCfg cfg_;
-  const Robot* robot_ = nullptr;
+  const robots::Robot* robot_ = nullptr;
   int floating_base_ = -1;  // group whose commands are base poses; -1: none
   double dt_ = 0;
   std::vector<std::vector<char>> slides_;  // [group][joint]: the joint is a slide
   std::vector<State> states_;              // [B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -10,7 +10,7 @@
 #include "mjsense/policies/planner/task_planner.h"
 #include "mjsense/policies/planner/testing/table_scene.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 Pose moved(Pose pose, Vec3 by) {
@@ -20,7 +20,7 @@ Pose moved(Pose pose, Vec3 by) {
 
 TEST(Follower, TwoToolsMoveAtTheSameTimeAndGrippersKeepTheirCommand) {
   TableStage stage("bimanual_yam");
-  const Robot& robot = stage.robot();
+  const robots::Robot& robot = stage.robot();
   const auto hands = hands_of(robot, stage.world.model);
   ASSERT_EQ(hands.size(), 2u);
   Follower follower;
@@ -39,7 +39,7 @@ TEST(Follower, TwoToolsMoveAtTheSameTimeAndGrippersKeepTheirCommand) {
   follower.begin(stage.world);
   int steps = 0;
   for (; !follower.finished(0) && steps < 100; ++steps) {
-    Action action;
+    robots::Action action;
     const AllocationCount count;
     follower.follow(stage.world, action);
     EXPECT_EQ(count.since(), 0) << "while following";
@@ -57,14 +57,14 @@ TEST(Follower, TwoToolsMoveAtTheSameTimeAndGrippersKeepTheirCommand) {
 
 TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
   TableStage stage("mobile_franka");
-  const Robot& robot = stage.robot();
+  const robots::Robot& robot = stage.robot();
   const int base = robot.group_index("base"), arm = robot.arm();
   Follower follower;
   follower.initialize(robot, stage.world.model, 1);
   follower.restart(stage.world);
   const Pose tool = robot.leaf_pose(stage.world, arm);
   const Pose start = robot.base_pose(stage.world);
-  RobotValues now;
+  robots::RobotValues now;
   robot.read_qpos(stage.world, now);
   CommandPath path{base, {0, 2}, {}};
   for (double back : {0.0, 0.08}) {
@@ -76,7 +76,7 @@ TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
   plan.segments[0].tools.push_back({arm, tool, {}, 0, true});
   follower.begin(stage.world);
   while (!follower.finished(0)) {
-    Action action;
+    robots::Action action;
     follower.follow(stage.world, action);
     ASSERT_EQ(follower.failure(stage.world), PlanFailure::kNone);
     stage.step(action);
@@ -91,12 +91,12 @@ TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
 TEST(Follower, BaseCommandsStayWithinTheAccelerationLimits) {
   constexpr double kDt = 0.066;
   TableStage stage("mobile_franka");
-  const Robot& robot = stage.robot();
+  const robots::Robot& robot = stage.robot();
   const int base = robot.group_index("base");
   Follower follower;
   follower.initialize(robot, stage.world.model, 1, kDt);
   follower.reset(stage.world);
-  RobotValues now;
+  robots::RobotValues now;
   robot.read_qpos(stage.world, now);
   const auto at = [&](int i) { return now[base].values[i]; };
   // The same yaw, a full turn off.
@@ -106,8 +106,8 @@ TEST(Follower, BaseCommandsStayWithinTheAccelerationLimits) {
   follower.begin(stage.world);
   std::array<double, 3> told{at(0), at(1), at(2)}, rate{};
   double maximum = 0, max_turn = 0;
-  const auto look = [&](const Action& action) {
-    const GroupValues& command = action.commands[base];
+  const auto look = [&](const robots::Action& action) {
+    const robots::GroupValues& command = action.commands[base];
     for (int i = 0; i < 3; ++i) {
       const double next = command.given ? command.values[i] : told[i], v = (next - told[i]) / kDt;
       (i == 2 ? max_turn : maximum) =
@@ -117,7 +117,7 @@ TEST(Follower, BaseCommandsStayWithinTheAccelerationLimits) {
     }
   };
   for (int k = 0; k < 45; ++k) {
-    Action action;
+    robots::Action action;
     follower.follow(stage.world, action);
     look(action);
     stage.step(action);
@@ -125,13 +125,13 @@ TEST(Follower, BaseCommandsStayWithinTheAccelerationLimits) {
   EXPECT_NEAR(rate[0], -0.3, 1e-6) << "the command has caught up with the path";
   EXPECT_NEAR(told[2], at(2) + 0.3, 1e-9);
   for (bool stopped = false; !stopped;) {
-    Action action;
+    robots::Action action;
     stopped = follower.brake(stage.world, action);
     look(action);
     stage.step(action);
   }
   EXPECT_EQ(rate[0], 0);
-  Action held;
+  robots::Action held;
   EXPECT_TRUE(follower.brake(stage.world, held));
   EXPECT_FALSE(held.commands[base].given) << "a base holds without a command";
   const FollowerCfg cfg;
@@ -148,7 +148,7 @@ TEST(Follower, ABaseDoesNotMakeAFullTurnBetweenPaths) {
   Follower follower;
   follower.initialize(stage.robot(), stage.world.model, 1, 0.066);
   follower.reset(stage.world);
-  RobotValues now;
+  robots::RobotValues now;
   stage.robot().read_qpos(stage.world, now);
   const auto at = now[base].values;
   const auto stay = [&](double yaw) {
@@ -159,7 +159,7 @@ TEST(Follower, ABaseDoesNotMakeAFullTurnBetweenPaths) {
   plan.move_groups(1, {stay(at[2] - kTurn)});
   follower.begin(stage.world);
   while (!follower.finished(0)) {
-    Action action;
+    robots::Action action;
     follower.follow(stage.world, action);
     EXPECT_NEAR(action.commands[base].values[2], at[2], 1e-9);
     stage.step(action);
@@ -181,7 +181,7 @@ TEST(Follower, AGroupReachesTheEndOfItsPath) {
   plan.move_groups(1, {path});
   plan.wait(2, 0.2);
   follower.begin(stage.world);
-  Action action;
+  robots::Action action;
   for (int i = 0; i < 3; ++i) {
     action = {};
     follower.follow(stage.world, action);
@@ -210,7 +210,7 @@ TEST(Follower, AnArmConvergesToAPathThatStartsElsewhere) {
   follower.begin(stage.world);
   double last = q[3];
   while (!follower.finished(0)) {
-    Action action;
+    robots::Action action;
     follower.follow(stage.world, action);
     EXPECT_LT(std::abs(action.commands[arm].values[3] - last), 0.012);
     last = action.commands[arm].values[3];
@@ -221,9 +221,9 @@ TEST(Follower, AnArmConvergesToAPathThatStartsElsewhere) {
 
 TEST(Follower, AFloatingHandMovesItsToolToTheTarget) {
   TableStage stage("floating_rum");
-  const Robot& robot = stage.robot();
+  const robots::Robot& robot = stage.robot();
   Rng rng(0, 0, 0, 0);
-  robot.write_start(state_row(stage.world.data), Pose{{0.3, 0, 1.2}, {0, 1, 0, 0}}, rng);
+  robot.write_start(robots::state_row(stage.world.data), Pose{{0.3, 0, 1.2}, {0, 1, 0, 0}}, rng);
   mj_forward(stage.world.model, stage.world.data);
   const auto hands = hands_of(robot, stage.world.model);
   ASSERT_EQ(hands.size(), 1u);
@@ -236,7 +236,7 @@ TEST(Follower, AFloatingHandMovesItsToolToTheTarget) {
   follower.plan(0).move_tool_in_world(1, hands[0].tool, from, to, 0.2, 0.5);
   follower.begin(stage.world);
   while (!follower.finished(0)) {
-    Action action;
+    robots::Action action;
     follower.follow(stage.world, action);
     ASSERT_EQ(follower.failure(stage.world), PlanFailure::kNone);
     stage.step(action);
@@ -270,7 +270,7 @@ TEST(TaskPlanner, PlansTheNextStageAndEndsOnce) {
   planner.initialize(*stage.task);
   planner.reset(stage.world);
   std::vector<int> phases;
-  Action action;
+  robots::Action action;
   for (int i = 0; i < 10 && !action.done; ++i) {
     planner.act(stage.world, action);
     phases.push_back(planner.phase(0));
@@ -288,7 +288,7 @@ TEST(TaskPlanner, StageWithoutAPlanIsRetriedThenGivenUp) {
   TwoStages planner(1);
   planner.initialize(*stage.task);
   planner.reset(stage.world);
-  Action action;
+  robots::Action action;
   for (int i = 0; i < 30 && !action.done; ++i) {
     planner.act(stage.world, action);
     stage.step(action);
@@ -319,7 +319,7 @@ TEST(TaskPlanner, ReportsTheFailureAndThatTheRetryFoundNoPlan) {
   planner.reset(stage.world);
   EXPECT_EQ(planner.failure(0), "");
   EXPECT_EQ(planner.grasp_pose(0).q.w, 1) << "the identity before the first grasp";
-  Action action;
+  robots::Action action;
   for (int i = 0; i < 60 && !action.done; ++i) {
     planner.act(stage.world, action);
     stage.step(action);
@@ -332,4 +332,4 @@ TEST(TaskPlanner, ReportsTheFailureAndThatTheRetryFoundNoPlan) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -9,16 +9,16 @@
 
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 // Name of the geom's body or its nearest named ancestor; name of the geom if it belongs to the
 // world body.
 std::string named(const mjModel* m, int geom) {
   int body = m->geom_bodyid[geom];
-  while (body > 0 && name_of(m, mjOBJ_BODY, body).empty()) body = m->body_parentid[body];
-  const std::string name = name_of(m, mjOBJ_GEOM, geom);
-  return body == 0 && !name.empty() ? name : name_of(m, mjOBJ_BODY, body);
+  while (body > 0 && scene::name_of(m, mjOBJ_BODY, body).empty()) body = m->body_parentid[body];
+  const std::string name = scene::name_of(m, mjOBJ_GEOM, geom);
+  return body == 0 && !name.empty() ? name : scene::name_of(m, mjOBJ_BODY, body);
 }
 
 }  // namespace
@@ -55,4 +55,4 @@ std::string text_of(std::string_view what, const std::vector<Rejection>& rejecti
   return fmt::format("{} {}{}{}", tried, what, parts.empty() ? "" : ": ", fmt::join(parts, "; "));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

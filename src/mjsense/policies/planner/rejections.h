@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct Rejection {
   std::string_view reason;            // e.g. "out of reach"; "": the candidate was not tried
@@ -24,4 +24,4 @@ struct Rejection {
 std::string text_of(std::string_view what, const std::vector<Rejection>& rejections,
                     const mjModel* model);
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -5,11 +5,11 @@
 
 #include "mjsense/observe/testing/world.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 TEST(Refusals, AreCountedByReasonAndNameTheBodiesThatCollideMost) {
-  const TestWorld w(R"(<mujoco><worldbody><geom name="wall" size=".1"/>
+  const observe::TestWorld w(R"(<mujoco><worldbody><geom name="wall" size=".1"/>
     <body name="shelf"><geom size=".1"/><body><geom size=".1"/></body></body>
     <body name="hand" pos="1 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
   EXPECT_EQ(text_of("grasps", {}, w.model), "0 grasps");
@@ -24,4 +24,4 @@ TEST(Refusals, AreCountedByReasonAndNameTheBodiesThatCollideMost) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::policies

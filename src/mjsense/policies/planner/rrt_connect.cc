@@ -16,7 +16,7 @@
 
 #include "mjsense/policies/planner/joint_path.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 namespace ob = ompl::base;
@@ -157,4 +157,4 @@ std::vector<double> find_path(const JointSpace& space, std::span<const double> s
   return path;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/policies/planner/task_planner.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 namespace {
 
 const char* text_of(PlanFailure failure) {
@@ -26,7 +26,7 @@ const char* text_of(PlanFailure failure) {
 
 }  // namespace
 
-void TaskPlanner::initialize(Task& task) {
+void TaskPlanner::initialize(episode::Task& task) {
   task_ = &task;
   follower_.initialize(task.robot(), task.model(), task.num_worlds(),
                        0.001 * task.cfg().policy_dt_ms);
@@ -53,7 +53,7 @@ bool TaskPlanner::plan(const World& world) {
   return state.planned;
 }
 
-void TaskPlanner::replan(const World& world, Action& action) {
+void TaskPlanner::replan(const World& world, robots::Action& action) {
   State& state = states_[world.id];
   state.planned = false;
   state.stops = true;
@@ -75,12 +75,12 @@ std::string TaskPlanner::failure(int world) const {
   return text;
 }
 
-void TaskPlanner::give_up(Action& action) {
+void TaskPlanner::give_up(robots::Action& action) {
   action.done = true;
   action.success = false;
 }
 
-void TaskPlanner::act(const World& world, Action& action) {
+void TaskPlanner::act(const World& world, robots::Action& action) {
   State& state = states_[world.id];
   action = {};
   if (state.stops) {
@@ -113,4 +113,4 @@ void TaskPlanner::act(const World& world, Action& action) {
   action.done = follower_.finished(world.id);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -17,7 +17,7 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/policies/planner/plan_follower.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 struct TaskPlannerCfg {
   FollowerCfg follower;
@@ -31,13 +31,13 @@ struct PlanRequest {
 
 // Commands the groups that its plans name; the others hold. Giving up is the action {done, success:
 // false} without commands. Before a retry the robot comes to rest, which takes at least one step.
-class TaskPlanner : public PlannerPolicy {
+class TaskPlanner : public episode::PlannerPolicy {
  public:
   explicit TaskPlanner(TaskPlannerCfg cfg = {}) : planner_cfg_(cfg), follower_(cfg.follower) {}
   std::string_view name() const override { return "planner"; }
-  void initialize(Task& task) final;
+  void initialize(episode::Task& task) final;
   void reset(const World& world) final;
-  void act(const World& world, Action& action) final;
+  void act(const World& world, robots::Action& action) final;
 
   int phase(int world) const override { return follower_.phase(world); }
   int num_retries(int world) const override { return states_[world].retries; }
@@ -58,8 +58,8 @@ class TaskPlanner : public PlannerPolicy {
   // A further reason for a retry, checked in every step.
   virtual bool gone_wrong(const World& /*world*/) const { return false; }
 
-  Task& task() const { return *task_; }
-  const Robot& robot() const { return task_->robot(); }
+  episode::Task& task() const { return *task_; }
+  const robots::Robot& robot() const { return task_->robot(); }
   const Follower& follower() const { return follower_; }
   // X_BT at the start of a plan: commanded or, without a command, measured.
   Pose tool_target(const World& world, int tool) const {
@@ -77,13 +77,13 @@ class TaskPlanner : public PlannerPolicy {
     std::string rejection;       // reason of the last time that no plan was found
   };
   bool plan(const World& world);
-  void replan(const World& world, Action& action);
-  static void give_up(Action& action);
+  void replan(const World& world, robots::Action& action);
+  static void give_up(robots::Action& action);
 
   TaskPlannerCfg planner_cfg_;
-  Task* task_ = nullptr;
+  episode::Task* task_ = nullptr;
   Follower follower_;
   std::vector<State> states_;  // [B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

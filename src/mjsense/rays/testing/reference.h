@@ -63,14 +63,14 @@ class Neighbours {
 
   // Tolerance of a hit at t metres.
   double rounding(double t) const { return move_ + kRoundings * t; }
-  bool same(double t, const Hit& hit) const {
+  bool same(double t, const rays::Hit& hit) const {
     if (t == kMiss || !hit) return (t == kMiss) == !hit;
     return std::abs(hit.t - t) <= rounding(t);
   }
 
   // Whether the ray's point at the hit lies on a surface. Rays are cast down at it from random
   // points nearby.
-  bool on_surface(const Hit& hit, Rng& rng) const {
+  bool on_surface(const rays::Hit& hit, Rng& rng) const {
     constexpr double kAbove = 1e-4;
     double up[3], from[3], by[6];
     for (int k = 0; k < 3; ++k) up[k] = hit.normal[k];
@@ -111,7 +111,7 @@ class Neighbours {
 // surface may meet it anywhere along a long stretch, because of roundings that differ from point to
 // point. For such a ray it is sufficient that some neighbour travels farther than the hit, and that
 // the ray's point at the hit lies on a surface.
-inline bool agree(const TestModel& m, const double o[3], const double d[3], const Hit& hit) {
+inline bool agree(const TestModel& m, const double o[3], const double d[3], const rays::Hit& hit) {
   const Neighbours ray(m, o, d);
   if (ray.same(ray.distance(), hit)) return true;
   Rng rng(1, 0, 0, 0);
@@ -125,7 +125,7 @@ inline bool agree(const TestModel& m, const double o[3], const double d[3], cons
 
 // Message for a failed test: both results, and the ray. "" if they agree.
 inline std::string disagreement(const TestModel& m, const double o[3], const double d[3],
-                                const Hit& hit) {
+                                const rays::Hit& hit) {
   if (agree(m, o, d, hit)) return "";
   const Reference reference = mujoco_ray(m, o, d);
   return "t " + std::to_string(hit.t) + " geom " + std::to_string(hit.geom) + " prim " +

@@ -11,7 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/text/json.h"
 
-namespace mjsense {
+namespace mjsense::record {
 namespace {
 
 struct Moment {
@@ -261,4 +261,4 @@ std::string FakeSuite::obs_scene(std::int64_t episode) {
       episode);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::record

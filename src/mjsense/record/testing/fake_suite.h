@@ -10,7 +10,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::record {
 
 struct FakeSuiteCfg {
   int num_worlds = 1;
@@ -39,4 +39,4 @@ class FakeSuite {
   std::vector<std::unique_ptr<Sensor>> sensors_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::record

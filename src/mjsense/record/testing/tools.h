@@ -62,7 +62,7 @@ inline int length_of(std::int64_t episode, int steps) {
 }
 
 // Runs attempts in order, like a rollout, until the recording has enough episodes.
-inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) {
+inline void record_all(record::Recorder& recorder, record::FakeSuite& suite, const Attempts& a) {
   struct Running {
     std::int64_t episode = -1;
     int t = 0;
@@ -85,7 +85,7 @@ inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) 
       if (a.discard_every > 0 && r.episode % a.discard_every == a.discard_every - 1) {
         recorder.discard_episode(w, "for the test");
       } else {
-        recorder.finish_episode(w, FakeSuite::obs_scene(r.episode), "success");
+        recorder.finish_episode(w, record::FakeSuite::obs_scene(r.episode), "success");
       }
       r.episode = -1;
       if (++decided == a.stop_after) {
@@ -100,27 +100,27 @@ inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) 
   recorder.complete();
 }
 
-inline RecordingCfg fake_recording(const fs::path& out, const FakeSuite& suite, int worlds,
-                                   int episodes) {
-  RecordingCfg cfg;
+inline record::RecordingCfg fake_recording(const fs::path& out, const record::FakeSuite& suite,
+                                           int worlds, int episodes) {
+  record::RecordingCfg cfg;
   cfg.out_dir = out;
   cfg.episodes = episodes;
   cfg.num_worlds = worlds;
-  cfg.fps = Fps::from_period_ms(66);
+  cfg.fps = record::Fps::from_period_ms(66);
   cfg.sensors = suite.sensors();
   cfg.settings = R"({"seed":7})";
   return cfg;
 }
 
 // Records and returns the bytes of all HDF5 files, in order.
-inline std::string record(const fs::path& out, int episodes, const Attempts& attempts,
-                          bool video = false,
-                          const std::function<void(RecordingCfg&)>& change = {}) {
-  FakeSuite suite({attempts.worlds, 16, 12, video, video});
-  RecordingCfg cfg = fake_recording(out, suite, attempts.worlds, episodes);
+inline std::string write_recording(const fs::path& out, int episodes, const Attempts& attempts,
+                                   bool video = false,
+                                   const std::function<void(record::RecordingCfg&)>& change = {}) {
+  record::FakeSuite suite({attempts.worlds, 16, 12, video, video});
+  record::RecordingCfg cfg = fake_recording(out, suite, attempts.worlds, episodes);
   if (change) change(cfg);
   {
-    Recorder recorder(cfg);
+    record::Recorder recorder(cfg);
     record_all(recorder, suite, attempts);
   }
   std::string bytes;

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Name, place and size of a member.
 #define MJSENSE_FIELD(type, name, integer, needed) \
@@ -94,4 +94,4 @@ void StructReader::copy(const char* from, char* to) const {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Fields have the names and meanings of mjvGeom, mjvLight and mjvGLCamera. A field that the library
 // does not have keeps the value given here.
@@ -79,4 +79,4 @@ class StructReader {
   std::vector<Step> steps_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr int kSlices = 28;         // MuJoCo's default
@@ -136,4 +136,4 @@ void add_line(const float from[3], const float to[3], const float eye[3], const 
   add(p[0][0], p[1][1], p[1][0]);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

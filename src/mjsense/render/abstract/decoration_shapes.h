@@ -8,7 +8,7 @@
 #include "mjsense/rays/mesh_geometry.h"
 #include "mjsense/render/view/surface_assets.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 struct ShapeTriangles {
   std::vector<float> vertices;  // [V, 3] m, geom frame
@@ -34,4 +34,4 @@ ShapeTriangles triangle_triangles(const float size[3]);
 void add_line(const float from[3], const float to[3], const float eye[3], const float ahead[3],
               bool orthographic, float width, float pixel, ShapeTriangles& out);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

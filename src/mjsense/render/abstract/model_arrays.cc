@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Reads fields of `arrays` into an mjModel.
@@ -107,4 +107,4 @@ std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays) {
 
 #undef MJSENSE_READ
 
-}  // namespace mjsense
+}  // namespace mjsense::render

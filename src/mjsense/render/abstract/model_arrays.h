@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::render {
 
 struct NamedArray {
   void* data;
@@ -29,4 +29,4 @@ using NamedArrays = std::map<std::string, NamedArray>;
 // is missing or has another type or shape than expected.
 std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

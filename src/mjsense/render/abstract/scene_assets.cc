@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Only what the model's height fields or skins need.
@@ -82,11 +82,11 @@ const DrawnMesh* SceneAssets::mesh(int id) {
     if (id % 2) {
       made = hull(mesh);
     } else if (m->mesh_facenum[mesh] > 0) {
-      made.geometry = mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
-                                     3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
-                                    {m->mesh_face + 3 * m->mesh_faceadr[mesh],
-                                     3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
-                                    true);
+      made.geometry = rays::mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
+                                           3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
+                                          {m->mesh_face + 3 * m->mesh_faceadr[mesh],
+                                           3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
+                                          true);
       made.tables = mesh_tables(m, mesh);
     }
     if (made.tables) made.surface = made.tables->surface();
@@ -106,7 +106,7 @@ DrawnMesh SceneAssets::hull(int mesh) const {
   const float* vert = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
   DrawnMesh made;
   made.geometry =
-      mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])}, faces, true);
+      rays::mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])}, faces, true);
   auto tables = std::make_shared<MeshTables>();
   for (int f = 0; f < num_faces; ++f) {
     const float *a = vert + 3 * faces[3 * f], *b = vert + 3 * faces[3 * f + 1],
@@ -140,10 +140,10 @@ const Texture* SceneAssets::skybox() {
   return nullptr;
 }
 
-const HeightField& SceneAssets::height_field(int id) {
+const rays::HeightField& SceneAssets::height_field(int id) {
   if (!height_fields_) {
     const mjModel part = part_of(model_, true);
-    height_fields_ = std::make_unique<SharedGeometry>(&part);
+    height_fields_ = std::make_unique<rays::SharedGeometry>(&part);
   }
   return height_fields_->height_fields[id];
 }
@@ -156,4 +156,4 @@ const MeshSurface& SceneAssets::skin(int id) {
   return *skins_->skin(id);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -12,11 +12,11 @@
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/render/view/surface_assets.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // A mesh and its faces' tables.
 struct DrawnMesh {
-  std::shared_ptr<const MeshGeometry> geometry;
+  std::shared_ptr<const rays::MeshGeometry> geometry;
   std::shared_ptr<const MeshTables> tables;
   MeshSurface surface;
 };
@@ -32,8 +32,8 @@ class SceneAssets {
   // Null for -1 and for a texture that cannot be drawn.
   const Texture* texture(int id);
   const Texture* skybox();  // null if the model has none
-  const HeightField& height_field(int id);
-  const SharedGeometry& height_fields() const { return *height_fields_; }
+  const rays::HeightField& height_field(int id);
+  const rays::SharedGeometry& height_fields() const { return *height_fields_; }
   // Texture coordinates of the skin's faces; null if it has none.
   const MeshSurface& skin(int id);
 
@@ -56,8 +56,8 @@ class SceneAssets {
   std::vector<std::unique_ptr<DrawnMesh>> meshes_;  // [2 * nmesh]
   std::vector<std::shared_ptr<const StoredTexture>> textures_;
   std::vector<Stamp> mesh_stamps_, texture_stamps_, height_field_stamps_;
-  std::unique_ptr<SharedGeometry> height_fields_;
+  std::unique_ptr<rays::SharedGeometry> height_fields_;
   std::unique_ptr<SurfaceAssets> skins_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

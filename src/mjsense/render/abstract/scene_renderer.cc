@@ -13,7 +13,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr float kEndless = 1e30f;
@@ -32,13 +32,13 @@ float far_depth(float near, float far, bool orthographic) {
   return static_cast<float>(static_cast<double>(d) / c);
 }
 
-void set_box(float x, float y, float z, RayGeom& shape) {
+void set_box(float x, float y, float z, rays::RayGeom& shape) {
   shape.half[0] = x;
   shape.half[1] = y;
   shape.half[2] = z;
 }
 
-void set_box(const std::array<float, 6>& box, RayGeom& shape) {
+void set_box(const std::array<float, 6>& box, rays::RayGeom& shape) {
   std::copy_n(box.data(), 3, shape.center);
   std::copy_n(box.data() + 3, 3, shape.half);
 }
@@ -47,7 +47,7 @@ void set_box(const std::array<float, 6>& box, RayGeom& shape) {
 
 // A flex or skin: triangles that move.
 struct SceneRenderer::Soft {
-  DeformableMesh mesh;
+  rays::DeformableMesh mesh;
   std::vector<float> vertices;  // those that the mesh has
   std::vector<float> normals, density;
   MeshSurface surface;
@@ -58,7 +58,7 @@ struct SceneRenderer::Soft {
 // A shape without a primitive of its own.
 struct SceneRenderer::Decoration {
   ShapeTriangles triangles;
-  SceneHandle scene;
+  rays::SceneHandle scene;
   MeshSurface surface;
   float box[6];
 };
@@ -73,7 +73,7 @@ SceneRenderer::SceneRenderer(const NamedArrays& arrays, const SceneSettings& set
       camera_reader_(std::move(cameras)),
       soft_(soft),
       assets_(model_.get()),
-      device_(ray_device()) {}
+      device_(rays::ray_device()) {}
 
 SceneRenderer::~SceneRenderer() = default;
 
@@ -181,7 +181,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
     }
     if (colored) out.texture = assets_.texture(texture);
   }
-  RayGeom& shape = out.shape;
+  rays::RayGeom& shape = out.shape;
   shape.type = geom.type;
   shape.data = -1;
   std::copy_n(geom.pos, 3, shape.pos);
@@ -228,7 +228,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
     case mjGEOM_HFIELD: {
       if (geom.dataid < 0 || geom.dataid >= model_->nhfield) return;
       out.height_field = &assets_.height_field(geom.dataid);
-      const SharedGeometry& fields = assets_.height_fields();
+      const rays::SharedGeometry& fields = assets_.height_fields();
       out.bvh = out.height_field->scene;
       out.clusters = fields.clusters_of_height_field(geom.dataid);
       out.horizons = fields.horizons_of_height_field(geom.dataid);
@@ -266,9 +266,9 @@ void SceneRenderer::add_triangles(DrawnGeom drawn, ShapeTriangles triangles) {
   if (triangles.faces.empty()) return;
   Decoration& d = *decorations_.emplace_back(std::make_unique<Decoration>());
   d.triangles = std::move(triangles);
-  d.scene = build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces);
+  d.scene = rays::build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces);
   d.surface.normals = d.triangles.normals.data();
-  box_around(d.triangles.vertices, d.box);
+  rays::box_around(d.triangles.vertices, d.box);
   std::copy_n(d.box, 3, drawn.shape.center);
   std::copy_n(d.box + 3, 3, drawn.shape.half);
   drawn.bvh = d.scene.get();
@@ -319,7 +319,7 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
   const int id = geom.objid;
   const int used = soft_.flexfaceused[id];
   const float radius = geom.size[0];
-  RayGeom& shape = drawn.shape;
+  rays::RayGeom& shape = drawn.shape;
   if (radius > 0 && !(scene.flex_skin && used)) {
     DrawnGeom part = drawn;
     part.texture = nullptr;
@@ -382,12 +382,12 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
     place->num_faces = count;
     std::vector<int> faces(3 * static_cast<std::size_t>(count));
     for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = static_cast<int>(i);
-    place->mesh = DeformableMesh(device_.get(), faces, now);
-    box_around(now, place->box);
+    place->mesh = rays::DeformableMesh(device_.get(), faces, now);
+    rays::box_around(now, place->box);
   } else if (!std::ranges::equal(now, place->mesh.vertices())) {
     std::ranges::copy(now, place->mesh.vertices().begin());
     place->mesh.refit();
-    box_around(now, place->box);
+    rays::box_around(now, place->box);
   }
   Soft& soft = *place;
   soft.surface.normals = soft_.flexnormal + 9 * start;
@@ -423,20 +423,20 @@ void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
   if (first) {
     place = std::make_unique<Soft>();
     place->mesh =
-        DeformableMesh(device_.get(), {faces, 3 * static_cast<std::size_t>(num_faces)}, now);
+        rays::DeformableMesh(device_.get(), {faces, 3 * static_cast<std::size_t>(num_faces)}, now);
     place->normals.resize(9 * static_cast<std::size_t>(num_faces));
   }
   Soft& soft = *place;
   if (first || !std::ranges::equal(now, soft.mesh.vertices())) {
     std::ranges::copy(now, soft.mesh.vertices().begin());
     if (!first) soft.mesh.refit();
-    box_around(now, soft.box);
+    rays::box_around(now, soft.box);
     for (int i = 0; i < 3 * num_faces; ++i)
       std::copy_n(normals + 3 * faces[i], 3, &soft.normals[3 * static_cast<std::size_t>(i)]);
   }
   soft.surface = assets_.skin(id);
   soft.surface.normals = soft.normals.data();
-  RayGeom& shape = drawn.shape;
+  rays::RayGeom& shape = drawn.shape;
   std::copy_n(soft.box, 3, shape.center);
   std::copy_n(soft.box + 3, 3, shape.half);
   std::fill_n(shape.pos, 3, 0.0);
@@ -550,4 +550,4 @@ void SceneRenderer::read_camera(const SceneMemory& scene, int width, int height)
   grid_.dy = -(top - bottom) * scale / static_cast<float>(height);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -14,7 +14,7 @@
 #include "mjsense/render/kernels/tile_memory.h"
 #include "mjsense/render/view/view_builder.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Values of the model that MuJoCo's renderers read when they are made.
 struct SceneSettings {
@@ -101,4 +101,4 @@ class SceneRenderer {
   RenderTiles tiles_ = best_render_tiles();
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

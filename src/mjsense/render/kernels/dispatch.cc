@@ -2,7 +2,7 @@
 #include "mjsense/core/system/cpu.h"
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 RenderTiles best_render_tiles() {
   switch (cpu_isa()) {
@@ -17,4 +17,4 @@ RenderTiles best_render_tiles() {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -4,7 +4,7 @@
 
 #include "mjsense/render/kernels/rays.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Window of a set of points; all of them have w <= farthest.
@@ -60,7 +60,8 @@ inline std::uint32_t overlaps(const LightWindows& a, int first, const LitWindow&
 
 // Windows of a node's children.
 struct alignas(64) ChildWindows {
-  float u0[kClusterSize], u1[kClusterSize], v0[kClusterSize], v1[kClusterSize], w[kClusterSize];
+  float u0[rays::kClusterSize], u1[rays::kClusterSize], v0[rays::kClusterSize],
+      v1[rays::kClusterSize], w[rays::kClusterSize];
 };
 
 // Transform of a triangle geom into a light's frame.
@@ -89,11 +90,11 @@ struct SeenByLight {
   }
 
   // Returns the children whose boxes overlap the window, and writes the windows of all children.
-  std::uint32_t children(const ClusterNode& node, const LitWindow& points,
+  std::uint32_t children(const rays::ClusterNode& node, const LitWindow& points,
                          ChildWindows& out) const {
     const Float zero = splat(0.0f), one = splat(1.0f);
     std::uint32_t near = 0;
-    for (int k = 0; k < kClusterSize; k += kWidth) {
+    for (int k = 0; k < rays::kClusterSize; k += kWidth) {
       const Vec3f c{load(node.center[0] + k), load(node.center[1] + k), load(node.center[2] + k)};
       const Vec3f h{load(node.half[0] + k), load(node.half[1] + k), load(node.half[2] + k)};
       Float low[3], high[3];
@@ -125,4 +126,4 @@ struct SeenByLight {
 };
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

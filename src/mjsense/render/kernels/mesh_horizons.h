@@ -17,7 +17,7 @@
 #include "mjsense/rays/horizons.h"
 #include "mjsense/render/kernels/rays.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Maximum slope of a horizon; steeper ones are treated as walls. See leaves_mesh().
@@ -38,7 +38,8 @@ struct FaceHorizon {
   float flat;                          // m, minimum height of a rise
   bool valid;
 
-  FaceHorizon(const TriangleBlock& block, int lane, int octant, float size) : flat(kFlat * size) {
+  FaceHorizon(const rays::TriangleBlock& block, int lane, int octant, float size)
+      : flat(kFlat * size) {
     float c[3][3];
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) c[i][k] = block.corners[i][k][lane];
@@ -89,9 +90,9 @@ struct FaceHorizon {
 };
 
 // Children of a node that may contain a rise steeper than `slope`.
-inline std::uint32_t rising(const FaceHorizon& from, const ClusterNode& node, float slope) {
+inline std::uint32_t rising(const FaceHorizon& from, const rays::ClusterNode& node, float slope) {
   std::uint32_t out = 0;
-  for (int k = 0; k < kClusterSize; k += kWidth) {
+  for (int k = 0; k < rays::kClusterSize; k += kWidth) {
     const Vec3f half{load(node.half[0] + k), load(node.half[1] + k), load(node.half[2] + k)};
     const Vec3f center =
         Vec3f{load(node.center[0] + k), load(node.center[1] + k), load(node.center[2] + k)} -
@@ -111,7 +112,7 @@ inline std::uint32_t rising(const FaceHorizon& from, const ClusterNode& node, fl
 }
 
 // The line that the block is farthest beyond, judged by the block's first corner.
-inline int farthest_line(const FaceHorizon& from, const TriangleBlock& block) {
+inline int farthest_line(const FaceHorizon& from, const rays::TriangleBlock& block) {
   int best = 0;
   float maximum = -kInfinity;
   for (int i = 0; i < FaceHorizon::kLines; ++i) {
@@ -125,11 +126,11 @@ inline int farthest_line(const FaceHorizon& from, const TriangleBlock& block) {
 
 // The steepest slope among the triangles of a block, but at least `slope`. Infinity if a triangle
 // is not beyond any line.
-inline float steepest_of(const FaceHorizon& from, const TriangleBlock& block, float slope) {
+inline float steepest_of(const FaceHorizon& from, const rays::TriangleBlock& block, float slope) {
   const Float zero = splat(0.0f), flat = splat(from.flat), endless = splat(kInfinity);
   const int first = farthest_line(from, block);
   Float maximum = splat(slope);
-  for (int k = 0; k < kClusterSize; k += kWidth) {
+  for (int k = 0; k < rays::kClusterSize; k += kWidth) {
     Vec3f x[3];
     Float h[3];
     Mask tall[3];
@@ -193,17 +194,18 @@ inline float steepest_of(const FaceHorizon& from, const TriangleBlock& block, fl
 }
 
 // Computes the value for Horizons::ask().
-inline float find_horizon(const Clusters& clusters, int slot, int octant, float size) {
-  const FaceHorizon from(clusters.blocks[slot / kClusterSize], slot % kClusterSize, octant, size);
-  if (!from.valid) return Horizons::kNever;
-  int waiting[Clusters::kMaxWaiting];
+inline float find_horizon(const rays::Clusters& clusters, int slot, int octant, float size) {
+  const FaceHorizon from(clusters.blocks[slot / rays::kClusterSize], slot % rays::kClusterSize,
+                         octant, size);
+  if (!from.valid) return rays::Horizons::kNever;
+  int waiting[rays::Clusters::kMaxWaiting];
   int left = 1;
   waiting[0] = 0;
   // The face's own block first: steep neighbours exclude much of the tree.
-  float slope = steepest_of(from, clusters.blocks[slot / kClusterSize], 0);
-  if (slope > kSteepest) return Horizons::kNever;
+  float slope = steepest_of(from, clusters.blocks[slot / rays::kClusterSize], 0);
+  if (slope > kSteepest) return rays::Horizons::kNever;
   while (left) {
-    const ClusterNode& node = clusters.nodes[waiting[--left]];
+    const rays::ClusterNode& node = clusters.nodes[waiting[--left]];
     for (std::uint32_t near = rising(from, node, slope); near; near &= near - 1) {
       const int child = node.child[__builtin_ctz(near)];
       if (child >= 0) {
@@ -211,7 +213,7 @@ inline float find_horizon(const Clusters& clusters, int slot, int octant, float 
         continue;
       }
       slope = steepest_of(from, clusters.blocks[~child], slope);
-      if (slope > kSteepest) return Horizons::kNever;
+      if (slope > kSteepest) return rays::Horizons::kNever;
     }
   }
   return slope / __builtin_sqrtf(1 + slope * slope) + 2e-3f;
@@ -242,7 +244,7 @@ inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f n
   Float4 planes[kWidth], sines[kWidth];
   for (int i = 0; i < kWidth; ++i) {
     planes[i] = Float4{};
-    sines[i] = Float4{Horizons::kNever};
+    sines[i] = Float4{rays::Horizons::kNever};
     if (!(asked >> i & 1u) || faces[i] < 0) continue;  // or a wall of a height field
     planes[i] = load4(g.horizons->plane(faces[i]));
     sines[i] = Float4{g.horizons->ask(faces[i], octants[i], [&] {
@@ -262,4 +264,4 @@ inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f n
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

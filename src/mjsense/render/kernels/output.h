@@ -4,7 +4,7 @@
 
 #include "mjsense/render/kernels/transparency.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Copies `values` [16, n] of a packet into the image [H, W, n].
@@ -121,4 +121,4 @@ inline void write_rgb(const ImageTargets& targets, const PixelGrid& grid, int x0
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -6,7 +6,7 @@
 #include "mjsense/render/kernels/raster.h"
 #include "mjsense/render/kernels/trace.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 inline void update_farthest(Tile& tile, PacketMask packets) {
@@ -59,4 +59,4 @@ inline void trace_transparent(const View& view, const int* list, int count, Tile
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

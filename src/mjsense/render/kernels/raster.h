@@ -12,18 +12,18 @@
 
 #include "mjsense/render/kernels/trace.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // A block of triangles as linear functions of x and y: f(x, y) = f[0] x + f[1] y - f[2].
 struct alignas(64) Drawn {
-  float edges[3][3][kClusterSize];
-  float inverse_t[3][kClusterSize];
-  float window[4][kClusterSize];
-  float nearest[kClusterSize], farthest[kClusterSize];  // planar depth of the corners
+  float edges[3][3][rays::kClusterSize];
+  float inverse_t[3][rays::kClusterSize];
+  float window[4][rays::kClusterSize];
+  float nearest[rays::kClusterSize], farthest[rays::kClusterSize];  // planar depth of the corners
 };
 
-inline void store(float (*p)[kClusterSize], int k, Vec3f v) {
+inline void store(float (*p)[rays::kClusterSize], int k, Vec3f v) {
   store(p[0] + k, v.x);
   store(p[1] + k, v.y);
   store(p[2] + k, v.z);
@@ -39,11 +39,11 @@ inline Mask holds_center(Float low, Float high, float first, float step) {
 
 // Sets up the triangles that may be visible in the tile: they face the camera and cover a pixel
 // centre.
-inline std::uint32_t set_up(const View& view, const ViewGeom& g, const TriangleBlock& block,
+inline std::uint32_t set_up(const View& view, const ViewGeom& g, const rays::TriangleBlock& block,
                             const Tile& tile, Drawn& out) {
   const PixelGrid& grid = view.grid;
   std::uint32_t drawn = 0;
-  for (int k = 0; k < kClusterSize; k += kWidth) {
+  for (int k = 0; k < rays::kClusterSize; k += kWidth) {
     Vec3f c[3];
     for (int i = 0; i < 3; ++i) {
       const Vec3f v{load(block.corners[i][0] + k), load(block.corners[i][1] + k),
@@ -93,7 +93,7 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, const TriangleB
   return drawn;
 }
 
-inline Float linear(const float (*f)[kClusterSize], int lane, Float x, Float y) {
+inline Float linear(const float (*f)[rays::kClusterSize], int lane, Float x, Float y) {
   return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
 }
 
@@ -161,9 +161,9 @@ struct TileFrustum {
     b[4] += tile.depth;  // excludes what is behind the hits so far
   }
 
-  std::uint32_t children(const ClusterNode& node) const {
+  std::uint32_t children(const rays::ClusterNode& node) const {
     std::uint32_t seen = 0;
-    for (int k = 0; k < kClusterSize; k += kWidth) {
+    for (int k = 0; k < rays::kClusterSize; k += kWidth) {
       const Vec3f c{load(node.center[0] + k), load(node.center[1] + k), load(node.center[2] + k)};
       const Vec3f h{load(node.half[0] + k), load(node.half[1] + k), load(node.half[2] + k)};
       Float minimum = splat(kInfinity);
@@ -183,13 +183,13 @@ constexpr int kMaxBlocks = 640;  // in one tile; more are never worth rasterisin
 
 // Writes the blocks of triangles that the tile may see and returns their number, or -1 if it
 // exceeds `maximum`.
-inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int maximum,
+inline int find_blocks(const rays::Clusters& clusters, const TileFrustum& frustum, int maximum,
                        int* blocks) {
-  int waiting[Clusters::kMaxWaiting];
+  int waiting[rays::Clusters::kMaxWaiting];
   int left = 1, found = 0;
   waiting[0] = 0;
   while (left) {
-    const ClusterNode& node = clusters.nodes[waiting[--left]];
+    const rays::ClusterNode& node = clusters.nodes[waiting[--left]];
     for (std::uint32_t seen = frustum.children(node); seen; seen &= seen - 1) {
       const int child = node.child[__builtin_ctz(seen)];
       if (child >= 0) {
@@ -204,7 +204,7 @@ inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int
   return found;
 }
 
-inline void prefetch(const TriangleBlock& block) {
+inline void prefetch(const rays::TriangleBlock& block) {
   const char* p = reinterpret_cast<const char*>(&block);
   for (std::size_t line = 0; line < sizeof block; line += 64) __builtin_prefetch(p + line);
 }
@@ -214,7 +214,7 @@ inline void prefetch(const TriangleBlock& block) {
 inline bool rasterize(const View& view, int index, PacketMask packets, Tile& tile,
                       PacketMask& changed) {
   const ViewGeom& g = view.geoms[index];
-  const Clusters& clusters = *g.clusters;
+  const rays::Clusters& clusters = *g.clusters;
   // A packet of rays costs about as much as kBlocksPerPacket blocks.
   constexpr int kBlocksPerPacket = 40;
   const int maximum = kBlocksPerPacket * __builtin_popcount(packets);
@@ -223,7 +223,7 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
   if (count < 0) return false;
   Drawn drawn;
   for (int i = 0; i < count; ++i) {
-    const TriangleBlock& block = clusters.blocks[blocks[i]];
+    const rays::TriangleBlock& block = clusters.blocks[blocks[i]];
     if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
     for (std::uint32_t lanes = set_up(view, g, block, tile, drawn); lanes; lanes &= lanes - 1) {
       const int lane = __builtin_ctz(lanes);
@@ -244,4 +244,4 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -5,13 +5,13 @@
 
 #include <mujoco/mujoco.h>
 
+#include "mjsense/core/simd.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/kernels.h"
-#include "mjsense/rays/simd.h"
 #include "mjsense/rays/triangle_clusters.h"
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr int kLanes = 16;
@@ -192,7 +192,7 @@ inline Float plane(const ViewGeom& g, Vec3f o, Vec3f d, bool both_sides) {
 }
 
 // Elevation (m) at a fractional column and row on the border of a height field.
-inline float border_height(const HeightField& f, float column, float row) {
+inline float border_height(const rays::HeightField& f, float column, float row) {
   const int c = column < 0 ? 0 : column >= f.cols - 1 ? f.cols - 2 : static_cast<int>(column);
   const int r = row < 0 ? 0 : row >= f.rows - 1 ? f.rows - 2 : static_cast<int>(row);
   const float fc = column - c, fr = row - r;
@@ -202,4 +202,4 @@ inline float border_height(const HeightField& f, float column, float row) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

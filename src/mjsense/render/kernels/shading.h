@@ -10,7 +10,7 @@
 #include "mjsense/render/kernels/shadow_rays.h"
 #include "mjsense/render/kernels/surfaces.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 struct alignas(64) Colors {
@@ -216,4 +216,4 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

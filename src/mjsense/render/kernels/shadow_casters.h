@@ -6,7 +6,7 @@
 
 #include "mjsense/render/kernels/light_window.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 struct Casters {
@@ -84,13 +84,13 @@ inline bool add_parts(const View& view, int index, const LitWindow& points, int 
                       Casters& out) {
   const ViewGeom& g = view.geoms[index];
   const SeenByLight seen(*out.frame, g, out.error);
-  int waiting[Clusters::kMaxWaiting];
+  int waiting[rays::Clusters::kMaxWaiting];
   int left = 1;
   waiting[0] = 0;
   const int before = out.count;
   ChildWindows w;
   while (left) {
-    const ClusterNode& node = g.clusters->nodes[waiting[--left]];
+    const rays::ClusterNode& node = g.clusters->nodes[waiting[--left]];
     for (std::uint32_t near = seen.children(node, points, w); near; near &= near - 1) {
       const int k = __builtin_ctz(near);
       const bool wide =
@@ -157,4 +157,4 @@ inline void find_casters(const View& view, int light, Part part, const float* lo
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -5,7 +5,7 @@
 #include "mjsense/render/kernels/mesh_horizons.h"
 #include "mjsense/render/kernels/shadow_casters.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Points to be lit and their rays to the light, camera frame: q = p + s d, s in (0, end).
@@ -19,7 +19,7 @@ struct alignas(64) LightRays {
 
 // Rays from on or above a height field that rise more steeply than its steepest slope; they do not
 // hit it again.
-inline Mask leaves_ground(const HeightField& field, Vec3f o, Vec3f d, Mask on_ground) {
+inline Mask leaves_ground(const rays::HeightField& field, Vec3f o, Vec3f d, Mask on_ground) {
   const Float level = sqrt(fma(d.x, d.x, d.y * d.y));
   return (on_ground | (splat(field.top) <= o.z)) & (level * splat(1.01f * field.steepest) < d.z);
 }
@@ -28,7 +28,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
                                          std::uint32_t active) {
   const ViewGeom& g = view.geoms[index];
   const bool has_horizons = g.horizons && !view.grid.orthographic;
-  EmbreeRays ray;
+  rays::EmbreeRays ray;
   alignas(64) int valid[kWidth];
   std::uint32_t dark = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
@@ -63,7 +63,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
     store(ray.time, zero);
     store(reinterpret_cast<int*>(ray.mask), int_of(-1));
     store(reinterpret_cast<int*>(ray.flags), int_of(0));
-    embree_occluded(valid, static_cast<RTCScene>(g.bvh), &ray, false, true);
+    rays::embree_occluded(valid, static_cast<RTCScene>(g.bvh), &ray, false, true);
     dark |= bits(hit & (load(ray.tfar) < zero)) << k;
   }
   return dark;
@@ -124,4 +124,4 @@ inline std::uint32_t in_shadow(const View& view, Casters& casters, const LightRa
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

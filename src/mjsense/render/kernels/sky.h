@@ -4,7 +4,7 @@
 
 #include "mjsense/render/kernels/shading.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
@@ -70,4 +70,4 @@ inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, C
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

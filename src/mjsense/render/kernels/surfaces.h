@@ -5,7 +5,7 @@
 
 #include "mjsense/render/kernels/texture.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Surface data of a packet, camera frame. Undefined in lanes without a hit.
@@ -242,4 +242,4 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -5,7 +5,7 @@
 
 #include "mjsense/render/kernels/rays.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 using Ints = int __attribute__((vector_size(4 * kWidth)));
@@ -182,4 +182,4 @@ inline void curved_uv(const ViewGeom& g, const float* p, const float* n, float& 
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -8,7 +8,7 @@
 #include "mjsense/render/kernels/tile_fixed_layer.h"
 #include "mjsense/render/kernels/transparency.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Pixel offsets of a packet's lanes.
@@ -455,4 +455,4 @@ inline void render_tiles(const View& view, const ImageTargets& targets, int firs
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

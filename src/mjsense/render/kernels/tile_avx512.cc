@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/kernels/tile.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 void render_tiles_avx512(const View& view, const ImageTargets& targets, int first, int last,
                          TileScratch& scratch) {
   render_tiles(view, targets, first, last, scratch);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -5,7 +5,7 @@
 #include "mjsense/render/kernels/pixel_visibility.h"
 #include "mjsense/render/kernels/shading.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 inline std::uint32_t hit_lanes(const Hits& hits) {
@@ -229,4 +229,4 @@ inline void load_rest(const FixedTile& from, int q, std::uint32_t lanes, Hits& h
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/kernels/tile_memory.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 namespace {
 
@@ -25,4 +25,4 @@ TileMemory::TileMemory(int max_geoms)
   scratch_.tile = tile_.data();
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -7,7 +7,7 @@
 #include "mjsense/core/array.h"
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 class TileMemory {
  public:
@@ -21,4 +21,4 @@ class TileMemory {
   TileScratch scratch_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/kernels/tile.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 void render_tiles_portable(const View& view, const ImageTargets& targets, int first, int last,
                            TileScratch& scratch) {
@@ -10,4 +10,4 @@ void render_tiles_portable(const View& view, const ImageTargets& targets, int fi
 
 std::size_t tile_bytes() { return sizeof(TileSpace); }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

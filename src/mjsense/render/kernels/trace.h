@@ -4,7 +4,7 @@
 
 #include "mjsense/render/kernels/rays.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 inline bool overlap(const float* a, const float* b) {
@@ -80,7 +80,7 @@ struct Tracing {
 // Writes the rays of kWidth pixels from k on for Embree. Only rays that meet the geom's bounding
 // box before `limit` are valid; returns false if there are none.
 inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limit,
-                      EmbreeRayHits& rays, int* valid) {
+                      rays::EmbreeRayHits& rays, int* valid) {
   const ViewGeom& g = at.geom;
   const LocalRay ray = at.ray(pixels, k);
   const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
@@ -102,7 +102,8 @@ inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limi
 
 // The first hit on a closed surface is a front face. Only lanes whose first hit is a back face are
 // traced again with Embree's filter that tests the side of every triangle.
-inline void trace_past_back_faces(const ViewGeom& g, Float limit, EmbreeRayHits& rays, int* valid) {
+inline void trace_past_back_faces(const ViewGeom& g, Float limit, rays::EmbreeRayHits& rays,
+                                  int* valid) {
   const Vec3f n{load(rays.hit.Ng_x), load(rays.hit.Ng_y), load(rays.hit.Ng_z)};
   const Vec3f d{load(rays.ray.dir_x), load(rays.ray.dir_y), load(rays.ray.dir_z)};
   int* ids = reinterpret_cast<int*>(rays.hit.geomID);
@@ -111,13 +112,13 @@ inline void trace_past_back_faces(const ViewGeom& g, Float limit, EmbreeRayHits&
   store(valid, select(back, int_of(-1), int_of(0)));
   store(ids, select(back, int_of(-1), load(ids)));
   store(rays.ray.tfar, select(back, limit, load(rays.ray.tfar)));
-  embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
+  rays::embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
 }
 
 inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits* hits,
                                   PacketMask packets) {
   const ViewGeom& g = at.geom;
-  EmbreeRayHits rays;
+  rays::EmbreeRayHits rays;
   alignas(64) int valid[kWidth];
   // Embree does not change these fields.
   store(rays.ray.time, splat(0.0f));
@@ -131,7 +132,7 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
     for (int k = 0; k < kLanes; k += kWidth) {
       const Float before = load(h.t + k), limit = before * splat(1.0f + kSame);
       if (!fill_rays(at, pixels[q], k, limit, rays, valid)) continue;
-      embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
+      rays::embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
       trace_past_back_faces(g, limit, rays, valid);
       const Float t = load(rays.ray.tfar);
       const Int found = load(reinterpret_cast<int*>(rays.hit.geomID));
@@ -157,7 +158,7 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
 // processed one lane at a time.
 inline bool trace_walls_of_packet(const Tracing& at, const Pixels& pixels, Hits& hits) {
   const ViewGeom& g = at.geom;
-  const HeightField& f = *g.height_field;
+  const rays::HeightField& f = *g.height_field;
   const float center[3] = {0, 0, 0.5f * (f.size[2] - f.size[3])};
   const float half[3] = {f.size[0], f.size[1], 0.5f * (f.size[2] + f.size[3])};
   bool changed = false;
@@ -273,4 +274,4 @@ inline void clear(Hits& hits, float far) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -7,7 +7,7 @@
 #include "mjsense/render/kernels/shading.h"
 #include "mjsense/render/kernels/tile_fixed_layer.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr int kMaxMirrored = 32;  // maximum number of transparent geoms in a reflection
@@ -139,4 +139,4 @@ inline void add_reflection(const View& view, const Reflection& reflection, int q
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -5,7 +5,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/render/opengl/gl_renderer.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel*, const GlRendererCfg&,
                                              const std::string& context) {
@@ -15,4 +15,4 @@ std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel*, const GlRendererCfg
       context));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

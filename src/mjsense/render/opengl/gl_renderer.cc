@@ -17,7 +17,7 @@
 #include "mjsense/rays/skin_shapes.h"
 #include "mjsense/render/opengl/visual_fields.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // libEGL, loaded on first use, so that it is not required otherwise.
@@ -145,7 +145,7 @@ class MujocoGl final : public GlRenderer {
 
   void remember(int world, const mjModel* model) override { worlds_[world].copy_from(model); }
 
-  void render(int world, const RayWorld& state, std::span<const mjvGeom> markers,
+  void render(int world, const rays::RayWorld& state, std::span<const mjvGeom> markers,
               const ImageTargets& targets) override {
     show(worlds_[world]);
     pose(state);
@@ -203,7 +203,7 @@ class MujocoGl final : public GlRenderer {
     std::copy_n(model_->mat_texrepeat, 2 * count, context_.mat_texrepeat);
   }
 
-  void pose(const RayWorld& world) {
+  void pose(const rays::RayWorld& world) {
     for (int i = 0; i < world.num_geoms(); ++i) {
       std::copy_n(world.geom(i).pos, 3, data_->geom_xpos + 3 * i);
       std::copy_n(world.geom(i).mat, 9, data_->geom_xmat + 9 * i);
@@ -285,4 +285,4 @@ std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRende
   return std::make_unique<MujocoGl>(model, cfg, context);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -14,9 +14,11 @@
 
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
-
+namespace mjsense::rays {
 class RayWorld;
+}  // namespace mjsense::rays
+
+namespace mjsense::render {
 
 struct GlRendererCfg {
   int num_worlds = 1;
@@ -40,7 +42,7 @@ class GlRenderer {
   virtual void remember(int world, const mjModel* model) = 0;
   // Writes rgb, depth (planar) and segmentation of `targets`, with the poses of `state`, these
   // markers, and the fields from remember().
-  virtual void render(int world, const RayWorld& state, std::span<const mjvGeom> markers,
+  virtual void render(int world, const rays::RayWorld& state, std::span<const mjvGeom> markers,
                       const ImageTargets& targets) = 0;
 };
 
@@ -48,4 +50,4 @@ class GlRenderer {
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRendererCfg& cfg,
                                              const std::string& context);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::render {
 
 class VisualFields {
  public:
@@ -68,4 +68,4 @@ class VisualFields {
   std::vector<char> values_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -34,8 +34,8 @@ struct Picture {
         normals(3 * w * h),
         points(3 * w * h),
         ids(2 * w * h) {}
-  ImageTargets targets() {
-    ImageTargets t;
+  render::ImageTargets targets() {
+    render::ImageTargets t;
     t.rgb = rgb.data();
     t.depth = depth.data();
     t.normals = normals.data();
@@ -54,10 +54,10 @@ struct Picture {
 struct TestRenderer {
   std::unique_ptr<mjModel, void (*)(mjModel*)> model{nullptr, mj_deleteModel};
   std::unique_ptr<mjData, void (*)(mjData*)> data{nullptr, mj_deleteData};
-  std::unique_ptr<RayScene> rays;
-  std::unique_ptr<SurfaceAssets> assets;
-  ViewOptions options;
-  RenderTiles render = best_render_tiles();
+  std::unique_ptr<rays::RayScene> rays;
+  std::unique_ptr<render::SurfaceAssets> assets;
+  render::ViewOptions options;
+  render::RenderTiles render = render::best_render_tiles();
 
   explicit TestRenderer(std::string xml) {
     // A camera in the model enables what only images need: clusters of triangles.
@@ -86,8 +86,8 @@ struct TestRenderer {
   void update() {
     mj_forward(model.get(), data.get());
     if (!rays) {
-      rays = std::make_unique<RayScene>(model.get(), 1);
-      assets = std::make_unique<SurfaceAssets>(model.get(), true, true);
+      rays = std::make_unique<rays::RayScene>(model.get(), 1);
+      assets = std::make_unique<render::SurfaceAssets>(model.get(), true, true);
     }
     World world;
     world.model = model.get();
@@ -95,8 +95,9 @@ struct TestRenderer {
     rays->update(world);
   }
   // The view from `at`; x and y are the camera's axes (unit, world frame).
-  const View& view(ViewBuilder& builder, std::array<double, 3> at, std::array<double, 3> x,
-                   std::array<double, 3> y, const PixelGrid& grid) {
+  const render::View& view(render::ViewBuilder& builder, std::array<double, 3> at,
+                           std::array<double, 3> x, std::array<double, 3> y,
+                           const render::PixelGrid& grid) {
     const double z[3] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
                          x[0] * y[1] - x[1] * y[0]};
     double r[9];
@@ -105,19 +106,20 @@ struct TestRenderer {
       r[3 * i + 1] = y[i];
       r[3 * i + 2] = z[i];
     }
-    return builder.build(rays->world(0), rays->shared(), Appearance(model.get()), {}, at.data(), r,
-                         grid);
+    return builder.build(rays->world(0), rays->shared(), render::Appearance(model.get()), {},
+                         at.data(), r, grid);
   }
-  void draw(const View& view, const ImageTargets& targets) {
-    TileMemory memory(ViewBuilder::max_geoms(model.get()));
-    render(view, targets, 0, (view.grid.height + kTileSize - 1) / kTileSize, memory.scratch());
+  void draw(const render::View& view, const render::ImageTargets& targets) {
+    render::TileMemory memory(render::ViewBuilder::max_geoms(model.get()));
+    render(view, targets, 0, (view.grid.height + render::kTileSize - 1) / render::kTileSize,
+           memory.scratch());
   }
   Picture take(std::array<double, 3> at, std::array<double, 3> x, std::array<double, 3> y,
-               const PixelGrid& grid, int samples = 1) {
+               const render::PixelGrid& grid, int samples = 1) {
     if (!rays) update();
-    ViewBuilder builder(model.get(), *assets, options);
+    render::ViewBuilder builder(model.get(), *assets, options);
     Picture out(grid.width, grid.height);
-    ImageTargets targets = out.targets();
+    render::ImageTargets targets = out.targets();
     targets.samples = samples;
     draw(view(builder, at, x, y, grid), targets);
     return out;
@@ -126,7 +128,7 @@ struct TestRenderer {
   std::vector<std::uint8_t> shoot(std::array<double, 3> at, std::array<double, 3> x,
                                   std::array<double, 3> y, int size, double fovy = 45,
                                   int samples = 1) {
-    return take(at, x, y, grid_from_fovy(size, size, fovy, false), samples).rgb;
+    return take(at, x, y, render::grid_from_fovy(size, size, fovy, false), samples).rgb;
   }
   Pixel center(std::array<double, 3> at, std::array<double, 3> x, std::array<double, 3> y,
                double fovy = 45) {

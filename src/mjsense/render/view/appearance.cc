@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // MuJoCo's visualiser uses a geom's own colour, unless that is the default grey and the geom has a
@@ -19,7 +19,7 @@ void resolve_rgba(const mjModel* m, int material, const float* own, float* out) 
 
 Appearance::Appearance(const mjModel* m, int max_lights)
     : max_lights_(max_lights),
-      flex_parts_(flex_parts(m)),
+      flex_parts_(rays::flex_parts(m)),
       rgba_(4 * (m->ngeom + flex_parts_.size() + m->nskin)),
       materials_(m->nmat),
       lights_(max_lights),
@@ -31,7 +31,7 @@ void Appearance::copy(const mjModel* m) {
   for (int i = 0; i < m->ngeom; ++i)
     resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
   float* next = rgba_.data() + 4 * m->ngeom;
-  for (const FlexPart& part : flex_parts_) {
+  for (const rays::FlexPart& part : flex_parts_) {
     resolve_rgba(m, m->flex_matid[part.element], m->flex_rgba + 4 * part.flex, next);
     next += 4;
   }
@@ -87,4 +87,4 @@ void Appearance::copy_lights(const mjModel* m) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

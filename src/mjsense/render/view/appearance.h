@@ -10,7 +10,7 @@
 #include "mjsense/rays/flex_surface.h"
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 struct Material {
   float specular, shininess, emission, reflectance;
@@ -48,7 +48,7 @@ class Appearance {
   void copy_lights(const mjModel* model);
 
   int max_lights_;
-  std::vector<FlexPart> flex_parts_;
+  std::vector<rays::FlexPart> flex_parts_;
   std::vector<float> rgba_;
   std::vector<Material> materials_;
   Sky sky_;
@@ -57,4 +57,4 @@ class Appearance {
   std::size_t num_lights_ = 0;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 PixelGrid grid_from_window(int width, int height, double left, double right, double top,
@@ -182,4 +182,4 @@ std::vector<float> distorted_rays(const PixelGrid& grid, Lens lens,
   return rays;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -10,7 +10,7 @@
 
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Square pixels; fovy is that of the image's height: degrees, or metres if orthographic.
 PixelGrid grid_from_fovy(int width, int height, double fovy_deg, bool orthographic);
@@ -43,4 +43,4 @@ std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficien
 std::vector<float> distorted_rays(const PixelGrid& grid, Lens lens,
                                   std::span<const double> coefficients, const char* context);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

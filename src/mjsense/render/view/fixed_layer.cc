@@ -7,7 +7,7 @@
 
 #include "mjsense/render/view/view_builder.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 bool equal(const PixelGrid& a, const PixelGrid& b) {
@@ -109,4 +109,4 @@ FixedTile* FixedLayers::settle(int world, const View& view) {
   return layer && layer->settles(view) ? layer->tiles() : nullptr;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -13,7 +13,7 @@
 
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Whether a body stays in place between resets: there is no joint between it and the world. A mocap
 // body with children is the base of something and counts as fixed; one without children is a target
@@ -75,4 +75,4 @@ class FixedLayers {
   std::vector<FixedLayer> own_;  // of the first own_.size() worlds
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

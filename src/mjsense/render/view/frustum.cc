@@ -6,13 +6,13 @@
 
 #include "mjsense/rays/box_list.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // Tolerance relative to lengths and positions, for the rounding of rays and intersection tests.
 constexpr double kSlack = 1e-4;
 
-bool misses(const KernelBoxes& boxes, int k, const Frustum& frustum) {
+bool misses(const rays::KernelBoxes& boxes, int k, const Frustum& frustum) {
   const float low[3] = {boxes.low[0][k], boxes.low[1][k], boxes.low[2][k]};
   const float high[3] = {boxes.high[0][k], boxes.high[1][k], boxes.high[2][k]};
   return frustum.misses(low, high);
@@ -75,7 +75,7 @@ void Frustum::widen(double by) {
   for (Side& side : sides_) side.offset += by * std::sqrt(side.along(side.normal));
 }
 
-void find_candidates(const BoxList& list, const Frustum& frustum,
+void find_candidates(const rays::BoxList& list, const Frustum& frustum,
                      std::vector<std::uint64_t>& candidates) {
   std::fill(candidates.begin(), candidates.end(), 0);
   list.each([&](int block) { return !misses(list.blocks(), block, frustum); },
@@ -86,4 +86,4 @@ void find_candidates(const BoxList& list, const Frustum& frustum,
             });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

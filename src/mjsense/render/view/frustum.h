@@ -9,9 +9,11 @@
 
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
-
+namespace mjsense::rays {
 class BoxList;
+}  // namespace mjsense::rays
+
+namespace mjsense::render {
 
 // The part of the world that an image can show: a pyramid, or a box for an orthographic camera.
 class Frustum {
@@ -44,7 +46,7 @@ class Frustum {
 
 // Sets bit i % 64 of word i / 64 if object i of the list may be in the image, and clears the other
 // bits.
-void find_candidates(const BoxList& boxes, const Frustum& frustum,
+void find_candidates(const rays::BoxList& boxes, const Frustum& frustum,
                      std::vector<std::uint64_t>& candidates);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

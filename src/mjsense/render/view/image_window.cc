@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
@@ -87,4 +87,4 @@ bool find_window(const View& view, ViewGeom& g) {
          g.window[3] >= bottom;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -4,7 +4,7 @@
 
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Sets center, radius, window and nearest of `g` from its pose and box. Returns false if no point
 // of it can be in the image of view.grid between view.near and view.far.
@@ -14,4 +14,4 @@ bool find_window(const View& view, ViewGeom& g);
 // in one bit share an edge.
 void box_corners(const ViewGeom& g, float (*corners)[3]);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

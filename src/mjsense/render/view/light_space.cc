@@ -10,7 +10,7 @@
 
 #include "mjsense/render/view/image_window.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr int kFaces = 6;  // faces of a cube around a light that shines in all directions
@@ -145,4 +145,4 @@ void LightSpace::fill(View& view) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

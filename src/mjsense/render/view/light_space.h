@@ -8,7 +8,7 @@
 
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Owns View::light_frames and light_sides of one view. fill() allocates nothing.
 class LightSpace {
@@ -27,4 +27,4 @@ class LightSpace {
   std::vector<float> windows_, sides_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

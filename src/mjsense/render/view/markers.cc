@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr int kCatenaryPoints = 100;  // MuJoCo's limit
@@ -31,7 +31,7 @@ Marker marker_of(const mjvGeom& g) {
                      .texture = g.matid < 0 ? -1 : g.texid,
                      .repeat = {g.texrepeat[0], g.texrepeat[1]},
                      .uniform = g.texuniform != 0};
-  RayGeom& shape = marker.shape;
+  rays::RayGeom& shape = marker.shape;
   shape.type = g.type;
   shape.data = -1;
   std::copy_n(g.pos, 3, shape.pos);
@@ -76,4 +76,4 @@ void Markers::copy(const mjModel* model, mjData* data) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -12,10 +12,10 @@
 #include "mjsense/rays/ray_geom.h"
 #include "mjsense/render/view/appearance.h"
 
-namespace mjsense {
+namespace mjsense::render {
 
 struct Marker {
-  RayGeom shape;
+  rays::RayGeom shape;
   Material material;  // MuJoCo's defaults if there is none
   float rgba[4];
   int id, object;  // for segmentation: id and mjtObj
@@ -47,4 +47,4 @@ class Markers {
   std::size_t count_ = 0;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

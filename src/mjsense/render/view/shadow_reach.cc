@@ -10,7 +10,7 @@
 #include "mjsense/render/view/appearance.h"
 #include "mjsense/render/view/frustum.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
@@ -22,7 +22,7 @@ double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] 
 struct Extent {
   double low[3] = {kEndless, kEndless, kEndless}, high[3] = {-kEndless, -kEndless, -kEndless};
 
-  void add(const KernelBoxes& boxes, int k) {
+  void add(const rays::KernelBoxes& boxes, int k) {
     for (int i = 0; i < 3; ++i) {
       low[i] = std::min<double>(low[i], boxes.low[i][k]);
       high[i] = std::max<double>(high[i], boxes.high[i][k]);
@@ -43,9 +43,9 @@ struct Extent {
   }
 };
 
-bool is_plane(const KernelBoxes& boxes, int k) { return boxes.high[0][k] > kPlane; }
+bool is_plane(const rays::KernelBoxes& boxes, int k) { return boxes.high[0][k] > kPlane; }
 
-Extent extent_of(const BoxList& list) {
+Extent extent_of(const rays::BoxList& list) {
   Extent out;
   list.each(
       [&](int block) {
@@ -60,15 +60,15 @@ Extent extent_of(const BoxList& list) {
 }
 
 // Maximum distance between a caster and its shadow in parallel light, on objects and on planes.
-double longest_shadow(const RayWorld& world, const Extent& extent, const RayLight& light,
-                      const double* to_light) {
+double longest_shadow(const rays::RayWorld& world, const Extent& extent,
+                      const rays::RayLight& light, const double* to_light) {
   // Objects behind the light cast no shadow; see dark_lanes() of the kernels.
   double longest = std::min(extent.maximum(to_light), dot(light.pos, to_light));
   longest = std::max(longest - extent.minimum(to_light), 0.0);
-  const BoxList& boxes = world.boxes();
+  const rays::BoxList& boxes = world.boxes();
   const auto add_plane = [&](int k) {
     if (!is_plane(boxes.all(), k)) return;
-    const RayGeom& plane = world.geom(boxes.object(k));
+    const rays::RayGeom& plane = world.geom(boxes.object(k));
     const double n[3] = {plane.mat[2], plane.mat[5], plane.mat[8]};
     const double height = dot(n, plane.pos), slope = std::abs(dot(n, to_light));
     const double away = std::max(extent.maximum(n) - height, height - extent.minimum(n));
@@ -80,7 +80,7 @@ double longest_shadow(const RayWorld& world, const Extent& extent, const RayLigh
 
 }  // namespace
 
-void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& frustum) {
+void reach_lights(const rays::RayWorld& world, const Appearance& appearance, Frustum& frustum) {
   const Extent extent = extent_of(world.boxes());
   if (!(extent.low[0] <= extent.high[0])) return;  // only planes
   bool any = false;
@@ -89,7 +89,7 @@ void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& 
     const int id = appearance.light_ids()[i];
     if (!light.shadows || id < 0) continue;
     any = true;
-    const RayLight& source = world.lights()[id];
+    const rays::RayLight& source = world.lights()[id];
     if (light.kind != LightKind::kDirectional) {
       frustum.reach(source.pos);
       continue;
@@ -103,4 +103,4 @@ void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& 
   if (any) frustum.widen(1e-3 * extent.size());
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -3,14 +3,17 @@
 // Extends a camera's frustum by shadow casters. Only objects between a light and the visible region
 // can cast a shadow into the image; the rest of a large scene is skipped.
 
-namespace mjsense {
+namespace mjsense::rays {
+class RayWorld;
+}  // namespace mjsense::rays
+
+namespace mjsense::render {
 
 class Appearance;
 class Frustum;
-class RayWorld;
 
 // Extends the frustum until everything that may cast a shadow into it is inside. The world must
 // have no skins, because their bounding boxes are not stored.
-void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& frustum);
+void reach_lights(const rays::RayWorld& world, const Appearance& appearance, Frustum& frustum);
 
-}  // namespace mjsense
+}  // namespace mjsense::render

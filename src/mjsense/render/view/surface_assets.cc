@@ -9,7 +9,7 @@
 #include "mjsense/core/content_cache.h"
 #include "mjsense/rays/flex_surface.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 // If the cosine between a vertex normal and the face's normal is below this, the corner is on a
@@ -263,8 +263,8 @@ SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
 }
 
 void SurfaceAssets::add_flex(const mjModel* model, int id, bool textures) {
-  const FlexSurface s = flex_surface(model, id);
-  for (const FlexSurface::Part& part : s.parts) {
+  const rays::FlexSurface s = rays::flex_surface(model, id);
+  for (const rays::FlexSurface::Part& part : s.parts) {
     flex_parts_.emplace_back();
     if (s.texcoords.empty() || !textures) continue;
     auto tables = std::make_shared<MeshTables>();
@@ -288,4 +288,4 @@ void SurfaceAssets::add_skin(const mjModel* model, int id) {
   keep(std::move(tables), skins_[id]);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::render {
 
 // Mip pyramid of RGBA8 images in one array: level 0 first, row 0 first. A cube map has its six
 // faces (+x -x +y -y +z -z) one after another in each level. Each row has one extra texel at its
@@ -89,4 +89,4 @@ class SurfaceAssets {
   const Texture* skybox_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

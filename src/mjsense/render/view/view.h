@@ -9,11 +9,13 @@
 
 #include "mjsense/render/view/surface_assets.h"
 
-namespace mjsense {
-
+namespace mjsense::rays {
+class Horizons;
 struct Clusters;
 struct HeightField;
-class Horizons;
+}  // namespace mjsense::rays
+
+namespace mjsense::render {
 
 // Rays of pixels. Pixel (x, y), row 0 at the top, has the ray from the origin along (X, Y, -1),
 // with X = left + dx (x + 0.5) and Y = top + dy (y + 0.5). An orthographic camera's ray starts at
@@ -57,10 +59,10 @@ struct alignas(64) ViewGeom {
   // A plane seen from below: drawn as a faint veil, absent in depth and segmentation.
   bool behind;
   void* bvh;  // RTCScene of a mesh, a height field's surface, a flex or a skin; else null
-  const Clusters* clusters;  // the same triangles, for rasterising; null: use rays only
-  const Horizons* horizons;  // horizons of the mesh's faces; null without clusters
+  const rays::Clusters* clusters;  // the same triangles, for rasterising; null: use rays only
+  const rays::Horizons* horizons;  // horizons of the mesh's faces; null without clusters
   const MeshSurface* mesh;
-  const HeightField* height_field;
+  const rays::HeightField* height_field;
   Surface surface;
 };
 
@@ -210,4 +212,4 @@ void render_tiles_avx512(const View&, const ImageTargets&, int first, int last, 
 // The fastest version that this CPU supports.
 RenderTiles best_render_tiles();
 
-}  // namespace mjsense
+}  // namespace mjsense::render

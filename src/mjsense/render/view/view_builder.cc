@@ -15,7 +15,7 @@
 #include "mjsense/render/view/image_window.h"
 #include "mjsense/render/view/shadow_reach.h"
 
-namespace mjsense {
+namespace mjsense::render {
 namespace {
 
 constexpr float kOpaque = 0.995f;    // MuJoCo blends geoms with a lower alpha
@@ -90,7 +90,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
 }
 
 template <class SetShape>
-void ViewBuilder::add_shape(const RayGeom& source, int id, const float* rgba,
+void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rgba,
                             const Material* material, const double position[3],
                             const double rotation[9], SetShape shape) {
   const int index = static_cast<int>(order_.size());
@@ -133,17 +133,17 @@ void ViewBuilder::sort_geoms(const double rotation[9]) {
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
 }
 
-const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes,
+const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
                                const Appearance& appearance, std::span<const Marker> markers,
                                const double position[3], const double rotation[9],
                                const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
-  const RayGeom* endless = nullptr;  // the first infinite plane
+  const rays::RayGeom* endless = nullptr;  // the first infinite plane
   const auto texture_of = [&](const Material& material) {
     return assets_->texture(material.texture);
   };
-  const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
+  const auto add = [&](const rays::RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
     if (rgba[3] == 0 || !(flags & options_.groups) || id == excluded_geom_) return;
     if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
@@ -173,13 +173,13 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
       }
     }
   }
-  if (const FlexShapes* flexes = world.flexes()) {
-    for (const FlexShapes::Part& part : flexes->parts()) {
+  if (const rays::FlexShapes* flexes = world.flexes()) {
+    for (const rays::FlexShapes::Part& part : flexes->parts()) {
       const int object = world.num_geoms() + part.flex;
       add(world.geom(object), id++, world.flags()[object], part.material);
     }
   }
-  if (SkinShapes* skins = world.skins()) {
+  if (rays::SkinShapes* skins = world.skins()) {
     skins->bend(options_.groups);
     for (int i = 0; i < skins->size(); ++i)
       add(skins->geom(i), id++, skins->group(i), skins->material(i));
@@ -202,7 +202,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
 }
 
 template <class Build>
-bool ViewBuilder::ends_mirror_search(const RayGeom& g, int id, float alpha, float reflectance,
+bool ViewBuilder::ends_mirror_search(const rays::RayGeom& g, int id, float alpha, float reflectance,
                                      const double position[3], const double rotation[9],
                                      Build build) {
   if (g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) return false;
@@ -244,10 +244,10 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   view_.shadows = scene.shadows;
   view_.skybox = scene.skybox;
   order_.clear();
-  const RayGeom* endless = nullptr;  // the first infinite plane
+  const rays::RayGeom* endless = nullptr;  // the first infinite plane
   int id = 0;
   for (const DrawnGeom& geom : scene.geoms) {
-    const RayGeom& shape = geom.shape;
+    const rays::RayGeom& shape = geom.shape;
     if (!endless && shape.type == mjGEOM_PLANE && shape.size[0] == 0 && shape.size[1] == 0)
       endless = &shape;
     if (id++ == excluded_geom_) continue;
@@ -300,13 +300,13 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
 
 // Mirrors the camera in the plane. Its pixel rays then meet the mirror at the same points and
 // continue to what is reflected. The camera's rotation becomes a reflection, which does no harm.
-void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes,
+void ViewBuilder::set_mirror(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
                              const Appearance& appearance, std::span<const Marker> markers,
                              const double position[3], const double rotation[9]) {
   view_.mirror = -1;
   view_.reflection = nullptr;
   // Returns true if the search is over. As in MuJoCo, there is at most one mirror.
-  const auto settles = [&](const RayGeom& g, int id, float alpha, float reflectance) {
+  const auto settles = [&](const rays::RayGeom& g, int id, float alpha, float reflectance) {
     return ends_mirror_search(g, id, alpha, reflectance, position, rotation,
                               [&](const double p[3], const double r[9]) -> const View& {
                                 return mirrored_->build(world, shapes, appearance, markers, p, r,
@@ -325,8 +325,8 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
     if (settles(marker.shape, id++, marker.rgba[3], marker.material.reflectance)) return;
 }
 
-void ViewBuilder::place(const RayGeom& source, const double position[3], const double rotation[9],
-                        ViewGeom& g) const {
+void ViewBuilder::place(const rays::RayGeom& source, const double position[3],
+                        const double rotation[9], ViewGeom& g) const {
   const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
                             source.pos[2] - position[2]};
   double p[3], eye[3];
@@ -345,8 +345,8 @@ void ViewBuilder::place(const RayGeom& source, const double position[3], const d
   }
 }
 
-void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
-                            const RayGeom& source, ViewGeom& g) {
+void ViewBuilder::set_shape(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
+                            const rays::RayGeom& source, ViewGeom& g) {
   set_primitive(source.type, mjOBJ_GEOM, g.id, g);
   if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
     g.bvh = shapes.mesh_scenes[source.data];
@@ -358,13 +358,13 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
     g.bvh = g.height_field->scene;
     g.clusters = shapes.clusters_of_height_field(source.data);
     g.horizons = shapes.horizons_of_height_field(source.data);
-  } else if (g.type == kFlexType) {
+  } else if (g.type == rays::kFlexType) {
     const int part = g.id - world.num_geoms();
-    const FlexShapes::Part& shape = world.flexes()->parts()[part];
+    const rays::FlexShapes::Part& shape = world.flexes()->parts()[part];
     g.object = mjOBJ_FLEX;
     g.bvh = shape.scene;
     g.mesh = soft_surface(part, *assets_->flex_part(part), shape.normals);
-  } else if (g.type == kSkinType) {
+  } else if (g.type == rays::kSkinType) {
     const int id = source.data;
     g.object = mjOBJ_SKIN;
     g.bvh = world.skins()->scene(id);
@@ -386,8 +386,8 @@ const MeshSurface* ViewBuilder::soft_surface(int index, const MeshSurface& share
   return &surface;
 }
 
-void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Material* material,
-                              const Texture* texture, ViewGeom& g) const {
+void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
+                              const Material* material, const Texture* texture, ViewGeom& g) const {
   Surface& s = g.surface;
   s = {};
   std::copy_n(rgba, 4, s.rgba);
@@ -445,7 +445,7 @@ float ViewBuilder::sky_from(const Sky& sky) const {
 
 // An orthographic view has no position relative to the sky: the sky hides nothing and there is no
 // haze.
-void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
+void ViewBuilder::set_sky(const rays::RayGeom* plane, const Sky& sky, const double position[3],
                           const double rotation[9]) {
   view_.sky_distance = view_.grid.orthographic ? 0 : sky.distance;
   view_.sky_from = sky_from(sky);
@@ -464,7 +464,7 @@ void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double pos
   haze.width = sky.haze_width;
 }
 
-void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance,
+void ViewBuilder::set_lights(const rays::RayWorld& world, const Appearance& appearance,
                              const double position[3], const double rotation[9]) {
   view_.num_lights = static_cast<int>(appearance.lights().size());
   // As in MuJoCo, so that the image is not black.
@@ -479,7 +479,7 @@ void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance
       for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(d[k]);
       continue;
     }
-    const RayLight& source = world.lights()[id];
+    const rays::RayLight& source = world.lights()[id];
     place_light(source.pos, source.dir, position, rotation, light);
   }
 }
@@ -498,4 +498,4 @@ void ViewBuilder::place_light(const double light_position[3], const double direc
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::render

@@ -15,11 +15,13 @@
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
-
+namespace mjsense::rays {
 class RayWorld;
 struct RayGeom;
 struct SharedGeometry;
+}  // namespace mjsense::rays
+
+namespace mjsense::render {
 
 struct ViewOptions {
   unsigned groups = 0x7;  // bit g: geoms of group g
@@ -34,7 +36,7 @@ struct ViewOptions {
 
 // A geom with everything that its image depends on; used where the geoms do not come from a RayWorld.
 struct DrawnGeom {
-  RayGeom shape;  // `center` and `half` are set
+  rays::RayGeom shape;  // `center` and `half` are set
   float rgba[4];
   Material material;
   const Texture* texture;   // null: none
@@ -42,9 +44,9 @@ struct DrawnGeom {
   bool casts;               // casts shadows
   const MeshSurface* mesh;  // null unless the shape has triangles
   void* bvh;                // as in ViewGeom
-  const Clusters* clusters;
-  const Horizons* horizons;
-  const HeightField* height_field;
+  const rays::Clusters* clusters;
+  const rays::Horizons* horizons;
+  const rays::HeightField* height_field;
 };
 
 struct DrawnScene {
@@ -70,7 +72,7 @@ class ViewBuilder {
   ViewBuilder(const mjModel* model, const SurfaceAssets& assets, const ViewOptions& options);
 
   // position, rotation: X_WC, row-major.
-  const View& build(const RayWorld& world, const SharedGeometry& shapes,
+  const View& build(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
                     const Appearance& appearance, std::span<const Marker> markers,
                     const double position[3], const double rotation[9], const PixelGrid& grid);
 
@@ -83,7 +85,7 @@ class ViewBuilder {
   void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // tiles of the last view built
   // Without markers.
   static std::size_t max_geoms(const mjModel* model) {
-    return static_cast<std::size_t>(model->ngeom + model->nskin) + flex_parts(model).size();
+    return static_cast<std::size_t>(model->ngeom + model->nskin) + rays::flex_parts(model).size();
   }
 
  private:
@@ -92,33 +94,33 @@ class ViewBuilder {
     float key;
     int index;
   };
-  void place(const RayGeom& source, const double position[3], const double rotation[9],
+  void place(const rays::RayGeom& source, const double position[3], const double rotation[9],
              ViewGeom& g) const;
-  void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
-                 ViewGeom& g);
+  void set_shape(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
+                 const rays::RayGeom& source, ViewGeom& g);
   // Ids of markers follow those of all other objects.
   int first_marker() const { return static_cast<int>(unsorted_.size() - options_.markers); }
   const MeshSurface* soft_surface(int index, const MeshSurface& shared, const float* normals);
-  void set_surface(const RayGeom& source, const float* rgba, const Material* material,
+  void set_surface(const rays::RayGeom& source, const float* rgba, const Material* material,
                    const Texture* texture, ViewGeom& g) const;
   // shape(g) sets the fields that depend on the kind of object.
   template <class SetShape>
-  void add_shape(const RayGeom& source, int id, const float* rgba, const Material* material,
+  void add_shape(const rays::RayGeom& source, int id, const float* rgba, const Material* material,
                  const double position[3], const double rotation[9], SetShape shape);
   void sort_geoms(const double rotation[9]);
   // Whether the geom ends the search for the mirror. If it reflects, build(p, r) must return the
   // view from the mirrored camera pose.
   template <class Build>
-  bool ends_mirror_search(const RayGeom& geom, int id, float alpha, float reflectance,
+  bool ends_mirror_search(const rays::RayGeom& geom, int id, float alpha, float reflectance,
                           const double position[3], const double rotation[9], Build build);
-  void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
-                  std::span<const Marker> markers, const double position[3],
-                  const double rotation[9]);
+  void set_mirror(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
+                  const Appearance& appearance, std::span<const Marker> markers,
+                  const double position[3], const double rotation[9]);
   float sky_from(const Sky& sky) const;
-  void set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
+  void set_sky(const rays::RayGeom* plane, const Sky& sky, const double position[3],
                const double rotation[9]);
-  void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
-                  const double rotation[9]);
+  void set_lights(const rays::RayWorld& world, const Appearance& appearance,
+                  const double position[3], const double rotation[9]);
   static void place_light(const double light_position[3], const double direction[3],
                           const double position[3], const double rotation[9], ViewLight& light);
 
@@ -141,4 +143,4 @@ class ViewBuilder {
   float tint_ = 1;  // factor of every colour: the mirror's reflectance
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::render

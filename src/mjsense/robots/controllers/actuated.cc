@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 bool is_position_servo(const mjModel* m, int actuator) {
   const double* gain = m->actuator_gainprm + mjNGAIN * actuator;
@@ -107,8 +107,8 @@ void ActuatedController::need_position_servos(const ControllerInit& init, const 
     if (is_position_servo(model_, a)) continue;
     throw ValueError(fmt::format(
         "{}: the controller '{}' needs position servos of joints; the actuator '{}' is not one",
-        init.context, kind, name_of(model_, mjOBJ_ACTUATOR, a)));
+        init.context, kind, scene::name_of(model_, mjOBJ_ACTUATOR, a)));
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

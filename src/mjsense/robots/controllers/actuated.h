@@ -6,7 +6,7 @@
 
 #include "mjsense/robots/controllers/controller.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // True if the actuator is a position servo of a joint: its control is the joint position.
 bool is_position_servo(const mjModel* model, int actuator);
@@ -50,4 +50,4 @@ class ChangeController : public ActuatedController {
             std::span<double> command) const override;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -21,7 +21,7 @@
 #include "mjsense/robots/move_group.h"
 #include "mjsense/robots/state_row.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Periods of the policy and the controllers, s.
 struct ControlPeriods {
@@ -79,4 +79,4 @@ class Controller {
 std::unique_ptr<Controller> make_controller(const ControllerCfg& cfg, const MoveGroup& group,
                                             const ControllerInit& init);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -11,7 +11,7 @@
 #include "mjsense/core/fields/field_traits.h"
 #include "mjsense/core/fields/named_enum.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // Without a ramp a servo jumps at every command; if the policy period is long, held objects slip.
 inline constexpr const char* kRampText =
@@ -146,11 +146,12 @@ void visit_fields(V& v, EePoseCfg& c) {
 }
 
 enum class DeltaFrame { kBase, kTool };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<DeltaFrame>{"base", "tool"};
+constexpr std::array<std::string_view, 2> enum_names(DeltaFrame) { return {"base", "tool"}; }
+
 enum class DeltaReference { kTarget, kMeasured };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<DeltaReference>{"target", "measured"};
+constexpr std::array<std::string_view, 2> enum_names(DeltaReference) {
+  return {"target", "measured"};
+}
 
 struct EeDeltaPoseCfg {
   NamedEnum<DeltaFrame> frame = DeltaFrame::kBase;
@@ -190,11 +191,18 @@ using ControllerCfg =
     std::variant<JointPositionCfg, JointPositionRelativeCfg, JointVelocityCfg, TorsoHeightCfg,
                  HolonomicBaseCfg, DifferentialBaseCfg, MocapBaseCfg, FreeBaseCfg, EePoseCfg,
                  EeDeltaPoseCfg, NoControllerCfg>;
+
+}  // namespace mjsense::robots
+
+namespace mjsense {
 template <>
-inline constexpr const char* kChoiceName<ControllerCfg> = "ControllerCfg";
+inline constexpr const char* kChoiceName<robots::ControllerCfg> = "ControllerCfg";
+}  // namespace mjsense
+
+namespace mjsense::robots {
 
 // Reads the kind of a controller, "ee_delta_pose", or an inline table of TOML with its fields,
 // "{ kind = 'ee_delta_pose', frame = 'tool' }". `context` begins the message of a ValueError.
 ControllerCfg parse_controller(std::string_view text, const std::string& context);
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

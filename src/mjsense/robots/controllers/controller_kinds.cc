@@ -6,7 +6,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/toml_fields.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 struct Given {
@@ -34,4 +34,4 @@ std::unique_ptr<Controller> make_controller(const ControllerCfg& cfg, const Move
   return std::visit([&](const auto& kind) { return make_kind(kind, group, init); }, cfg);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -4,7 +4,7 @@
 
 #include "mjsense/robots/controllers/controller.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 template <class Cfg>
 using MakeController = std::unique_ptr<Controller>(const Cfg&, const MoveGroup&,
@@ -22,4 +22,4 @@ MakeController<EePoseCfg> make_kind;
 MakeController<EeDeltaPoseCfg> make_kind;
 MakeController<NoControllerCfg> make_kind;
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

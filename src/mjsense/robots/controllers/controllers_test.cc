@@ -10,7 +10,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 using testing::HasSubstr;
@@ -29,11 +29,11 @@ struct OneGroup {
     cfg.groups = {std::move(group)};
     cfg.policy_dt_ms = 60;
     cfg.ctrl_dt_ms = 6;
-    SceneCfg scene_cfg;
-    EntityCfg entity;
+    scene::SceneCfg scene_cfg;
+    scene::EntityCfg entity;
     entity.model = cfg.model;
     scene_cfg.entities = {{"robot_0", entity}};
-    scene = std::make_unique<Scene>(scene_cfg);
+    scene = std::make_unique<scene::Scene>(scene_cfg);
     model = scene->model();
     robot = std::make_unique<Robot>(cfg, model, 1);
     data.reset(mj_makeData(model));
@@ -63,7 +63,7 @@ struct OneGroup {
   double target(int i) const { return robot->targets(0)[0].values[i]; }
 
   RobotCfg cfg;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<scene::Scene> scene;
   const mjModel* model = nullptr;
   std::unique_ptr<Robot> robot;
   std::unique_ptr<mjData, DataDelete> data;
@@ -288,13 +288,13 @@ TEST(Bases, FixedBaseCannotBePlacedElsewhere) {
   cfg.name = "small";
   cfg.base_body = "base";
   cfg.model.xml = kPositions;
-  SceneCfg scene_cfg;
-  EntityCfg entity;
+  scene::SceneCfg scene_cfg;
+  scene::EntityCfg entity;
   entity.model = cfg.model;
   entity.mocap_base = false;
   entity.pos = {1, 2, 3};
   scene_cfg.entities = {{"robot_0", entity}};
-  const Scene scene(scene_cfg);
+  const scene::Scene scene(scene_cfg);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
   const Robot robot(cfg, scene.model(), 1);
   Rng rng(1, 0, 0, 0);
@@ -397,4 +397,4 @@ TEST(Controllers, ToolControllersNeedATool) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -12,7 +12,7 @@
 #include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class DifferentialBase : public ActuatedController {
@@ -52,7 +52,7 @@ class Wheels final : public DifferentialBase {
       throw ValueError(
           fmt::format("{}: the controller 'differential_base' of two wheels needs velocity servos; "
                       "the actuator '{}' is not one",
-                      init.context, name_of(init.model, mjOBJ_ACTUATOR, a)));
+                      init.context, scene::name_of(init.model, mjOBJ_ACTUATOR, a)));
     }
   }
   void begin(const World& world, std::span<const double> /*target*/,
@@ -106,4 +106,4 @@ std::unique_ptr<Controller> make_kind(const DifferentialBaseCfg& cfg, const Move
   return std::make_unique<Planar>(cfg, group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

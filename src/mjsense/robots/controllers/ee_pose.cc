@@ -19,7 +19,7 @@
 #include "mjsense/robots/controllers/ramp.h"
 #include "mjsense/robots/kinematics.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 // Steps of the inverse kinematics of one command, and the error at which it ends, m and rad. A
@@ -219,4 +219,4 @@ std::unique_ptr<Controller> make_kind(const EeDeltaPoseCfg& cfg, const MoveGroup
   return std::make_unique<EeDeltaPose>(cfg, group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

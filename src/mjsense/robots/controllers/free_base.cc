@@ -8,7 +8,7 @@
 #include "mjsense/robots/controllers/pose_target.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class FreeBase final : public PoseTarget {
@@ -35,9 +35,9 @@ std::unique_ptr<Controller> make_kind(const FreeBaseCfg& cfg, const MoveGroup& /
     throw ValueError(
         fmt::format("{}: the controller 'free_base' needs a free joint; the base '{}' "
                     "has none",
-                    init.context, name_of(m, mjOBJ_BODY, base)));
+                    init.context, scene::name_of(m, mjOBJ_BODY, base)));
   }
-  const int target = resolve(m, mjOBJ_BODY, init.prefix + cfg.target, init.context);
+  const int target = scene::resolve(m, mjOBJ_BODY, init.prefix + cfg.target, init.context);
   if (m->body_mocapid[target] < 0) {
     throw ValueError(
         fmt::format("{}: the target '{}' is not a mocap body", init.context, cfg.target));
@@ -49,4 +49,4 @@ std::unique_ptr<Controller> make_kind(const FreeBaseCfg& cfg, const MoveGroup& /
                                     inverse(X_WB) * X_WM, cfg, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

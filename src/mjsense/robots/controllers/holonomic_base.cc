@@ -8,7 +8,7 @@
 #include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/ramp.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class HolonomicBase final : public RampedController {
@@ -48,4 +48,4 @@ std::unique_ptr<Controller> make_kind(const HolonomicBaseCfg& cfg, const MoveGro
   return std::make_unique<HolonomicBase>(cfg, group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -4,7 +4,7 @@
 #include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/ramp.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class JointPosition final : public RampedController {
@@ -28,4 +28,4 @@ std::unique_ptr<Controller> make_kind(const JointPositionCfg& cfg, const MoveGro
   return std::make_unique<JointPosition>(cfg, group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -7,7 +7,7 @@
 #include "mjsense/robots/controllers/actuated.h"
 #include "mjsense/robots/controllers/controller_kinds.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class JointPositionRelative final : public ChangeController {
@@ -44,4 +44,4 @@ std::unique_ptr<Controller> make_kind(const JointPositionRelativeCfg& cfg, const
   return std::make_unique<JointPositionRelative>(cfg, group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -10,7 +10,7 @@
 #include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class VelocityServos final : public ChangeController {
@@ -107,4 +107,4 @@ std::unique_ptr<Controller> make_kind(const JointVelocityCfg& /*cfg*/, const Mov
   return std::make_unique<MovingTargets>(group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

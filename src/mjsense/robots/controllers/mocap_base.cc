@@ -8,7 +8,7 @@
 #include "mjsense/robots/controllers/pose_target.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 std::unique_ptr<Controller> make_kind(const MocapBaseCfg& cfg, const MoveGroup& /*group*/,
                                       const ControllerInit& init) {
@@ -16,9 +16,9 @@ std::unique_ptr<Controller> make_kind(const MocapBaseCfg& cfg, const MoveGroup& 
   if (mocap < 0) {
     throw ValueError(
         fmt::format("{}: the controller 'mocap_base' needs a mocap body; the base '{}' is not one",
-                    init.context, name_of(init.model, mjOBJ_BODY, init.base_body)));
+                    init.context, scene::name_of(init.model, mjOBJ_BODY, init.base_body)));
   }
   return std::make_unique<PoseTarget>(mocap, Pose{}, cfg.max_speed, cfg.max_turn, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

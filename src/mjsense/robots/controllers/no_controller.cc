@@ -3,7 +3,7 @@
 #include "mjsense/robots/controllers/actuated.h"
 #include "mjsense/robots/controllers/controller_kinds.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class NoController final : public ActuatedController {
@@ -24,4 +24,4 @@ std::unique_ptr<Controller> make_kind(const NoControllerCfg& /*cfg*/, const Move
   return std::make_unique<NoController>(group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -7,7 +7,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 Pose commanded_pose(std::span<const double> command, const std::string& context) {
   const Quat q = quat(command.data() + 3);
@@ -84,4 +84,4 @@ void PoseTarget::write(const Pose& base, const StateRow& state) const {
   write_quat(at.q, state.mocap_quat + 4 * mocap_);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

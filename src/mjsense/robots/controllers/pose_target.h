@@ -8,7 +8,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/robots/controllers/controller.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 // The pose of a command x, y, z, w, x, y, z. Throws ValueError if the quaternion is zero; the
 // message begins with `context`.
@@ -48,4 +48,4 @@ class PoseTarget : public Controller {
   std::vector<Goal> goals_;  // [B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

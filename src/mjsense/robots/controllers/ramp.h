@@ -11,7 +11,7 @@
 
 #include "mjsense/robots/controllers/actuated.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 
 class Ramp {
  public:
@@ -66,4 +66,4 @@ class RampedController : public ActuatedController {
   std::optional<Ramp> ramp_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

@@ -10,7 +10,7 @@
 #include "mjsense/robots/controllers/actuated.h"
 #include "mjsense/robots/controllers/controller_kinds.h"
 
-namespace mjsense {
+namespace mjsense::robots {
 namespace {
 
 class TorsoHeight final : public ActuatedController {
@@ -65,4 +65,4 @@ std::unique_ptr<Controller> make_kind(const TorsoHeightCfg& cfg, const MoveGroup
   return std::make_unique<TorsoHeight>(cfg, group, init);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::robots

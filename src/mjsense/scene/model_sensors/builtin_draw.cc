@@ -7,7 +7,7 @@
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 struct FrameRows {
@@ -48,4 +48,4 @@ void draw_sensor_frame(const World& world, int id, const std::string& name, Debu
                    0.2 * shapes.meansize(), name);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

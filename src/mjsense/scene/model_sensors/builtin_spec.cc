@@ -9,7 +9,7 @@
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -122,4 +122,4 @@ SensorSpec describe_builtin(const mjModel* m, int id) {
   return spec;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

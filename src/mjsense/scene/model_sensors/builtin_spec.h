@@ -6,8 +6,8 @@
 
 #include "mjsense/core/sensor_spec.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 SensorSpec describe_builtin(const mjModel* model, int sensor_id);
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -5,7 +5,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 namespace {
 
 using G = BuiltinGroup;
@@ -176,4 +176,4 @@ std::vector<std::string> allowed_refs(BuiltinGroup group) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

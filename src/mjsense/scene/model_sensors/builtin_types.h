@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace mjsense {
+namespace mjsense::scene {
 
 // Kinds of elements that the sensor is attached to (obj) and that `ref` may name.
 enum class BuiltinGroup {
@@ -63,4 +63,4 @@ struct RangeField {
 };
 std::span<const RangeField> range_fields();
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

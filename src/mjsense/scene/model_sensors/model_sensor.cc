@@ -7,7 +7,7 @@
 #include "mjsense/scene/model_sensors/builtin_spec.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 void ModelSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
@@ -48,4 +48,4 @@ void ModelSensor::draw(const World& world, DebugShapes& shapes) {
   draw_sensor_frame(world, id_, name(), shapes);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -8,7 +8,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::scene {
 
 class ModelSensor : public Sensor {
  public:
@@ -29,4 +29,4 @@ class ModelSensor : public Sensor {
   Field* history_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scene

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kSkirting = 0.08, kBoard = 0.007;  // m, height and half thickness
@@ -108,4 +108,4 @@ void write_window(BuildingWriter& out, Vec3 at, double yaw, double width, double
   out.box({0, 0, bottom - 0.012}, {half + 0.05, deep + 0.06, 0.014}, "skirting", false);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

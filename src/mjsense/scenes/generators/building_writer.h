@@ -10,7 +10,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/scenes/generators/room_writer.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 class BuildingWriter {
  public:
@@ -70,4 +70,4 @@ void write_wall(BuildingWriter& out, Vec3 from, Vec3 to, std::vector<Opening> op
 void write_window(BuildingWriter& out, Vec3 at, double yaw, double width, double bottom, double top,
                   double thickness);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

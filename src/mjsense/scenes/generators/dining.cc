@@ -4,7 +4,7 @@
 #include "mjsense/scenes/generators/room_writer.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr Colour kRugs[] = {{0.48, 0.30, 0.28}, {0.34, 0.40, 0.46}, {0.62, 0.56, 0.44}};
@@ -25,7 +25,7 @@ void chair(RoomWriter& room, const char* name, double x, double y, double back) 
   room.close_body();
 }
 
-ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   RoomWriter room("dining");
   write_shell_finishes(room, rng);
@@ -79,4 +79,4 @@ Generator dining_generator() {
   return {"dining", "A table in a dining room with chairs, a rug and a window.", {}, make};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -3,10 +3,10 @@
 
 #include "mjsense/scenes/generators/generator.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A table in a dining room, with chairs, a rug and a picture on the wall. Objects are placed on
 // geom table_top, in the region "table" in front of the robot.
 Generator dining_generator();
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

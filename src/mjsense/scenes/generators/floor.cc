@@ -13,7 +13,7 @@
 #include "mjsense/scenes/generators/furniture.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -238,7 +238,7 @@ void write_pictures(BuildingWriter& out, const FloorPlan& plan, Rng& rng) {
   }
 }
 
-ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   FloorPlan plan(rng);
   RoomWriter text("floor");
@@ -286,4 +286,4 @@ Generator floor_generator() {
   return {"floor", "Four to six furnished rooms, open to each other.", {}, make};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -3,9 +3,9 @@
 
 #include "mjsense/scenes/generators/generator.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A floor with four to six furnished rooms, connected by openings, with objects on the furniture.
 Generator floor_generator();
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

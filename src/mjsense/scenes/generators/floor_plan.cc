@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kMin = 2.9;        // m, minimum side of a room
@@ -165,4 +165,4 @@ bool FloorPlan::connected(const Rect* more) const {
   return false;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

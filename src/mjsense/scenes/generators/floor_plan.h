@@ -7,7 +7,7 @@
 
 #include "mjsense/core/rng.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct Rect {
   double x0, y0, x1, y1;  // m
@@ -61,4 +61,4 @@ class FloorPlan {
   std::vector<Rect> taken_, passages_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -10,7 +10,7 @@
 
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -347,4 +347,4 @@ void write_painting(BuildingWriter& out, std::string_view picture, double width,
                   "contype=\"0\" conaffinity=\"0\" group=\"2\"");
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -11,7 +11,7 @@
 #include "mjsense/scenes/generators/building_writer.h"
 #include "mjsense/scenes/scene_file.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 enum class Furniture {
   kSofa,
@@ -50,4 +50,4 @@ void write_rug(BuildingWriter& out, std::string_view material, double half_x, do
 void write_painting(BuildingWriter& out, std::string_view picture, double width, double height,
                     double z);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

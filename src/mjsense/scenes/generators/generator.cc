@@ -12,7 +12,7 @@
 #include "mjsense/scenes/generators/room_with_door.h"
 #include "mjsense/scenes/generators/shelf.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 std::span<const Generator> generators() {
   static const std::vector<Generator> all{dining_generator(), floor_generator(),
@@ -21,7 +21,7 @@ std::span<const Generator> generators() {
   return all;
 }
 
-ModelSource generate(SceneFileCfg& cfg) {
+scene::ModelSource generate(SceneFileCfg& cfg) {
   const std::string context = fmt::format("scene '{}'", cfg.name);
   const auto all = generators();
   const auto one = std::ranges::find(all, cfg.generator, &Generator::name);
@@ -49,4 +49,4 @@ ModelSource generate(SceneFileCfg& cfg) {
   return one->make(input, cfg);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -15,7 +15,7 @@
 #include "mjsense/scene/entity.h"
 #include "mjsense/scenes/scene_file.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A number that a scene.toml may pass to its generator.
 struct GeneratorParameter {
@@ -38,7 +38,7 @@ struct Generator {
   // Creates the first entity of the scene, named `room`; the model's names are "room/...". May add
   // to `cfg` what depends on the house: regions, objects, the pose of the robot, variation. Must be
   // a function of `input` only.
-  ModelSource (*make)(GeneratorInput& input, SceneFileCfg& cfg);
+  scene::ModelSource (*make)(GeneratorInput& input, SceneFileCfg& cfg);
 };
 
 // Table of the built-in generators.
@@ -46,6 +46,6 @@ std::span<const Generator> generators();
 
 // Generates house cfg.house with cfg.generator and adds to `cfg`. Throws KeyError for an unknown
 // generator or parameter.
-ModelSource generate(SceneFileCfg& cfg);
+scene::ModelSource generate(SceneFileCfg& cfg);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

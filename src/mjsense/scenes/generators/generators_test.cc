@@ -14,7 +14,7 @@
 #include "mjsense/scenes/occupancy_grid.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using ::testing::HasSubstr;
@@ -32,13 +32,13 @@ std::string error_of(F f) {
 // A house compiled without a robot, ready for episodes.
 struct Built {
   EpisodeScene scene;
-  std::unique_ptr<Scene> whole;
+  std::unique_ptr<scene::Scene> whole;
   std::shared_ptr<mjData> data;
 
   explicit Built(const std::string& name) : scene(load_scene(name)) {
-    SceneCfg cfg = scene.scene_cfg("robot_0");
+    scene::SceneCfg cfg = scene.scene_cfg("robot_0");
     std::erase_if(cfg.entities, [](const auto& e) { return e.second.model.empty(); });
-    whole = std::make_unique<Scene>(std::move(cfg));
+    whole = std::make_unique<scene::Scene>(std::move(cfg));
     data = {mj_makeData(whole->model()), mj_deleteData};
     scene.initialize(whole->model(), 1, "robot_0/");
   }
@@ -47,7 +47,7 @@ struct Built {
     mj_resetData(whole->model(), data.get());
     const int target =
         static_cast<int>(rng.below(static_cast<std::uint32_t>(scene.objects().size())));
-    scene.sample(0, target, seed, 0, rng, state_row(data.get()));
+    scene.sample(0, target, seed, 0, rng, robots::state_row(data.get()));
     mj_forward(whole->model(), data.get());
     return scene.fault({.id = 0, .model = whole->model(), .data = data.get()});
   }
@@ -66,7 +66,7 @@ TEST(Generators, HousesAreDeterministicAndDiffer) {
     std::vector<std::string> texts;
     for (const char* house : {"", ":0", ":7"}) {
       SceneFileCfg cfg = load_scene(name + house);
-      const ModelSource made = generate(cfg);
+      const scene::ModelSource made = generate(cfg);
       texts.push_back(made.xml);
       for (const auto& [file, bytes] : made.assets) texts.back() += bytes;
     }
@@ -91,9 +91,9 @@ TEST(Generators, StartsWithoutPenetration) {
 TEST(Generators, OccupancyCoversDisplacedFurniture) {
   for (const std::string name : {"floor", "floor:3", "room_with_door", "room_with_door:5"}) {
     EpisodeScene scene(load_scene(name));
-    SceneCfg whole = scene.scene_cfg("robot_0");
+    scene::SceneCfg whole = scene.scene_cfg("robot_0");
     std::erase_if(whole.entities, [](const auto& e) { return e.second.model.empty(); });
-    Simulation sim(std::make_shared<Scene>(whole), SimulationCfg{.num_worlds = 1});
+    sim::Simulation sim(std::make_shared<scene::Scene>(whole), sim::SimulationCfg{.num_worlds = 1});
     const mjModel* m = sim.model();
     scene.initialize(m, 1, "robot_0/");
     scene.bind(sim);
@@ -161,4 +161,4 @@ TEST(Generators, ParametersArePassedToTheGenerator) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kGap = 0.004, kThick = 0.04;  // m, gap around the leaf and thickness of the leaf
@@ -153,4 +153,4 @@ void write_door(BuildingWriter& out, const HingedDoor& door, double wall_thickne
                   kReach / door.press));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -6,7 +6,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/scenes/generators/building_writer.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 struct HingedDoor {
   double width = 0.9, height = 2.03;  // m, of the leaf
@@ -34,4 +34,4 @@ double opening_height(const HingedDoor& door);
 // "door_metal", "black" and "skirting".
 void write_door(BuildingWriter& out, const HingedDoor& door, double wall_thickness);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -11,7 +11,7 @@
 #include "mjsense/scenes/generators/room_writer.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr Colour kStones[] = {{0.26, 0.26, 0.27}, {0.62, 0.60, 0.57}, {0.78, 0.76, 0.72}};
@@ -86,7 +86,7 @@ void clutter(RoomWriter& room, Rng& rng, double z, double y0, double wide) {
   room.close_body();
 }
 
-ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   RoomWriter room("kitchen");
   materials(room, rng);
@@ -183,4 +183,4 @@ Generator kitchen_generator() {
   return {"kitchen", "A fitted kitchen: drawers, cabinets, oven, fridge, microwave.", {}, make};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -3,7 +3,7 @@
 
 #include "mjsense/scenes/generators/generator.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A fitted kitchen along the wall at +x. The fronts are at x = 0 and face -x.
 //
@@ -17,4 +17,4 @@ namespace mjsense {
 // Each leaf has a geom <thing>/handle. Geoms worktop_0 .. are level surfaces for objects.
 Generator kitchen_generator();
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

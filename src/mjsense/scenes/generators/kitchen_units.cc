@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kPanel = 0.018;  // m, thickness of boards
@@ -321,4 +321,4 @@ void write_hob(RoomWriter& room, const KitchenStyle& style, double y0, double wi
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -8,7 +8,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/scenes/generators/room_writer.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Properties shared by the units of one house.
 struct KitchenStyle {
@@ -46,4 +46,4 @@ void write_sink_worktop(RoomWriter& room, const KitchenStyle& style, int number,
                         double wide);
 void write_hob(RoomWriter& room, const KitchenStyle& style, double y0, double wide);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -4,7 +4,7 @@
 
 #include "mjsense/scenes/generators/room_writer.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr double kWall = 0.1;  // m thick
@@ -78,4 +78,4 @@ void write_shell(RoomWriter& room, const ShellCfg& s) {
                   window, s.y1 - 0.15, s.sill + 0.6));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -9,7 +9,7 @@
 #include "mjsense/scenes/generators/hinged_door.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
@@ -72,7 +72,7 @@ void write_materials(RoomWriter& text, Rng& rng) {
   for (const char* name : {"painting_1", "painting_2"}) write_picture(text, name, rng);
 }
 
-ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   HingedDoor door = draw_door(rng);
   if (input.parameters[0] > 0) door.width = input.parameters[0];
@@ -135,4 +135,4 @@ Generator room_with_door_generator() {
           make};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 std::string named(std::string_view name) {
@@ -142,8 +142,8 @@ void RoomWriter::tail(std::string_view element) {
   tail_ += '\n';
 }
 
-ModelSource RoomWriter::model() const {
-  ModelSource source;
+scene::ModelSource RoomWriter::model() const {
+  scene::ModelSource source;
   source.xml = fmt::format(
       "<mujoco model=\"{}\">\n<compiler angle=\"radian\" autolimits=\"true\"/>\n"
       "<default><geom friction=\"0.9 0.005 0.0001\"/>\n"
@@ -156,4 +156,4 @@ ModelSource RoomWriter::model() const {
   return source;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -13,7 +13,7 @@
 #include "mjsense/scene/entity.h"
 #include "mjsense/scenes/generators/texture.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Reflection properties of a material.
 struct Gloss {
@@ -60,7 +60,7 @@ class RoomWriter {
   void asset(std::string_view element) { assets_ += element; }
   void file(std::string name, std::string bytes) { files_[std::move(name)] = std::move(bytes); }
 
-  ModelSource model() const;
+  scene::ModelSource model() const;
   const std::string& name() const { return name_; }
 
  private:
@@ -81,4 +81,4 @@ struct ShellCfg {
 // daylight.
 void write_shell(RoomWriter& room, const ShellCfg& shell);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

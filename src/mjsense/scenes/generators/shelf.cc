@@ -8,7 +8,7 @@
 #include "mjsense/scenes/generators/room_writer.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr Colour kSpines[] = {{0.55, 0.18, 0.16}, {0.16, 0.27, 0.42}, {0.22, 0.38, 0.27},
@@ -30,7 +30,7 @@ void books(RoomWriter& room, Rng& rng, double x, double y0, double length, doubl
   }
 }
 
-ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   RoomWriter room("shelf");
   write_shell_finishes(room, rng);
@@ -124,4 +124,4 @@ Generator shelf_generator() {
           make};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -3,10 +3,10 @@
 
 #include "mjsense/scenes/generators/generator.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // A bookcase at a wall. Geoms board_0 .. board_N-1, from the lowest to the highest, are level
 // surfaces for objects. books_*, plant and picture belong to the house.
 Generator shelf_generator();
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

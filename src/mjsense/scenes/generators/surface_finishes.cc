@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/scenes/generators/surface_finishes.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 constexpr Colour kWoods[] = {{0.72, 0.55, 0.38},
@@ -44,4 +44,4 @@ void write_shell_finishes(RoomWriter& room, Rng& rng) {
   room.glowing("lamp_glass", {1.0, 0.98, 0.92}, 0.9);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

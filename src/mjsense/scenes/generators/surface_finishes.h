@@ -7,7 +7,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/scenes/generators/room_writer.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 // Writes the materials floor, wall, ceiling, skirting and lamp_glass, which write_shell() needs.
 // Floors are planks or tiles.
@@ -19,4 +19,4 @@ Colour pick(Rng& rng, std::span<const Colour> colours);
 Colour wood_colour(Rng& rng);
 Colour paint_colour(Rng& rng);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

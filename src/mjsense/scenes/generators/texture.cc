@@ -8,7 +8,7 @@
 
 #include "mjsense/core/files/png.h"
 
-namespace mjsense {
+namespace mjsense::scenes {
 namespace {
 
 std::uint32_t hash(std::uint32_t x, std::uint32_t y, std::uint32_t seed) {
@@ -178,4 +178,4 @@ std::string landscape_png(std::uint32_t seed, int size) {
   });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::scenes {
 
 using Colour = std::array<double, 3>;  // rgb in [0, 1]
 
@@ -28,4 +28,4 @@ std::string brushed_png(Colour colour, std::uint32_t seed, int size = 256);  // 
 // A landscape painting: hills under a sky. It does not tile.
 std::string landscape_png(std::uint32_t seed, int size = 256);
 
-}  // namespace mjsense
+}  // namespace mjsense::scenes

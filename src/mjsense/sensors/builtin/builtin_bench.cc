@@ -7,7 +7,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr const char* kLegged = R"(<mujoco><worldbody><geom type="plane" size="9 9 1"/>
@@ -23,9 +23,9 @@ struct Legged {
     for (int i = 0; i < 200; ++i) mj_step(scene.model(), data);
   }
   ~Legged() { mj_deleteData(data); }
-  static SceneCfg cfg(int sensors) {
+  static scene::SceneCfg cfg(int sensors) {
     const char* types[] = {"accelerometer", "gyro", "velocimeter", "framequat", "framezaxis"};
-    SceneCfg cfg;
+    scene::SceneCfg cfg;
     cfg.entities = {{"robot", {.model = {.xml = kLegged}}}};
     for (int i = 0; i < sensors; ++i) {
       auto sensor = std::make_shared<BuiltinSensorCfg>();
@@ -36,7 +36,7 @@ struct Legged {
     }
     return cfg;
   }
-  Scene scene;
+  scene::Scene scene;
   mjData* data;
 };
 
@@ -56,4 +56,4 @@ void rows(benchmark::State& state) {
 BENCHMARK(rows)->Name("builtin/rows")->Arg(10);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

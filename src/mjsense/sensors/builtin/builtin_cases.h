@@ -11,7 +11,7 @@
 
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // A robot with elements of every kind that a sensor can be attached to. `sensors`: XML of its
 // sensors.
@@ -48,14 +48,14 @@ struct Case {
   BuiltinSensorCfg cfg;
 };
 
-inline ObjRef in_robot(const std::string& type, const std::string& name) {
+inline scene::ObjRef in_robot(const std::string& type, const std::string& name) {
   return {type, name, "robot"};
 }
 
 inline std::vector<Case> all_cases() {
   std::vector<Case> cases;
-  const auto add = [&](const std::string& type, const std::string& attributes, ObjRef obj,
-                       ObjRef ref = {}) -> Case& {
+  const auto add = [&](const std::string& type, const std::string& attributes, scene::ObjRef obj,
+                       scene::ObjRef ref = {}) -> Case& {
     const std::string name = fmt::format("{}_{}", type, cases.size());
     BuiltinSensorCfg cfg;
     cfg.name = "cfg_" + name;
@@ -154,4 +154,4 @@ inline std::vector<Case> all_cases() {
   return cases;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

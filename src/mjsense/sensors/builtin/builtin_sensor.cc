@@ -15,7 +15,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 std::string or_list(const std::vector<std::string>& words) {
@@ -23,7 +23,7 @@ std::string or_list(const std::vector<std::string>& words) {
   return fmt::format("{} or {}", fmt::join(words.begin(), words.end() - 1, ", "), words.back());
 }
 
-void check_object(const ObjRef& ref, const std::vector<std::string>& allowed,
+void check_object(const scene::ObjRef& ref, const std::vector<std::string>& allowed,
                   std::string_view field, std::string_view type, std::string_view context) {
   if (std::find(allowed.begin(), allowed.end(), ref.type) == allowed.end()) {
     throw ValueError(fmt::format("{}: {} requires {}.type {}, not '{}'", context, type, field,
@@ -36,7 +36,7 @@ void check_object(const ObjRef& ref, const std::vector<std::string>& allowed,
 // Bit mask of the requested fields, which must be in MuJoCo's order.
 int range_mask(const std::vector<std::string>& data, std::string_view context) {
   std::vector<std::string> names;
-  for (const RangeField& field : range_fields()) names.emplace_back(field.name);
+  for (const scene::RangeField& field : scene::range_fields()) names.emplace_back(field.name);
   int mask = 0, last = -1;
   for (const std::string& name : data) {
     const int i = static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
@@ -70,10 +70,10 @@ void BuiltinSensorCfg::validate() const {
   if (name.empty()) throw ValueError("sensor '': a sensor needs a name");
   const std::string context = fmt::format("sensor '{}'", key());
   check_fields(*this, context);
-  const BuiltinType& type = builtin_type(sensor_type, context);
+  const scene::BuiltinType& type = scene::builtin_type(sensor_type, context);
 
-  const std::vector<std::string> objects = allowed_objects(type.group);
-  const std::vector<std::string> refs = allowed_refs(type.group);
+  const std::vector<std::string> objects = scene::allowed_objects(type.group);
+  const std::vector<std::string> refs = scene::allowed_refs(type.group);
   if (!objects.empty()) {
     if (obj.empty()) {
       throw ValueError(
@@ -81,13 +81,13 @@ void BuiltinSensorCfg::validate() const {
     }
     check_object(obj, objects, "obj", type.name, context);
   }
-  const bool needs_ref = !refs.empty() && type.group != BuiltinGroup::kFrame;
+  const bool needs_ref = !refs.empty() && type.group != scene::BuiltinGroup::kFrame;
   if (needs_ref && ref.empty()) {
     throw ValueError(
         fmt::format("{}: {} requires ref (type {})", context, type.name, or_list(refs)));
   }
   if (!ref.empty()) {
-    if (refs.empty() && type.group != BuiltinGroup::kPlugin) {
+    if (refs.empty() && type.group != scene::BuiltinGroup::kPlugin) {
       throw ValueError(fmt::format("{}: {} takes no ref", context, type.name));
     }
     if (!refs.empty()) check_object(ref, refs, "ref", type.name, context);
@@ -104,16 +104,16 @@ void BuiltinSensorCfg::validate() const {
     throw ValueError(fmt::format("{}: phase = {} s must be in (-interval, 0] = (-{}, 0]", context,
                                  phase, interval));
   }
-  if (type.group == BuiltinGroup::kRangefinder) range_mask(data, context);
-  if (enclosed && type.group != BuiltinGroup::kInside) {
+  if (type.group == scene::BuiltinGroup::kRangefinder) range_mask(data, context);
+  if (enclosed && type.group != scene::BuiltinGroup::kInside) {
     throw ValueError(
         fmt::format("{}: enclosed applies to insidesite only, not to {}", context, type.name));
   }
-  if (type.group == BuiltinGroup::kUser) {
+  if (type.group == scene::BuiltinGroup::kUser) {
     if (dim < 1)
       throw ValueError(fmt::format("{}: a user sensor requires dim >= 1, not {}", context, dim));
   }
-  if (type.group == BuiltinGroup::kPlugin && plugin.empty() == instance.empty()) {
+  if (type.group == scene::BuiltinGroup::kPlugin && plugin.empty() == instance.empty()) {
     throw ValueError(
         fmt::format("{}: a plugin sensor requires plugin or instance, one of them", context));
   }
@@ -125,7 +125,7 @@ std::unique_ptr<Sensor> BuiltinSensorCfg::build() const {
 }
 
 BuiltinSensor::BuiltinSensor(const BuiltinSensorCfg& cfg)
-    : ModelSensor(cfg.key()), cfg_(std::make_unique<BuiltinSensorCfg>(cfg)) {}
+    : scene::ModelSensor(cfg.key()), cfg_(std::make_unique<BuiltinSensorCfg>(cfg)) {}
 
 void BuiltinSensor::edit_spec(mjSpec* spec) {
   const std::string context = fmt::format("sensor '{}'", name());
@@ -134,14 +134,14 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
                          ? fmt::format("{}: already exists in the scene", context)
                          : fmt::format("{}: defined in both entity XML and scene config", context));
   }
-  const BuiltinType& type = builtin_type(cfg_->sensor_type, context);
+  const scene::BuiltinType& type = scene::builtin_type(cfg_->sensor_type, context);
   mjsSensor* sensor = mjs_addSensor(spec);
   mjs_setName(sensor->element, name().c_str());
   sensor->type = type.type;
-  const auto attach = [&](const ObjRef& ref, mjtObj& target_type, mjString* target_name) {
-    if (ref.empty() || type.group == BuiltinGroup::kWorld) return;
-    target_type = obj_type(ref.type, context);
-    find_in_spec(spec, target_type, ref.full_name(), context);
+  const auto attach = [&](const scene::ObjRef& ref, mjtObj& target_type, mjString* target_name) {
+    if (ref.empty() || type.group == scene::BuiltinGroup::kWorld) return;
+    target_type = scene::obj_type(ref.type, context);
+    scene::find_in_spec(spec, target_type, ref.full_name(), context);
     mjs_setString(target_name, ref.full_name().c_str());
   };
   attach(cfg_->obj, sensor->objtype, sensor->objname);
@@ -158,19 +158,19 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
   sensor->interval[0] = cfg_->interval;
   sensor->interval[1] = cfg_->phase;
   switch (type.group) {
-    case BuiltinGroup::kRangefinder:
+    case scene::BuiltinGroup::kRangefinder:
       sensor->intprm[0] = range_mask(cfg_->data, context);
       break;
-    case BuiltinGroup::kInside:
+    case scene::BuiltinGroup::kInside:
       sensor->intprm[0] = cfg_->enclosed;
       break;
-    case BuiltinGroup::kUser:
+    case scene::BuiltinGroup::kUser:
       sensor->dim = cfg_->dim;
       sensor->datatype = cfg_->datatype;
       sensor->needstage = static_cast<mjtStage>(
           mjSTAGE_POS + static_cast<int>(static_cast<BuiltinStage>(cfg_->needstage)));
       break;
-    case BuiltinGroup::kPlugin:
+    case scene::BuiltinGroup::kPlugin:
       sensor->plugin.active = 1;
       if (!cfg_->plugin.empty()) {
         if (mjs_activatePlugin(spec, cfg_->plugin.c_str()) != 0) {
@@ -182,7 +182,7 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
         mjs_setString(sensor->plugin.plugin_name, cfg_->plugin.c_str());
         mjs_setString(sensor->plugin.name, name().c_str());
       } else {
-        find_in_spec(spec, mjOBJ_PLUGIN, cfg_->instance, context);
+        scene::find_in_spec(spec, mjOBJ_PLUGIN, cfg_->instance, context);
         mjs_setString(sensor->plugin.name, cfg_->instance.c_str());
       }
       break;
@@ -193,4 +193,4 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
 
 SensorKind builtin_kind() { return sensor_kind<BuiltinSensorCfg>(); }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

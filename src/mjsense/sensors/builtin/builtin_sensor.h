@@ -15,21 +15,23 @@
 #include "mjsense/scene/model_sensors/model_sensor.h"
 
 namespace mjsense {
-
-enum class BuiltinInterp { kZoh, kLinear, kCubic };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<BuiltinInterp>{"zoh", "linear",
-                                                                           "cubic"};
 template <>
 inline constexpr std::array<std::string_view, 4> kEnumNames<mjtDataType>{"real", "positive", "axis",
                                                                          "quaternion"};
+}  // namespace mjsense
+
+namespace mjsense::sensors {
+
+enum class BuiltinInterp { kZoh, kLinear, kCubic };
+constexpr std::array<std::string_view, 3> enum_names(BuiltinInterp) {
+  return {"zoh", "linear", "cubic"};
+}
 enum class BuiltinStage { kPos, kVel, kAcc };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<BuiltinStage>{"pos", "vel", "acc"};
+constexpr std::array<std::string_view, 3> enum_names(BuiltinStage) { return {"pos", "vel", "acc"}; }
 
 struct BuiltinSensorCfg : SensorCfg {
   std::string sensor_type;
-  ObjRef obj, ref;
+  scene::ObjRef obj, ref;
   double cutoff = 0.0;
   double delay = 0.0;
   double interval = 0.0;
@@ -98,7 +100,7 @@ void visit_fields(V& v, BuiltinSensorCfg& c) {
 //
 // The class adds one of MuJoCo's own sensors to the spec; its base class ModelSensor fills the
 // rows.
-class BuiltinSensor : public ModelSensor {
+class BuiltinSensor : public scene::ModelSensor {
  public:
   explicit BuiltinSensor(const BuiltinSensorCfg& cfg);
   void edit_spec(mjSpec* spec) override;
@@ -107,4 +109,4 @@ class BuiltinSensor : public ModelSensor {
   std::unique_ptr<const BuiltinSensorCfg> cfg_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -20,7 +20,7 @@
 #include "mjsense/sensors/builtin/builtin_cases.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::HasSubstr;
@@ -32,12 +32,12 @@ using DataPtr = std::unique_ptr<mjData, DataDelete>;
 
 class Bench {
  public:
-  explicit Bench(SceneCfg cfg) : scene_(std::move(cfg)), data_(mj_makeData(scene_.model())) {
+  explicit Bench(scene::SceneCfg cfg) : scene_(std::move(cfg)), data_(mj_makeData(scene_.model())) {
     for (const auto& sensor : scene_.sensors()) sensor->initialize({scene_.model(), &scene_, 2});
   }
   const mjModel* model() const { return scene_.model(); }
   mjData* data() { return data_.get(); }
-  Scene& scene() { return scene_; }
+  scene::Scene& scene() { return scene_; }
 
   // Returns row 1 of 2; row 0 must stay zero.
   std::vector<float> read(const std::string& key, const std::string& field = "") {
@@ -49,7 +49,7 @@ class Bench {
   }
 
  private:
-  Scene scene_;
+  scene::Scene scene_;
   DataPtr data_;
 };
 
@@ -67,20 +67,20 @@ void disturb(mjSpec* spec, int seed) {
     for (int i = 0; i < 3; ++i) pos[i] += rng.uniform(-.05, .05);
     for (int i = 0; i < 4; ++i) quat[i] += rng.uniform(-.2, .2);
   };
-  for (mjsElement* e : spec_elements(spec, mjOBJ_BODY)) {
+  for (mjsElement* e : scene::spec_elements(spec, mjOBJ_BODY)) {
     mjsBody* body = mjs_asBody(e);
-    if (element_name(e) != "world") move(body->pos, body->quat);
+    if (scene::element_name(e) != "world") move(body->pos, body->quat);
   }
-  for (mjsElement* e : spec_elements(spec, mjOBJ_SITE))
+  for (mjsElement* e : scene::spec_elements(spec, mjOBJ_SITE))
     move(mjs_asSite(e)->pos, mjs_asSite(e)->quat);
-  for (mjsElement* e : spec_elements(spec, mjOBJ_CAMERA)) {
+  for (mjsElement* e : scene::spec_elements(spec, mjOBJ_CAMERA)) {
     move(mjs_asCamera(e)->pos, mjs_asCamera(e)->quat);
   }
-  for (mjsElement* e : spec_elements(spec, mjOBJ_JOINT)) {
+  for (mjsElement* e : scene::spec_elements(spec, mjOBJ_JOINT)) {
     for (double& x : mjs_asJoint(e)->axis) x += rng.uniform(-.5, .5);
     mjs_asJoint(e)->damping[0] = rng.uniform(0, 1);
   }
-  for (mjsElement* e : spec_elements(spec, mjOBJ_GEOM)) {
+  for (mjsElement* e : scene::spec_elements(spec, mjOBJ_GEOM)) {
     if (mjs_asGeom(e)->type == mjGEOM_PLANE || mjs_asGeom(e)->type == mjGEOM_MESH) continue;
     mjs_asGeom(e)->mass = rng.uniform(.1, 3);
     mjs_asGeom(e)->size[0] *= rng.uniform(.7, 1.4);
@@ -95,7 +95,7 @@ TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
   for (const Case& c : cases) sensors += c.xml;
   std::set<std::string> types, moved;
   for (int model = 0; model < 10; ++model) {
-    SceneCfg cfg;
+    scene::SceneCfg cfg;
     for (const Case& c : cases) cfg.sensors.push_back(std::make_shared<BuiltinSensorCfg>(c.cfg));
     cfg.entities = {{"robot", {.model = {.xml = robot(sensors)}}}};
     if (model > 0) cfg.spec_fn = [&](mjSpec* spec) { disturb(spec, model); };
@@ -103,11 +103,11 @@ TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
 
     // The same model without mjsense: only the prefixes of names differ.
     char error[1000] = "";
-    SpecPtr spec(mj_parseXMLString(robot(sensors).c_str(), nullptr, error, sizeof error));
+    scene::SpecPtr spec(mj_parseXMLString(robot(sensors).c_str(), nullptr, error, sizeof error));
     ASSERT_TRUE(spec) << error;
     spec->option = bench.model()->opt;
     if (model > 0) disturb(spec.get(), model);
-    ModelPtr plain(mj_compile(spec.get(), nullptr));
+    scene::ModelPtr plain(mj_compile(spec.get(), nullptr));
     ASSERT_TRUE(plain) << mjs_getError(spec.get());
     DataPtr data(mj_makeData(plain.get()));
 
@@ -144,7 +144,7 @@ TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
       }
     }
   }
-  for (const BuiltinType& type : builtin_types()) {
+  for (const scene::BuiltinType& type : scene::builtin_types()) {
     if (type.name == "contact" || type.name == "plugin") continue;
     EXPECT_TRUE(types.count(std::string(type.name))) << type.name << " is not tested";
     EXPECT_EQ(moved.count(std::string(type.name)), type.name != "user" ? 1u : 0u)
@@ -161,7 +161,7 @@ std::string message_of(const std::function<void()>& body) {
   return "no error";
 }
 
-BuiltinSensorCfg make(const std::string& type, ObjRef obj = {}, ObjRef ref = {}) {
+BuiltinSensorCfg make(const std::string& type, scene::ObjRef obj = {}, scene::ObjRef ref = {}) {
   BuiltinSensorCfg cfg;
   cfg.name = "s";
   cfg.sensor_type = type;
@@ -176,7 +176,7 @@ TEST(BuiltinSensor, ValidatesItsConfiguration) {
     if (edit) edit(cfg);
     return message_of([&] { cfg.validate(); });
   };
-  const ObjRef site = in_robot("site", "imu");
+  const scene::ObjRef site = in_robot("site", "imu");
   EXPECT_EQ(fault(make("gyro", site)), "no error");
   EXPECT_EQ(fault(make("gyroo", site)),
             "sensor 'robot/s': unknown sensor_type 'gyroo'; did you mean 'gyro'?");
@@ -224,8 +224,8 @@ TEST(BuiltinSensor, ValidatesItsConfiguration) {
   EXPECT_THAT(fault(make("gyro", site), [](auto& c) { c.name = ""; }), HasSubstr("needs a name"));
 }
 
-SceneCfg with(std::vector<BuiltinSensorCfg> sensors, const std::string& xml = "") {
-  SceneCfg cfg;
+scene::SceneCfg with(std::vector<BuiltinSensorCfg> sensors, const std::string& xml = "") {
+  scene::SceneCfg cfg;
   cfg.entities = {{"robot", {.model = {.xml = robot(xml)}}}};
   for (auto& s : sensors) cfg.sensors.push_back(std::make_shared<BuiltinSensorCfg>(std::move(s)));
   return cfg;
@@ -233,7 +233,7 @@ SceneCfg with(std::vector<BuiltinSensorCfg> sensors, const std::string& xml = ""
 
 TEST(BuiltinSensor, SceneErrorsNameTheSensor) {
   const auto fault = [](std::vector<BuiltinSensorCfg> sensors, const std::string& xml = "") {
-    return message_of([&] { Scene scene(with(std::move(sensors), xml)); });
+    return message_of([&] { scene::Scene scene(with(std::move(sensors), xml)); });
   };
   EXPECT_THAT(fault({make("gyro", in_robot("site", "imuu"))}),
               HasSubstr("sensor 'robot/s': no site named 'robot/imuu'; did you mean 'robot/imu'?"));
@@ -249,7 +249,7 @@ TEST(BuiltinSensor, SceneErrorsNameTheSensor) {
 
 TEST(BuiltinSensor, DeclaresUnitAndFrame) {
   std::vector<BuiltinSensorCfg> sensors;
-  const auto add = [&](const std::string& type, ObjRef obj, ObjRef ref = {}) {
+  const auto add = [&](const std::string& type, scene::ObjRef obj, scene::ObjRef ref = {}) {
     sensors.push_back(make(type, std::move(obj), std::move(ref)));
     sensors.back().name = std::to_string(sensors.size());
   };
@@ -276,7 +276,7 @@ TEST(BuiltinSensor, DeclaresBounds) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   struct Case {
     const char* type;
-    ObjRef obj, ref;
+    scene::ObjRef obj, ref;
     double cutoff, low, high;
   };
   const std::vector<Case> cases = {
@@ -333,8 +333,8 @@ TEST(BuiltinSensor, SimulationRowsAreCurrent) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;
   for (const Case& c : cases) sensors += c.xml;
-  auto scene = std::make_shared<Scene>(with({}, sensors));
-  Simulation simulation(scene, {.num_worlds = 3, .decimation = 3, .threads = 2});
+  auto scene = std::make_shared<scene::Scene>(with({}, sensors));
+  sim::Simulation simulation(scene, {.num_worlds = 3, .decimation = 3, .threads = 2});
   const mjModel* m = scene->model();
   DataPtr data(mj_makeData(m));
   for (int k = 0; k < 6; ++k) {
@@ -361,4 +361,4 @@ TEST(BuiltinSensor, SimulationRowsAreCurrent) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

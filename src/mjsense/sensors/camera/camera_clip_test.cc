@@ -11,7 +11,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/testing/render_image.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // A camera with a lens of 3 cm and a shell around it, made of a mesh and of shapes that intersect
@@ -59,7 +59,7 @@ TEST(CameraClip, ClipsAtTheModelsNearPlaneLikeOpenGL) {
 // nearer surfaces are visible.
 TEST(CameraClip, ClipsEveryField) {
   const testing::TestModel m(kHousing);
-  RayScene rays(m.model, 1);
+  rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation", "normals", "point_cloud", "flow"});
   const auto clipped = testing::shoot(cfg, m, rays);
@@ -88,7 +88,7 @@ TEST(CameraClip, ErrorsNameTheLimits) {
   const auto message = [](const CameraSensorCfg& cfg) -> std::string {
     try {
       const testing::TestModel m(kHousing);
-      RayScene rays(m.model, 1);
+      rays::RayScene rays(m.model, 1);
       rays.update(m.world());
       testing::shoot(cfg, m, rays);
     } catch (const Error& e) {
@@ -106,4 +106,4 @@ TEST(CameraClip, ErrorsNameTheLimits) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

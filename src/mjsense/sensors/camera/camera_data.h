@@ -4,7 +4,7 @@
 
 #include "mjsense/core/fields/data_class.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // clang-format off
 inline constexpr DataField kCameraDataFields[] = {
@@ -26,4 +26,4 @@ inline constexpr DataClass kCameraData{
     "Images; row 0 is the top. With depth_kind \"ray\" depth is along each pixel's ray.",
     kCameraDataFields};
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -15,7 +15,7 @@
 #include "mjsense/sensors/camera/camera_sensor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using testing::TestModel;
@@ -32,7 +32,7 @@ CameraSensorCfg camera(int width, int height) {
 
 // One camera for the worlds of one model. The test changes `m.data` and renders.
 struct TestRenderer {
-  RayScene rays;
+  rays::RayScene rays;
   std::unique_ptr<Sensor> sensor;
   ThreadPool pool{1};
 
@@ -229,16 +229,16 @@ constexpr char kSoft[] = R"(<mujoco><worldbody>
 
 // Bytes of every image of every step, by world; world `first + w` starts with its own velocities.
 std::vector<std::string> play(int first, int worlds, int threads) {
-  SceneCfg cfg;
-  EntityCfg entity;
+  scene::SceneCfg cfg;
+  scene::EntityCfg entity;
   entity.model.xml = kSoft;
   cfg.entities.emplace_back("w", entity);
   auto eye = std::make_shared<CameraSensorCfg>(camera(48, 36));
   eye->camera_name = "w/eye";
   eye->use_shadows = true;
   cfg.sensors.push_back(eye);
-  auto scene = std::make_shared<Scene>(std::move(cfg));
-  Simulation sim(scene, {.num_worlds = worlds, .decimation = 5, .threads = threads});
+  auto scene = std::make_shared<scene::Scene>(std::move(cfg));
+  sim::Simulation sim(scene, {.num_worlds = worlds, .decimation = 5, .threads = threads});
   const ArrayView qvel = sim.worlds().state_component("qvel");
   for (int row = 0; row < worlds; ++row) {
     auto* v = reinterpret_cast<double*>(qvel.data + row * qvel.strides[0]);
@@ -265,4 +265,4 @@ TEST(CameraSoft, ImagesAreBitEqualAtAnyThreadCountAndAmongAnyNumberOfWorlds) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

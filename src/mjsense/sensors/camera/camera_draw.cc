@@ -7,7 +7,7 @@
 #include "mjsense/core/debug_shapes.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // Number of line segments for a side of the image if a lens bends it.
@@ -16,7 +16,7 @@ constexpr int kBentParts = 8;
 // A camera's rays in the world frame.
 class Optics {
  public:
-  Optics(const PixelGrid& grid, std::span<const float> pose) : grid_(grid), pose_(pose) {}
+  Optics(const render::PixelGrid& grid, std::span<const float> pose) : grid_(grid), pose_(pose) {}
 
   Vec3 origin() const { return {pose_[3], pose_[7], pose_[11]}; }
   // The point at `depth` that is visible at image point (u, v) in 0..1, v down.
@@ -42,7 +42,7 @@ class Optics {
     };
     return origin() + Vec3{row(0), row(1), row(2)};
   }
-  const PixelGrid& grid_;
+  const render::PixelGrid& grid_;
   std::span<const float> pose_;  // [4, 4]
 };
 
@@ -50,7 +50,7 @@ class Optics {
 
 void CameraSensor::draw(const World& world, DebugShapes& shapes) {
   const CameraVizCfg& viz = cfg_.viz;
-  const PixelGrid& grid = worlds_[world.id].grid;
+  const render::PixelGrid& grid = worlds_[world.id].grid;
   const std::span<const float> pose = pose_->data.row<float>(world.id);
   const Optics optics(grid, pose);
   if (viz.show_frame) {
@@ -86,4 +86,4 @@ void CameraSensor::draw(const World& world, DebugShapes& shapes) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

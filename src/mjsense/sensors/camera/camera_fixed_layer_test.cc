@@ -13,7 +13,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 std::string room(Rng& rng) {
@@ -75,7 +75,7 @@ std::vector<std::uint8_t> bytes_of(Camera& camera, int world) {
 }
 
 // Renders world 0 and returns its image.
-std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, RayScene& rays,
+std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, rays::RayScene& rays,
                                 ThreadPool& pool) {
   mj_forward(m.model, m.data);
   rays.update(m.world());
@@ -89,7 +89,7 @@ TEST(FixedLayer, DoesNotChangeImages) {
   for (int scene = 0; scene < 4; ++scene) {
     Rng rng(5, 0, 1, scene);
     testing::TestModel m(room(rng));
-    RayScene rays(m.model, 1);
+    rays::RayScene rays(m.model, 1);
     ThreadPool pool(1 + scene % 3);
     const bool shadows = scene != 3;
     Camera keeps(m.model, 1, 1 + scene % 3, shadows);
@@ -146,7 +146,7 @@ TEST(FixedLayer, DifferentWorldsHaveTheirOwnLayers) {
       m->cam_pos[0] += 0.1 * i;
       m->geom_rgba[0] = 0.1f * i;
     }
-    RayScene rays(worlds[0]->model, kWorlds);
+    rays::RayScene rays(worlds[0]->model, kWorlds);
     ThreadPool pool(threads);
     Camera keeps(worlds[0]->model, kWorlds, threads);
     for (std::size_t i = 0; i < casts.size(); ++i) {
@@ -169,4 +169,4 @@ TEST(FixedLayer, DifferentWorldsHaveTheirOwnLayers) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

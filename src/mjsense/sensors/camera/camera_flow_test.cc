@@ -13,7 +13,7 @@
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr int kWidth = 40, kHeight = 30;
@@ -50,18 +50,18 @@ std::shared_ptr<CameraSensorCfg> flow_camera(std::vector<std::string> types = {"
 }
 
 struct Lab {
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
-  explicit Lab(std::shared_ptr<CameraSensorCfg> camera, SimulationCfg cfg = {}) {
-    SceneCfg s;
-    EntityCfg e;
+  explicit Lab(std::shared_ptr<CameraSensorCfg> camera, sim::SimulationCfg cfg = {}) {
+    scene::SceneCfg s;
+    scene::EntityCfg e;
     e.model.xml = kWorld;
     s.entities.emplace_back("w", e);
     s.options.gravity = {0, 0, 0};
     s.sensors = {std::move(camera)};
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, cfg);
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, cfg);
   }
   double* qpos(int world = 0) {
     const ArrayView v = sim->worlds().state_component("qpos");
@@ -321,4 +321,4 @@ TEST(Flow, IsTheSameWithMuJoCosRenderer) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -8,7 +8,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/testing/render_image.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 CameraSensorCfg one_pixel(int max_lights) {
@@ -31,7 +31,7 @@ int brightness(int max_lights, const std::string& head, const std::string& first
       head + "'/></visual><worldbody>" + lights +
       "<geom type='plane' size='1 1 1' rgba='1 1 1 1'/><camera name='c' pos='0 0 "
       "1'/></worldbody></mujoco>");
-  RayScene rays(m.model, 1);
+  rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   return testing::shoot(one_pixel(max_lights), m, rays)->field("rgb").data.row<std::uint8_t>(0)[0];
 }
@@ -72,4 +72,4 @@ TEST(CameraLights, TwelveLightsLookAsWithOpenGL) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -12,7 +12,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/testing/render_image.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // Sites of every shape on bodies that move; tendons over a sphere, through a cylinder, over a
@@ -62,7 +62,7 @@ void run(const testing::TestModel& m, int steps) {
 
 TEST(CameraMarkers, EqualThoseOfMujocosScene) {
   const testing::TestModel m(kScene);
-  Markers markers(m.model, {0x7, 0xf, true});
+  render::Markers markers(m.model, {0x7, 0xf, true});
   mjvScene scene;
   mjv_defaultScene(&scene);
   mjv_makeScene(m.model, &scene, 1000);
@@ -81,7 +81,7 @@ TEST(CameraMarkers, EqualThoseOfMujocosScene) {
       const mjvGeom& theirs = scene.geoms[g];
       if (theirs.objtype != mjOBJ_SITE && theirs.objtype != mjOBJ_TENDON) continue;
       ASSERT_LT(next, markers.all().size());
-      const Marker& ours = markers.all()[next++];
+      const render::Marker& ours = markers.all()[next++];
       EXPECT_EQ(ours.object, theirs.objtype);
       EXPECT_EQ(ours.id, theirs.objid);
       EXPECT_EQ(ours.shape.type, theirs.type);
@@ -127,7 +127,7 @@ TEST(CameraMarkers, LookAsWithOpenGL) {
 
 TEST(CameraMarkers, AreVisibleOnlyIfTheirGroupsAre) {
   const testing::TestModel m(kScene);
-  RayScene rays(m.model, 1);
+  rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   const auto objects = [&](std::vector<int> sites, std::vector<int> tendons) {
     CameraSensorCfg cfg = sight({"segmentation"}, {});
@@ -154,7 +154,7 @@ TEST(CameraMarkers, AreVisibleOnlyIfTheirGroupsAre) {
 
 TEST(CameraMarkers, BelongToTheirBodies) {
   const testing::TestModel m(kScene);
-  RayScene rays(m.model, 1);
+  rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   const auto camera =
       testing::shoot(sight({"segmentation", "body_segmentation", "flow"}, {0}), m, rays);
@@ -198,4 +198,4 @@ TEST(CameraMarkers, ReflectAndAreReflected) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

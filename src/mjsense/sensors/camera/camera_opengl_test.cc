@@ -11,7 +11,7 @@
 #include "mjsense/sensors/camera/camera_sensor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr char kScene[] = R"(<mujoco>
@@ -57,8 +57,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, CameraAgainstOpenGL, ::testing::Values(kScene, 
 
 TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
   constexpr int kWidth = 160, kHeight = 120, kCount = kWidth * kHeight;
-  SceneCfg cfg;
-  EntityCfg entity;
+  scene::SceneCfg cfg;
+  scene::EntityCfg entity;
   entity.model.xml = GetParam();
   cfg.entities.emplace_back("w", entity);
   for (const char* name : {"rays", "opengl", "opengl smooth"}) {
@@ -74,10 +74,10 @@ TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
     camera->use_shadows = true;
     cfg.sensors.push_back(camera);
   }
-  auto scene = std::make_shared<Scene>(std::move(cfg));
-  std::unique_ptr<Simulation> sim;
+  auto scene = std::make_shared<scene::Scene>(std::move(cfg));
+  std::unique_ptr<sim::Simulation> sim;
   try {
-    sim = std::make_unique<Simulation>(scene, SimulationCfg{});
+    sim = std::make_unique<sim::Simulation>(scene, sim::SimulationCfg{});
   } catch (const RuntimeError& e) {
     GTEST_SKIP() << e.what();
   }
@@ -115,4 +115,4 @@ TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

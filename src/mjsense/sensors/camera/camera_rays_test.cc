@@ -15,7 +15,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/testing/render_image.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // Configuration of the scene's camera "c".
@@ -63,18 +63,18 @@ TEST(CameraAgainstRays, EveryPixelEqualsItsRay) {
     xml.insert(xml.find(end),
                "<camera name='c' pos='" + eye + "' euler='" + turn + "' fovy='70'/>");
     testing::TestModel m(xml);
-    RayScene rays(m.model, 1);
+    rays::RayScene rays(m.model, 1);
     rays.update(m.world());
     const auto camera =
         testing::shoot(camera_c(kWidth, kHeight, {"depth", "segmentation"}), m, rays);
     const auto depth = camera->field("depth").data.row<float>(0);
     const auto ids = camera->field("segmentation").data.row<std::int32_t>(0);
 
-    RayFilter filter;
+    rays::RayFilter filter;
     filter.groups = 0x7;
-    filter.backfaces = RayFilter::Backfaces::kCull;
+    filter.backfaces = rays::RayFilter::Backfaces::kCull;
     each_pixel(m, kWidth, kHeight, 70, [&](int i, const double* d, double length) {
-      const Hit hit = rays.trace(0, filter, m.data->cam_xpos, d);
+      const rays::Hit hit = rays.trace(0, filter, m.data->cam_xpos, d);
       const double planar = hit.t / length;
       ++pixels;
       hits += hit.geom >= 0;
@@ -111,7 +111,7 @@ TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
         testing::vec({rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(1, 3)}) + "' euler='" +
         (scene % 3 ? testing::vec({rng.uniform(-40, 40), rng.uniform(-40, 40), 20}) : "0 0 0") +
         "'/></body></worldbody></mujoco>");
-    RayScene rays(m.model, 1);
+    rays::RayScene rays(m.model, 1);
     rays.update(m.world());
     const auto camera = testing::shoot(camera_c(kWidth, kHeight, {"depth"}), m, rays);
     const auto depth = camera->field("depth").data.row<float>(0);
@@ -128,4 +128,4 @@ TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

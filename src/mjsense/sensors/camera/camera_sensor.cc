@@ -14,7 +14,7 @@
 #include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/depth_noise.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // If there are fewer images per thread than this, images are divided into bands. There are enough
@@ -27,12 +27,12 @@ unsigned bits_of(const std::vector<int>& groups) {
   return bits;
 }
 
-MarkerOptions marker_options(const CameraSensorCfg& cfg) {
+render::MarkerOptions marker_options(const CameraSensorCfg& cfg) {
   return {bits_of(cfg.enabled_site_groups), bits_of(cfg.enabled_tendon_groups), cfg.use_textures};
 }
 
-ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
-  ViewOptions options;
+render::ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
+  render::ViewOptions options;
   options.groups = bits_of(cfg.enabled_geom_groups);
   options.textures = cfg.use_textures;
   const bool colors = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
@@ -44,14 +44,14 @@ ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
 }
 
 // Cameras of one simulation share what they do not change.
-std::shared_ptr<const SurfaceAssets> surface_assets_of(const SensorInit& init, bool meshes,
-                                                       bool textures) {
+std::shared_ptr<const render::SurfaceAssets> surface_assets_of(const SensorInit& init, bool meshes,
+                                                               bool textures) {
   const auto make = [&] {
-    return std::make_shared<const SurfaceAssets>(init.model, meshes, textures);
+    return std::make_shared<const render::SurfaceAssets>(init.model, meshes, textures);
   };
   if (init.shared == nullptr) return make();
-  return init.shared->get<SurfaceAssets>(fmt::format("surface assets {} {}", meshes, textures),
-                                         make);
+  return init.shared->get<render::SurfaceAssets>(
+      fmt::format("surface assets {} {}", meshes, textures), make);
 }
 
 }  // namespace
@@ -59,11 +59,11 @@ std::shared_ptr<const SurfaceAssets> surface_assets_of(const SensorInit& init, b
 // Working memory of cast(). With few large images, each has a view, whose tiles are divided among
 // the threads. With many small ones, each thread has a view.
 struct CameraSensor::Workspace {
-  std::vector<ViewBuilder> builders;
+  std::vector<render::ViewBuilder> builders;
   // By builder: tiles of the fixed layer that must be rendered before the image; null: none.
-  std::vector<FixedTile*> making;
-  std::vector<TileMemory> memory;  // by thread
-  RenderTiles render = best_render_tiles();
+  std::vector<render::FixedTile*> making;
+  std::vector<render::TileMemory> memory;  // by thread
+  render::RenderTiles render = render::best_render_tiles();
 };
 
 CameraSensor::CameraSensor(const CameraSensorCfg& cfg) : Sensor(cfg.name), cfg_(cfg) {
@@ -99,18 +99,19 @@ void CameraSensor::initialize(const SensorInit& init) {
   workspace_.reset();
   clear_fields();
   declare_fields(init.num_worlds);
-  worlds_.assign(
-      init.num_worlds,
-      PerWorld{{}, Appearance(model_, cfg_.max_lights), Markers(model_, marker_options(cfg_))});
+  worlds_.assign(init.num_worlds, PerWorld{{},
+                                           render::Appearance(model_, cfg_.max_lights),
+                                           render::Markers(model_, marker_options(cfg_))});
   due_.reserve(init.num_worlds);
 
-  PixelGrid grid = grid_in(model_);
+  render::PixelGrid grid = grid_in(model_);
   check_grid(grid);
   std::optional<LensModel> lens;
   if (cfg_.distortion.model != LensKind::kNone) {
-    lens = {cfg_.distortion.model == LensKind::kFisheye ? Lens::kFisheye : Lens::kBrownConrady,
+    lens = {cfg_.distortion.model == LensKind::kFisheye ? render::Lens::kFisheye
+                                                        : render::Lens::kBrownConrady,
             cfg_.distortion.coefficients};
-    distorted_rays_ = distorted_rays(grid, lens->lens, lens->coefficients, context.c_str());
+    distorted_rays_ = render::distorted_rays(grid, lens->lens, lens->coefficients, context.c_str());
     grid.distorted_rays = distorted_rays_.data();
   }
   for (PerWorld& w : worlds_) w.grid = grid;
@@ -128,7 +129,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   const std::size_t markers = worlds_.empty() ? 0 : worlds_[0].markers.capacity();
   gl_.reset();
   if (cfg_.renderer == CameraRenderer::kOpenGl) {
-    GlRendererCfg gl;
+    render::GlRendererCfg gl;
     gl.num_worlds = init.num_worlds;
     gl.camera = camera_;
     gl.width = cfg_.width;
@@ -143,7 +144,7 @@ void CameraSensor::initialize(const SensorInit& init) {
       gl.fovy = cfg_.fovy;
       gl.orthographic = cfg_.orthographic;
     }
-    gl_ = make_gl_renderer(model_, gl, context);
+    gl_ = render::make_gl_renderer(model_, gl, context);
     return;
   }
   // Allocates all that cast() needs, except the shapes of the ray scene.
@@ -153,33 +154,35 @@ void CameraSensor::initialize(const SensorInit& init) {
   workspace_->builders.reserve(slots);
   workspace_->making.resize(slots);
   fixed_layers_.reset();
-  if (rgb_ && cfg_.samples == 1 && FixedLayer::possible(model_, camera_))
-    fixed_layers_ = std::make_unique<FixedLayers>(model_, cfg_.width, cfg_.height, init.num_worlds);
-  ViewOptions options = view_options(cfg_, near_);
+  if (rgb_ && cfg_.samples == 1 && render::FixedLayer::possible(model_, camera_))
+    fixed_layers_ =
+        std::make_unique<render::FixedLayers>(model_, cfg_.width, cfg_.height, init.num_worlds);
+  render::ViewOptions options = view_options(cfg_, near_);
   options.markers = markers;
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
-  const int geoms = static_cast<int>(ViewBuilder::max_geoms(model_) + markers);
+  const int geoms = static_cast<int>(render::ViewBuilder::max_geoms(model_) + markers);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }
 
 // The camera of the world's `model`, with this configuration's changes, which do not affect other
 // sensors of the same camera.
-PixelGrid CameraSensor::grid_in(const mjModel* model) const {
+render::PixelGrid CameraSensor::grid_in(const mjModel* model) const {
   const int w = cfg_.width, h = cfg_.height;
   if (cfg_.intrinsics) {
     const CameraIntrinsics& k = *cfg_.intrinsics;
-    return grid_from_intrinsics(w, h, k.fx, k.fy, k.cx, k.cy);
+    return render::grid_from_intrinsics(w, h, k.fx, k.fy, k.cx, k.cy);
   }
   const bool wrapped = !cfg_.camera_name.empty();
-  if (!wrapped || (!cfg_.fovy && !cfg_.orthographic)) return grid_of_camera(model, camera_, w, h);
+  if (!wrapped || (!cfg_.fovy && !cfg_.orthographic))
+    return render::grid_of_camera(model, camera_, w, h);
   const bool orthographic =
       cfg_.orthographic || model->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
-  return grid_from_fovy(w, h, cfg_.fovy.value_or(model->cam_fovy[camera_]), orthographic);
+  return render::grid_from_fovy(w, h, cfg_.fovy.value_or(model->cam_fovy[camera_]), orthographic);
 }
 
 // Checks that need the camera of the model, in addition to validate().
-void CameraSensor::check_grid(const PixelGrid& grid) const {
+void CameraSensor::check_grid(const render::PixelGrid& grid) const {
   const std::string context = fmt::format("camera '{}'", name());
   const bool orthographic = model_->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
   if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, context);
@@ -251,7 +254,8 @@ void CameraSensor::compute(const World& world) {
   w.markers.copy(m, world.data);  // poses of sites, paths of tendons
   if (optical_flow_) optical_flow_->take(world, w.grid);
   w.rng = world.rng(stream_of(name()));
-  std::ranges::copy(intrinsic_matrix(w.grid), intrinsics_->data.row<float>(world.id).begin());
+  std::ranges::copy(render::intrinsic_matrix(w.grid),
+                    intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;
   const double* r = world.data->cam_xmat + 9 * camera_;
   std::span<float> pose = pose_->data.row<float>(world.id);
@@ -264,8 +268,8 @@ void CameraSensor::compute(const World& world) {
 }
 
 // Targets in the fields of this world; buffers of this thread for those that only derive() needs.
-ImageTargets CameraSensor::targets(int world, int thread) {
-  ImageTargets t;
+render::ImageTargets CameraSensor::targets(int world, int thread) {
+  render::ImageTargets t;
   if (rgb_) t.rgb = rgb_->data.row<std::uint8_t>(world).data();
   if (depth_) t.depth = depth_->data.row<float>(world).data();
   if (segmentation_) t.segmentation = segmentation_->data.row<std::int32_t>(world).data();
@@ -278,32 +282,34 @@ ImageTargets CameraSensor::targets(int world, int thread) {
   return t;
 }
 
-const View& CameraSensor::build_view(const RayScene& rays, int world, ViewBuilder& builder) const {
-  const RayWorld& state = rays.world(world);
-  const RayCamera& camera = state.cameras()[camera_];
+const render::View& CameraSensor::build_view(const rays::RayScene& rays, int world,
+                                             render::ViewBuilder& builder) const {
+  const rays::RayWorld& state = rays.world(world);
+  const rays::RayCamera& camera = state.cameras()[camera_];
   const PerWorld& w = worlds_[world];
-  const View& view = builder.build(state, rays.shared(), w.appearance, w.markers.all(), camera.pos,
-                                   camera.mat, w.grid);
+  const render::View& view = builder.build(state, rays.shared(), w.appearance, w.markers.all(),
+                                           camera.pos, camera.mat, w.grid);
   if (fixed_layers_) builder.use_fixed(fixed_layers_->find(world, view));
   return view;
 }
 
-void CameraSensor::make_fixed(const View& view, FixedTile* tiles, int first, int last, int thread) {
-  ImageTargets targets;
+void CameraSensor::make_fixed(const render::View& view, render::FixedTile* tiles, int first,
+                              int last, int thread) {
+  render::ImageTargets targets;
   targets.fixed = tiles;
   workspace_->render(view, targets, first, last, workspace_->memory[thread].scratch());
 }
 
 void CameraSensor::settle_common_layer(const CastContext& context, int tile_rows) {
   const int world = due_[0];
-  const View& view = build_view(*context.rays, world, workspace_->builders[0]);
-  FixedTile* tiles = fixed_layers_->settle_common(world, view);
+  const render::View& view = build_view(*context.rays, world, workspace_->builders[0]);
+  render::FixedTile* tiles = fixed_layers_->settle_common(world, view);
   if (!tiles) return;
   context.pool.run(tile_rows,
                    [&](int row, int thread) { make_fixed(view, tiles, row, row + 1, thread); });
 }
 
-FixedTile* CameraSensor::settle_layer(int world, const View& view) {
+render::FixedTile* CameraSensor::settle_layer(int world, const render::View& view) {
   return fixed_layers_ && !view.fixed ? fixed_layers_->settle(world, view) : nullptr;
 }
 
@@ -325,14 +331,15 @@ void CameraSensor::add_noise(const CastContext& context) {
   });
 }
 
-void CameraSensor::render_rows(const View& view, int world, int first, int last, int thread) {
-  const ImageTargets image = targets(world, thread);
+void CameraSensor::render_rows(const render::View& view, int world, int first, int last,
+                               int thread) {
+  const render::ImageTargets image = targets(world, thread);
   workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
-  derive(world, image, first * kTileSize, std::min(last * kTileSize, cfg_.height));
+  derive(world, image, first * render::kTileSize, std::min(last * render::kTileSize, cfg_.height));
 }
 
 // Computes the fields that follow from depth and ids, for pixel rows [first, last).
-void CameraSensor::derive(int world, const ImageTargets& image, int first, int last) {
+void CameraSensor::derive(int world, const render::ImageTargets& image, int first, int last) {
   if (optical_flow_)
     optical_flow_->write(world, image, first, last, flow_->data.row<float>(world).data());
   if (owners_) {
@@ -344,25 +351,25 @@ void CameraSensor::derive(int world, const ImageTargets& image, int first, int l
 }
 
 void CameraSensor::render_due(const CastContext& context) {
-  const RayScene& rays = *context.rays;
+  const rays::RayScene& rays = *context.rays;
   if (gl_) {
     for (int id : due_) {
-      const ImageTargets image = targets(id, 0);
+      const render::ImageTargets image = targets(id, 0);
       gl_->render(id, rays.world(id), worlds_[id].markers.geoms(), image);
       derive(id, image, 0, cfg_.height);
     }
     return;
   }
   const int count = static_cast<int>(due_.size());
-  const int tile_rows = (cfg_.height + kTileSize - 1) / kTileSize;
+  const int tile_rows = (cfg_.height + render::kTileSize - 1) / render::kTileSize;
   const int threads = context.pool.size();
   Workspace& work = *workspace_;
   if (fixed_layers_ && count > 0) settle_common_layer(context, tile_rows);
   if (threads == 1 || count >= kImagesPerThread * threads) {
     context.pool.run(count, [&](int item, int thread) {
-      ViewBuilder& builder = work.builders[thread];
-      const View& view = build_view(rays, due_[item], builder);
-      if (FixedTile* tiles = settle_layer(due_[item], view)) {
+      render::ViewBuilder& builder = work.builders[thread];
+      const render::View& view = build_view(rays, due_[item], builder);
+      if (render::FixedTile* tiles = settle_layer(due_[item], view)) {
         make_fixed(view, tiles, 0, tile_rows, thread);
         builder.use_fixed(tiles);
       }
@@ -382,7 +389,7 @@ void CameraSensor::render_due(const CastContext& context) {
     work.making[item] = settle_layer(due_[item], build_view(rays, due_[item], work.builders[item]));
   });
   const auto making = std::span(work.making).first(count);
-  if (std::ranges::any_of(making, [](FixedTile* tiles) { return tiles != nullptr; })) {
+  if (std::ranges::any_of(making, [](render::FixedTile* tiles) { return tiles != nullptr; })) {
     run_bands([&](int image, int first, int last, int thread) {
       if (making[image])
         make_fixed(work.builders[image].view(), making[image], first, last, thread);
@@ -395,4 +402,4 @@ void CameraSensor::render_due(const CastContext& context) {
   });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -16,7 +16,7 @@
 #include "mjsense/sensors/camera/optical_flow.h"
 #include "mjsense/sensors/camera/pixel_owners.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // Throws ValueError for errors that can be found without a model.
 void validate(const CameraSensorCfg& cfg);
@@ -47,9 +47,9 @@ class CameraSensor final : public Sensor {
  private:
   struct Workspace;
   struct PerWorld {
-    PixelGrid grid;
-    Appearance appearance;
-    Markers markers;
+    render::PixelGrid grid;
+    render::Appearance appearance;
+    render::Markers markers;
     std::int64_t image = -1;  // number of the current image, if there is an update period
     bool due = false;
     Rng rng{0, 0, 0, 0};  // at the time of the image
@@ -58,19 +58,21 @@ class CameraSensor final : public Sensor {
   void declare_fields(int num_worlds);
   void render_due(const CastContext& context);
   void add_noise(const CastContext& context);
-  PixelGrid grid_in(const mjModel* model) const;
-  void check_grid(const PixelGrid& grid) const;
+  render::PixelGrid grid_in(const mjModel* model) const;
+  void check_grid(const render::PixelGrid& grid) const;
   bool is_due(const World& world, std::int64_t& image) const;
-  ImageTargets targets(int world, int thread);
-  void derive(int world, const ImageTargets& image, int first, int last);
+  render::ImageTargets targets(int world, int thread);
+  void derive(int world, const render::ImageTargets& image, int first, int last);
   // Renders rows of tiles [first, last) of an image, and computes the fields that follow from it.
-  void render_rows(const View& view, int world, int first, int last, int thread);
+  void render_rows(const render::View& view, int world, int first, int last, int thread);
   // Renders rows of tiles [first, last) of the fixed geoms of a view.
-  void make_fixed(const View& view, FixedTile* tiles, int first, int last, int thread);
+  void make_fixed(const render::View& view, render::FixedTile* tiles, int first, int last,
+                  int thread);
   void settle_common_layer(const CastContext& context, int tile_rows);
   // Tiles of the world's own layer that must be rendered first; null: none.
-  FixedTile* settle_layer(int world, const View& view);
-  const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
+  render::FixedTile* settle_layer(int world, const render::View& view);
+  const render::View& build_view(const rays::RayScene& rays, int world,
+                                 render::ViewBuilder& builder) const;
 
   CameraSensorCfg cfg_;
   const mjModel* model_ = nullptr;
@@ -80,15 +82,15 @@ class CameraSensor final : public Sensor {
   std::vector<float> distorted_rays_;
   std::vector<int> due_;
   std::vector<std::vector<float>> clean_;  // by thread: true depth of one image; only with noise
-  std::shared_ptr<const SurfaceAssets> assets_;
-  std::unique_ptr<GlRenderer> gl_;  // only with renderer "opengl"
+  std::shared_ptr<const render::SurfaceAssets> assets_;
+  std::unique_ptr<render::GlRenderer> gl_;  // only with renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
-  std::unique_ptr<FixedLayers> fixed_layers_;  // null: not useful, or the camera moves
-  std::unique_ptr<OpticalFlow> optical_flow_;  // null: not requested
-  std::unique_ptr<PixelOwners> owners_;        // null: not requested
+  std::unique_ptr<render::FixedLayers> fixed_layers_;  // null: not useful, or the camera moves
+  std::unique_ptr<OpticalFlow> optical_flow_;          // null: not requested
+  std::unique_ptr<PixelOwners> owners_;                // null: not requested
   Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *bodies_ = nullptr,
         *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr, *flow_ = nullptr;
   Field *intrinsics_ = nullptr, *pose_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

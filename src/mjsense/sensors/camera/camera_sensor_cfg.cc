@@ -15,7 +15,7 @@
 #include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 template <class Fail>
@@ -75,9 +75,9 @@ void validate(const CameraSensorCfg& cfg) {
       fail(
           "renderer 'opengl' takes clip range and intrinsics from the model, has no lens "
           "distortion, and measures planar depth");
-    if (cfg.max_lights > kClassicLights)
+    if (cfg.max_lights > render::kClassicLights)
       fail(fmt::format("renderer 'opengl' supports at most {} lights; max_lights is {}",
-                       kClassicLights, cfg.max_lights));
+                       render::kClassicLights, cfg.max_lights));
   }
   const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
   if (cfg.depth_noise != DepthNoise::kNone &&
@@ -130,4 +130,4 @@ void CameraSensor::edit_spec(mjSpec* spec) {
   camera->proj = cfg_.orthographic ? mjPROJ_ORTHOGRAPHIC : mjPROJ_PERSPECTIVE;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

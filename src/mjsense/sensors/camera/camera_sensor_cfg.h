@@ -36,7 +36,7 @@
 #include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 struct CameraIntrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;
@@ -54,9 +54,9 @@ void visit_fields(V& v, CameraIntrinsics& c) {
 }
 
 enum class LensKind { kNone, kBrownConrady, kFisheye };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<LensKind>{"none", "brown_conrady",
-                                                                      "fisheye"};
+constexpr std::array<std::string_view, 3> enum_names(LensKind) {
+  return {"none", "brown_conrady", "fisheye"};
+}
 
 // x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|, theta = atan r.
 struct LensDistortion {
@@ -106,17 +106,18 @@ void visit_fields(V& v, CameraVizCfg& c) {
 }
 
 enum class DepthKind { kPlanar, kRay };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<DepthKind>{"planar", "ray"};
+constexpr std::array<std::string_view, 2> enum_names(DepthKind) { return {"planar", "ray"}; }
+
 enum class DepthNoise { kNone, kD405, kD435 };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<DepthNoise>{"none", "d405", "d435"};
+constexpr std::array<std::string_view, 3> enum_names(DepthNoise) {
+  return {"none", "d405", "d435"};
+}
+
 enum class ClipNear { kNone, kModel };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<ClipNear>{"none", "model"};
+constexpr std::array<std::string_view, 2> enum_names(ClipNear) { return {"none", "model"}; }
+
 enum class CameraRenderer { kRays, kOpenGl };
-template <>
-inline constexpr std::array<std::string_view, 2> kEnumNames<CameraRenderer>{"rays", "opengl"};
+constexpr std::array<std::string_view, 2> enum_names(CameraRenderer) { return {"rays", "opengl"}; }
 
 inline constexpr std::array<std::string_view, 8> kCameraDataTypes{
     "rgb",     "depth",       "segmentation", "body_segmentation", "entity_segmentation",
@@ -232,4 +233,4 @@ void visit_fields(V& v, CameraSensorCfg& c) {
   v("viz", c.viz, "Appearance of the debug drawing.");
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

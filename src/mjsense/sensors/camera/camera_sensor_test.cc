@@ -18,28 +18,29 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::HasSubstr;
 
 // A scene with one entity "w" and cameras.
 struct Lab {
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
-  Lab(const std::string& worldbody, std::vector<CameraSensorCfg> cameras, SimulationCfg cfg = {}) {
-    SceneCfg s;
-    EntityCfg e;
+  Lab(const std::string& worldbody, std::vector<CameraSensorCfg> cameras,
+      sim::SimulationCfg cfg = {}) {
+    scene::SceneCfg s;
+    scene::EntityCfg e;
     e.model.xml = "<mujoco>" + worldbody + "</mujoco>";
     s.entities.emplace_back("w", e);
     for (CameraSensorCfg& c : cameras) s.sensors.push_back(std::make_shared<CameraSensorCfg>(c));
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, cfg);
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, cfg);
   }
-  Lab(SceneCfg s, SimulationCfg cfg)
-      : scene(std::make_shared<Scene>(std::move(s))),
-        sim(std::make_unique<Simulation>(scene, cfg)) {}
+  Lab(scene::SceneCfg s, sim::SimulationCfg cfg)
+      : scene(std::make_shared<scene::Scene>(std::move(s))),
+        sim(std::make_unique<sim::Simulation>(scene, cfg)) {}
   template <class T>
   std::vector<T> read(std::string_view field, std::string_view name = "cam", int world = -1) {
     Sensor& sensor = scene->sensor(name);
@@ -93,10 +94,10 @@ TEST(Camera, DepthIsPlanarAndIdsAreGeoms) {
 }
 
 TEST(Camera, PixelsHaveBodyAndEntityIds) {
-  SceneCfg cfg;
+  scene::SceneCfg cfg;
   cfg.terrain.emplace();
   for (const char* name : {"a", "b"}) {
-    EntityCfg e;
+    scene::EntityCfg e;
     e.model.xml = R"(<mujoco><worldbody><body name="ball"><freejoint/><geom size=".3"/></body>
                      </worldbody></mujoco>)";
     cfg.entities.emplace_back(name, e);
@@ -134,9 +135,9 @@ TEST(Camera, PixelsHaveBodyAndEntityIds) {
 
 // A cloth above a floor, each of them an entity.
 TEST(Camera, PixelsOfAFlexHaveItsEntityId) {
-  SceneCfg cfg;
+  scene::SceneCfg cfg;
   cfg.terrain.emplace();
-  EntityCfg cloth;
+  scene::EntityCfg cloth;
   cloth.model.xml = R"(<mujoco><worldbody><flexcomp name="cloth" type="grid" dim="2" count="5 5 1"
     spacing=".3 .3 .3" pos="0 0 1"><edge equality="true"/></flexcomp></worldbody></mujoco>)";
   cfg.entities.emplace_back("curtain", cloth);
@@ -310,7 +311,7 @@ std::vector<std::byte> rows(int worlds, int threads, int world, int width, int h
   CameraSensorCfg cfg =
       camera(width, height, {"rgb", "depth", "segmentation", "normals", "point_cloud"}, "w/c");
   cfg.use_shadows = true;
-  SimulationCfg sim;
+  sim::SimulationCfg sim;
   sim.num_worlds = worlds;
   sim.threads = threads;
   Lab lab(kShow, {cfg}, sim);
@@ -333,7 +334,7 @@ TEST(Camera, ImagesAreBitEqualAtAnyThreadCountAndAmongAnyNumberOfWorlds) {
 }
 
 TEST(Camera, TeleportedObjectIsInTheNextImage) {
-  SimulationCfg sim;
+  sim::SimulationCfg sim;
   sim.num_worlds = 3;
   Lab lab(
       R"(<worldbody><body><joint type="slide" axis="1 0 0"/><geom size=".2"/></body></worldbody>)",
@@ -596,4 +597,4 @@ TEST(Camera, ErrorsNameTheSetting) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

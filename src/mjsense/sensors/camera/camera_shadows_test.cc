@@ -9,7 +9,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/testing/render_image.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr int kSize = 64;
@@ -47,7 +47,7 @@ TEST(CameraShadows, FallWhereTheRayToTheLightIsBlocked) {
     Rng rng(11, 0, 1, scene);
     const double elevation[] = {8, 20, 35, 50, 65, 80};
     testing::TestModel m(hills(rng, elevation[scene % 6], scene >= 6));
-    RayScene rays(m.model, 1);
+    rays::RayScene rays(m.model, 1);
     rays.update(m.world());
     CameraSensorCfg cfg;
     cfg.name = "cam";
@@ -74,7 +74,7 @@ TEST(CameraShadows, FallWhereTheRayToTheLightIsBlocked) {
       mju_normalize3(to_light);
       const double facing = mju_dot3(n, to_light);
       if (std::abs(facing) < 0.03) continue;  // too dark to distinguish
-      RayFilter filter;
+      rays::RayFilter filter;
       const bool barred = rays.trace(0, filter, p, to_light).geom >= 0;
       const bool lit = facing > 0 && !barred;
       ++pixels;
@@ -88,4 +88,4 @@ TEST(CameraShadows, FallWhereTheRayToTheLightIsBlocked) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -12,7 +12,7 @@
 #include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/testing/render_image.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 struct Shape {
@@ -122,4 +122,4 @@ TEST(CameraTextures, OfInfinitePlanesBeginAtTheirPosition) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr double kSubpixels = 32;  // Intel's matcher has 5 fractional bits
@@ -72,4 +72,4 @@ void add_stereo_noise(const StereoCamera& camera, std::span<float> depth, int wi
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -14,7 +14,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 struct StereoCamera {
   double baseline;           // m
@@ -33,4 +33,4 @@ StereoCamera stereo_preset(DepthNoise noise);
 void add_stereo_noise(const StereoCamera& camera, std::span<float> depth, int width, double fx,
                       Rng rng, std::span<float> scratch);
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -9,14 +9,14 @@
 
 #include "mjsense/sensors/camera/pixel_owners.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 bool equal(const Pose& a, const Pose& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-bool same_rays(const PixelGrid& a, const PixelGrid& b) {
+bool same_rays(const render::PixelGrid& a, const render::PixelGrid& b) {
   return a.left == b.left && a.top == b.top && a.dx == b.dx && a.dy == b.dy &&
          a.orthographic == b.orthographic;
 }
@@ -24,7 +24,7 @@ bool same_rays(const PixelGrid& a, const PixelGrid& b) {
 }  // namespace
 
 OpticalFlow::OpticalFlow(const mjModel* model, int camera, const std::optional<LensModel>& lens,
-                         bool clocked, const PixelGrid& grid, int num_worlds, int threads)
+                         bool clocked, const render::PixelGrid& grid, int num_worlds, int threads)
     : model_(model), camera_(camera), lens_(lens), clocked_(clocked) {
   const auto num_bodies = static_cast<std::size_t>(model->nbody);
   const Moment empty{{}, std::vector<Pose>(num_bodies), grid};
@@ -41,7 +41,7 @@ OpticalFlow::OpticalFlow(const mjModel* model, int camera, const std::optional<L
   }
 }
 
-void OpticalFlow::take(const World& world, const PixelGrid& grid) {
+void OpticalFlow::take(const World& world, const render::PixelGrid& grid) {
   PerWorld& w = worlds_[world.id];
   const bool first = !w.any || (world.first && clocked_);
   const bool again = world.substep == w.substep && !world.first;
@@ -69,13 +69,13 @@ void OpticalFlow::take(const World& world, const PixelGrid& grid) {
   }
 }
 
-void OpticalFlow::complete(ImageTargets& targets, int thread) {
+void OpticalFlow::complete(render::ImageTargets& targets, int thread) {
   if (!targets.depth) targets.depth = scratch_[thread].depth.data();
   if (!targets.segmentation) targets.segmentation = scratch_[thread].segmentation.data();
 }
 
 // Pixel coordinates of p (camera frame). Returns false if the image has no such point.
-bool OpticalFlow::project(const PixelGrid& grid, const double p[3], double uv[2]) const {
+bool OpticalFlow::project(const render::PixelGrid& grid, const double p[3], double uv[2]) const {
   double x = p[0], y = p[1];
   if (!grid.orthographic) {
     if (!(p[2] < 0)) return false;
@@ -83,7 +83,7 @@ bool OpticalFlow::project(const PixelGrid& grid, const double p[3], double uv[2]
     y /= -p[2];
     if (lens_) {
       if (x * x + y * y > reach2_ * (1 + 1e-6)) return false;
-      const auto [right, down] = through_lens(lens_->lens, lens_->coefficients, x, -y);
+      const auto [right, down] = render::through_lens(lens_->lens, lens_->coefficients, x, -y);
       x = right;
       y = -down;
     }
@@ -97,7 +97,7 @@ bool OpticalFlow::project(const PixelGrid& grid, const double p[3], double uv[2]
 // for a pinhole, where everything is linear in depth and in x.
 void OpticalFlow::follow_pinhole(const PerWorld& w, const Move& move, int y, int begin, int end,
                                  const float* depth, float* flow) const {
-  const PixelGrid &now = w.now.grid, &before = w.before.grid;
+  const render::PixelGrid &now = w.now.grid, &before = w.before.grid;
   // Rows of K R and K t: image point times depth, then depth.
   double r[3][3], t[3];
   const double* last = move.r + 6;
@@ -126,7 +126,7 @@ void OpticalFlow::follow_pinhole(const PerWorld& w, const Move& move, int y, int
 
 void OpticalFlow::follow(const PerWorld& w, const Move& move, int y, int begin, int end,
                          const float* depth, bool ray_depth, float* flow) const {
-  const PixelGrid& now = w.now.grid;
+  const render::PixelGrid& now = w.now.grid;
   for (int x = begin; x < end; ++x) {
     double ray[2] = {now.left + now.dx * (x + 0.5), now.top + now.dy * (y + 0.5)};
     if (now.distorted_rays)
@@ -146,10 +146,10 @@ void OpticalFlow::follow(const PerWorld& w, const Move& move, int y, int begin, 
   }
 }
 
-void OpticalFlow::write(int world, const ImageTargets& image, int first, int last,
+void OpticalFlow::write(int world, const render::ImageTargets& image, int first, int last,
                         float* flow) const {
   const PerWorld& w = worlds_[world];
-  const PixelGrid& grid = w.now.grid;
+  const render::PixelGrid& grid = w.now.grid;
   const bool pinhole = !grid.distorted_rays && !image.ray_depth && !grid.orthographic;
   for (int y = first; y < last; ++y) {
     const std::size_t row = static_cast<std::size_t>(y) * grid.width;
@@ -171,4 +171,4 @@ void OpticalFlow::write(int world, const ImageTargets& image, int first, int las
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

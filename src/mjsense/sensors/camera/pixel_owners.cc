@@ -4,15 +4,15 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 std::vector<std::int32_t> entity_of_each(const SensorInit& init, mjtObj type) {
-  std::vector<std::int32_t> owners(count_of(init.model, type), -1);
+  std::vector<std::int32_t> owners(scene::count_of(init.model, type), -1);
   if (init.scene == nullptr) return owners;
   std::int32_t entity = 0;
-  for (const Entity& e : init.scene->entities()) {
-    for (int id : entity_elements(init.model, init.scene, e.name, type, "camera").ids)
+  for (const scene::Entity& e : init.scene->entities()) {
+    for (int id : scene::entity_elements(init.model, init.scene, e.name, type, "camera").ids)
       owners[id] = entity;
     ++entity;
   }
@@ -35,11 +35,11 @@ PixelOwners::PixelOwners(const SensorInit& init, int width, int height)
       scratch_(init.threads,
                std::vector<std::int32_t>(2 * static_cast<std::size_t>(width) * height)) {}
 
-void PixelOwners::complete(ImageTargets& targets, int thread) {
+void PixelOwners::complete(render::ImageTargets& targets, int thread) {
   if (targets.segmentation == nullptr) targets.segmentation = scratch_[thread].data();
 }
 
-void PixelOwners::write(const ImageTargets& image, int begin, int end, std::int32_t* bodies,
+void PixelOwners::write(const render::ImageTargets& image, int begin, int end, std::int32_t* bodies,
                         std::int32_t* entities) const {
   for (int i = begin; i < end; ++i) {
     const int id = image.segmentation[2 * i], type = image.segmentation[2 * i + 1];
@@ -54,4 +54,4 @@ void PixelOwners::write(const ImageTargets& image, int begin, int end, std::int3
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -10,7 +10,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/render/view/view.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // The body of an object in the segmentation; -1: there is no object, or it has many bodies (flexes,
 // skins, tendons).
@@ -21,10 +21,10 @@ class PixelOwners {
   PixelOwners(const SensorInit& init, int width, int height);
 
   // Adds a buffer of this thread for ids, if `targets` lacks one.
-  void complete(ImageTargets& targets, int thread);
+  void complete(render::ImageTargets& targets, int thread);
   // Writes pixels [begin, end) of the images [H, W]; a null image is not written. A body is -1
   // where body_of() is -1; an entity is -1 for objects that belong to no entity.
-  void write(const ImageTargets& image, int begin, int end, std::int32_t* bodies,
+  void write(const render::ImageTargets& image, int begin, int end, std::int32_t* bodies,
              std::int32_t* entities) const;
 
  private:
@@ -34,4 +34,4 @@ class PixelOwners {
   std::vector<std::vector<std::int32_t>> scratch_;  // [threads], [H, W, 2]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -12,7 +12,7 @@
 
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 struct Model {
@@ -128,4 +128,4 @@ void mujocos(benchmark::State& state) {
 BENCHMARK(mujocos)->Name("contact/mujoco_7_fields")->Apply(few_and_all);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -4,7 +4,7 @@
 
 #include "mjsense/core/fields/data_class.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // clang-format off
 inline constexpr DataField kContactDataFields[] = {
@@ -50,4 +50,4 @@ inline constexpr DataClass kContactData{
     "from the primary to the secondary.",
     kContactDataFields};
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

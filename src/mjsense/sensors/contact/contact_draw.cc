@@ -10,7 +10,7 @@
 #include "mjsense/sensors/contact/contact_reading.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 void ContactSensor::draw(const World& world, DebugShapes& shapes) {
   pass_->run(world);  // slots refer to the contacts of the current moment
@@ -41,4 +41,4 @@ void ContactSensor::draw(const World& world, DebugShapes& shapes) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

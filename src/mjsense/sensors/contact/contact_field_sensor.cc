@@ -9,7 +9,7 @@
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_fields.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 ContactFieldSensor::ContactFieldSensor(ContactSensor* owner, int primary, std::string field)
     : Sensor(fmt::format("{}_{}_{}", owner->name(), owner->primary_names()[primary], field)),
@@ -44,4 +44,4 @@ void ContactFieldSensor::compute(const World& world) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

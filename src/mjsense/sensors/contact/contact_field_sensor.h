@@ -7,7 +7,7 @@
 
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 class ContactFieldSensor : public Sensor {
  public:
@@ -27,4 +27,4 @@ class ContactFieldSensor : public Sensor {
   std::string field_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 std::string contact_field_frame(std::string_view field, bool world_axes) {
   if (field.starts_with("pos") || field.starts_with("normal") || field.starts_with("tangent"))
@@ -33,4 +33,4 @@ int contact_field_offset(std::string_view field) {
   return -1;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -9,7 +9,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_reading.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // Index of the first value of a field (also normal_force, friction_force) in a ContactReading that
 // is read as doubles; -1 for found, which is not in it.
@@ -22,4 +22,4 @@ inline const double* contact_values(const ContactReading& reading, int offset) {
 // Frame of a field's rows. `world_axes`: force and torque are in world axes.
 std::string contact_field_frame(std::string_view field, bool world_axes);
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

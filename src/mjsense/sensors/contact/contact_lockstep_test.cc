@@ -14,7 +14,7 @@
 #include "mjsense/sensors/contact/contact_sensor.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr char kHeap[] = R"(
@@ -30,12 +30,12 @@ constexpr char kHeap[] = R"(
     <geom name="c" type="capsule" size=".05 .1"/></body>
 </worldbody></mujoco>)";
 
-std::shared_ptr<Scene> make_scene() {
-  SceneCfg cfg;
-  EntityCfg entity;
+std::shared_ptr<scene::Scene> make_scene() {
+  scene::SceneCfg cfg;
+  scene::EntityCfg entity;
   entity.model.xml = kHeap;
   cfg.entities.emplace_back("heap", entity);
-  cfg.terrain = TerrainCfg{};
+  cfg.terrain = scene::TerrainCfg{};
   for (std::size_t i = 0; i < kEnumNames<ContactReduce>.size(); ++i) {
     const auto reduce = static_cast<ContactReduce>(i);
     for (bool memory : {false, true}) {
@@ -55,11 +55,11 @@ std::shared_ptr<Scene> make_scene() {
       cfg.sensors.push_back(std::make_shared<ContactSensorCfg>(c));
     }
   }
-  return std::make_shared<Scene>(std::move(cfg));
+  return std::make_shared<scene::Scene>(std::move(cfg));
 }
 
 // Gives a world random velocities, which depend on w only.
-void throw_world(Simulation& sim, int row, int w) {
+void throw_world(sim::Simulation& sim, int row, int w) {
   std::mt19937 random(100 + w);
   std::uniform_real_distribution<double> u(-1, 1);
   const ArrayView qvel = sim.worlds().state_component("qvel");
@@ -67,7 +67,7 @@ void throw_world(Simulation& sim, int row, int w) {
   for (int i = 0; i < sim.model()->nv; ++i) v[i] = u(random);
 }
 
-std::vector<Sensor*> contact_sensors(Simulation& sim) {
+std::vector<Sensor*> contact_sensors(sim::Simulation& sim) {
   std::vector<Sensor*> list;
   for (const auto& s : sim.scene().sensors()) {
     if (s->kind() == "contact") list.push_back(s.get());
@@ -78,25 +78,25 @@ std::vector<Sensor*> contact_sensors(Simulation& sim) {
 TEST(ContactLockstep, AnyBatchAndThreadCountIsBitEqual) {
   constexpr int kWorlds = 16, kSteps = 40;
   struct Run {
-    std::shared_ptr<Scene> scene;
-    std::unique_ptr<Simulation> sim;
+    std::shared_ptr<scene::Scene> scene;
+    std::unique_ptr<sim::Simulation> sim;
   };
   std::vector<Run> runs;
   for (int threads : {1, 2, 5}) {
-    SimulationCfg cfg;
+    sim::SimulationCfg cfg;
     cfg.num_worlds = kWorlds;
     cfg.decimation = 4;
     cfg.threads = threads;
     auto scene = make_scene();
-    runs.push_back({scene, std::make_unique<Simulation>(scene, cfg)});
+    runs.push_back({scene, std::make_unique<sim::Simulation>(scene, cfg)});
     for (int w = 0; w < kWorlds; ++w) throw_world(*runs.back().sim, w, w);
   }
-  SimulationCfg one;
+  sim::SimulationCfg one;
   one.decimation = 4;
   one.threads = 1;
   constexpr int kAlone = 11;
   auto scene = make_scene();
-  Simulation alone(scene, one);
+  sim::Simulation alone(scene, one);
   throw_world(alone, 0, kAlone);
   for (int step = 0; step < kSteps; ++step) {
     for (Run& run : runs) {
@@ -120,11 +120,11 @@ TEST(ContactLockstep, AnyBatchAndThreadCountIsBitEqual) {
 }
 
 TEST(ContactLockstep, StepDoesNotAllocate) {
-  SimulationCfg cfg;
+  sim::SimulationCfg cfg;
   cfg.num_worlds = 4;
   cfg.decimation = 3;
   cfg.threads = 2;
-  Simulation sim(make_scene(), cfg);
+  sim::Simulation sim(make_scene(), cfg);
   const std::vector<Sensor*> sensors = contact_sensors(sim);
   for (int i = 0; i < 3; ++i) {
     sim.step();
@@ -139,4 +139,4 @@ TEST(ContactLockstep, StepDoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/text/name_matching.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
@@ -201,4 +201,4 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
   return result;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

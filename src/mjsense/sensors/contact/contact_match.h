@@ -12,16 +12,17 @@
 
 #include "mjsense/core/fields/named_enum.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 enum class ContactMode { kGeom, kBody, kSubtree };
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<ContactMode>{"geom", "body", "subtree"};
+constexpr std::array<std::string_view, 3> enum_names(ContactMode) {
+  return {"geom", "body", "subtree"};
+}
 
 enum class ContactPolicy { kFirst, kError, kAny, kEach };
-template <>
-inline constexpr std::array<std::string_view, 4> kEnumNames<ContactPolicy>{"first", "error", "any",
-                                                                           "each"};
+constexpr std::array<std::string_view, 4> enum_names(ContactPolicy) {
+  return {"first", "error", "any", "each"};
+}
 
 // With an entity, each pattern is a regular expression (Python's syntax) for the whole local name,
 // and the result is in model order. Without one, patterns are full MuJoCo names, in the given
@@ -90,4 +91,4 @@ class ContactNames {
   int terrain_ = -1;  // body "terrain": an entity whose names have no prefix
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::sensors {
 ContactMemory::ContactMemory(int num_worlds, int num_primaries, int decimation,
                              const Fields& fields)
     : fields_(fields), num_primaries_(num_primaries), decimation_(decimation) {
@@ -107,4 +107,4 @@ void ContactMemory::reset(int world) {
   if (fields_.touchdown) std::fill_n(touch_.begin() + begin, num_primaries_, Touch::kUnknown);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -11,7 +11,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_reading.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // The rows of a field, without the index computations of Array.
 template <class T>
@@ -68,4 +68,4 @@ class ContactMemory {
   std::vector<Touch> touch_;       // [B, P] at the last substep
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

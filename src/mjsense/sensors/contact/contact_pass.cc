@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 ContactPass::ContactPass(const mjModel* model, int num_worlds)
     : num_geoms_(model->ngeom), begin_(model->ngeom + 1), moment_(num_worlds) {}
@@ -53,4 +53,4 @@ void ContactPass::run(const World& world) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -11,7 +11,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_reducer.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 class ContactPass {
  public:
@@ -40,4 +40,4 @@ class ContactPass {
   std::vector<std::uint64_t> moment_;  // [B] of the last run
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

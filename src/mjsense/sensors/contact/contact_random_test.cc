@@ -13,7 +13,7 @@
 
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using Random = std::mt19937;
@@ -394,4 +394,4 @@ TEST(ContactRandom, EightyContactsOfOneBody) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 void set_other(const World& world, const mjContact& c, int sign, ContactReading& r) {
@@ -71,4 +71,4 @@ ContactReading read_net_contact(const World& world, const ContactSum& sum) {
   return r;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

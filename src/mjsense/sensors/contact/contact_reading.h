@@ -6,7 +6,7 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_reducer.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 struct ContactReading {
   double force[3]{}, torque[3]{};                 // N, N m; of the primary on the other side
@@ -24,4 +24,4 @@ ContactReading read_contact(const World& world, const ContactRef& ref, bool wren
 // The synthetic contact of netforce, in world axes, at the force-weighted centroid.
 ContactReading read_net_contact(const World& world, const ContactSum& sum);
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

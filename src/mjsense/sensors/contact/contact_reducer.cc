@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 bool belongs(const mjModel* m, int geom, ContactMode mode, int id) {
@@ -170,4 +170,4 @@ std::span<const double> ContactReducer::pair_force(int world) const {
   return {pair_force_.data() + world * n, n};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

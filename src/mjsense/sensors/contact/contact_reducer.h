@@ -14,12 +14,12 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_match.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 enum class ContactReduce { kNone, kMinDist, kMaxForce, kNetForce };
-template <>
-inline constexpr std::array<std::string_view, 4> kEnumNames<ContactReduce>{"none", "mindist",
-                                                                           "maxforce", "netforce"};
+constexpr std::array<std::string_view, 4> enum_names(ContactReduce) {
+  return {"none", "mindist", "maxforce", "netforce"};
+}
 
 // Force and torque in the contact frame. Equal to mj_contactForce, which is called only for
 // contacts that are not plain constraints. The edges of a pyramidal cone come in pairs, one pair
@@ -160,4 +160,4 @@ class ContactReducer {
   std::vector<double> pair_force_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -17,7 +17,7 @@
 #include "mjsense/sensors/contact/contact_fields.h"
 #include "mjsense/sensors/contact/contact_pass.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 bool contains(const std::vector<std::string>& list, std::string_view x) {
@@ -375,4 +375,4 @@ Array ContactSensor::compute_first_air(double dt, double abs_tol) const {
   return first(dt, abs_tol, "current_air_time");
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -24,7 +24,7 @@
 #include "mjsense/sensors/contact/contact_memory.h"
 #include "mjsense/sensors/contact/contact_reducer.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 class ContactPass;
 
@@ -212,4 +212,4 @@ class ContactSensor : public Sensor {
   std::vector<std::uint16_t> history_left_;    // [B, N] substeps until a slot's history is all zero
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

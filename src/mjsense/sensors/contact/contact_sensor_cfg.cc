@@ -10,7 +10,7 @@
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 std::unique_ptr<Sensor> ContactSensorCfg::build() const {
   const std::string context = sensor_context(name);
@@ -33,4 +33,4 @@ std::unique_ptr<Sensor> ContactSensorCfg::build() const {
 
 SensorKind contact_kind() { return sensor_kind<ContactSensorCfg>(&kContactData); }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -11,7 +11,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::ElementsAre;
@@ -33,18 +33,18 @@ ContactSensorCfg box_cfg(std::string pattern = "box_geom") {
 
 // A scene with one entity and these contact sensors.
 struct Lab {
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
   Lab(std::string entity, std::string xml, std::vector<ContactSensorCfg> sensors,
-      SimulationCfg cfg = {}) {
-    SceneCfg s;
-    EntityCfg e;
+      sim::SimulationCfg cfg = {}) {
+    scene::SceneCfg s;
+    scene::EntityCfg e;
     e.model.xml = std::move(xml);
     s.entities.emplace_back(std::move(entity), e);
     for (ContactSensorCfg& c : sensors) s.sensors.push_back(std::make_shared<ContactSensorCfg>(c));
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, cfg);
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, cfg);
   }
   ContactSensor& sensor(std::string_view name = "c") {
     return dynamic_cast<ContactSensor&>(scene->sensor(name));
@@ -160,10 +160,10 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
       {"bottom", 0.1}, {"middle", 0.3}, {"top", 0.5}};
   for (ContactReduce reduce :
        {ContactReduce::kMinDist, ContactReduce::kMaxForce, ContactReduce::kNone}) {
-    SceneCfg cfg;
-    cfg.terrain = TerrainCfg{};
+    scene::SceneCfg cfg;
+    cfg.terrain = scene::TerrainCfg{};
     for (const auto& [name, z] : boxes) {
-      EntityCfg box;
+      scene::EntityCfg box;
       box.model.xml = "<mujoco><worldbody><body name='b' pos='0 0 " + std::to_string(z) +
                       "'><freejoint/><geom name='g' type='box' size='.1 .1 .1' mass='1'/></body>"
                       "</worldbody></mujoco>";
@@ -186,8 +186,8 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
     all->secondary.reset();
     all->num_slots = 8;
     cfg.sensors.push_back(all);
-    auto scene = std::make_shared<Scene>(std::move(cfg));
-    Simulation sim(scene, {});
+    auto scene = std::make_shared<scene::Scene>(std::move(cfg));
+    sim::Simulation sim(scene, {});
     sim.step(1500);
     const auto sum_z = [&](const char* name) {
       sim.refresh(scene->sensor(name));
@@ -206,9 +206,9 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
 
 // The terrain's names have no prefix "terrain/".
 TEST(Contact, TerrainIsAnEntity) {
-  SceneCfg cfg;
-  cfg.terrain = TerrainCfg{};
-  EntityCfg box;
+  scene::SceneCfg cfg;
+  cfg.terrain = scene::TerrainCfg{};
+  scene::EntityCfg box;
   box.model.xml =
       "<mujoco><worldbody><body name='b' pos='0 0 .1'><freejoint/>"
       "<geom name='g' type='box' size='.1 .1 .1' mass='1'/></body></worldbody></mujoco>";
@@ -223,8 +223,8 @@ TEST(Contact, TerrainIsAnEntity) {
     c->global_frame = true;
     cfg.sensors.push_back(c);
   }
-  auto scene = std::make_shared<Scene>(std::move(cfg));
-  Simulation sim(scene, {});
+  auto scene = std::make_shared<scene::Scene>(std::move(cfg));
+  sim::Simulation sim(scene, {});
   sim.step(1000);
   for (const char* mode : {"geom", "body"}) {
     sim.refresh(scene->sensor(mode));
@@ -441,4 +441,4 @@ TEST(Contact, NetforceNamesTheStrongestContact) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

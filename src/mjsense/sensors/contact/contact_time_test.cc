@@ -11,7 +11,7 @@
 
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // Two elastic balls on vertical rails, pushed at random: contacts of one to a few hundred substeps.
@@ -238,4 +238,4 @@ TEST(ContactTime, FirstSubstepAfterAResetIsNotAnEvent) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

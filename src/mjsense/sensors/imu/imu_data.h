@@ -4,7 +4,7 @@
 
 #include "mjsense/core/fields/data_class.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // clang-format off
 inline constexpr DataField kImuDataFields[] = {
@@ -16,4 +16,4 @@ inline constexpr DataField kImuDataFields[] = {
 
 inline constexpr DataClass kImuData{"ImuData", "In the axes of the site.", kImuDataFields};
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -9,7 +9,7 @@
 #include "mjsense/effects/noise.h"
 #include "mjsense/sensors/imu/imu_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr double kDeg = std::numbers::pi / 180.0;  // rad
@@ -52,33 +52,35 @@ void validate(const ImuModel::Axis& a, std::string_view context) {
           a.bias_drift_time_s, "positive where there is a bias_drift");
 }
 
-Effects imu_effects(const ImuModel::Axis& axis) {
-  Effects effects;
+effects::Effects imu_effects(const ImuModel::Axis& axis) {
+  effects::Effects effects;
   if (axis.scale_tolerance > 0 || axis.cross_axis_tolerance > 0) {
-    Misalignment m;
+    effects::Misalignment m;
     m.scale_error_std = axis.scale_tolerance / 3;
     m.angle_std = axis.cross_axis_tolerance / 3;
-    effects.push_back(std::make_shared<Misalignment>(m));
+    effects.push_back(std::make_shared<effects::Misalignment>(m));
   }
   const std::array<double, 3>& tolerance = axis.bias_tolerance;
   if (std::ranges::any_of(tolerance, [](double b) { return b > 0; })) {
-    effects.push_back(std::make_shared<EpisodeBias>(
-        Draw::gaussian({tolerance[0] / 3, tolerance[1] / 3, tolerance[2] / 3})));
+    effects.push_back(std::make_shared<effects::EpisodeBias>(
+        effects::Draw::gaussian({tolerance[0] / 3, tolerance[1] / 3, tolerance[2] / 3})));
   }
   if (axis.bias_drift > 0) {
-    BiasDrift drift;
+    effects::BiasDrift drift;
     drift.std = {axis.bias_drift};
     drift.time_constant_s = axis.bias_drift_time_s;
-    effects.push_back(std::make_shared<BiasDrift>(drift));
+    effects.push_back(std::make_shared<effects::BiasDrift>(drift));
   }
   if (axis.noise_density > 0) {
-    effects.push_back(std::make_shared<Noise>(Noise::with_density({axis.noise_density})));
+    effects.push_back(
+        std::make_shared<effects::Noise>(effects::Noise::with_density({axis.noise_density})));
   }
-  if (axis.range > 0) effects.push_back(std::make_shared<Clip>(Clip::saturation(axis.range)));
+  if (axis.range > 0)
+    effects.push_back(std::make_shared<effects::Clip>(effects::Clip::saturation(axis.range)));
   if (axis.resolution > 0) {
-    effects.push_back(std::make_shared<Quantize>(PerComponent{axis.resolution}));
+    effects.push_back(std::make_shared<effects::Quantize>(effects::PerComponent{axis.resolution}));
   }
   return effects;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -12,7 +12,7 @@
 #include "mjsense/scene/model_sensors/builtin_draw.h"
 #include "mjsense/sensors/imu/imu_data.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 mjsSensor* add_sensor(mjSpec* spec, mjtSensor type, mjtObj object, const std::string& site,
@@ -72,7 +72,8 @@ void ImuSensor::initialize(const SensorInit& init) {
   parts_.clear();
   needs_every_step_ = false;
   const std::string frame = "site " + cfg_.site.full_name();
-  const auto add = [&](const char* part, int size, const std::string& axes, Effects effects) {
+  const auto add = [&](const char* part, int size, const std::string& axes,
+                       effects::Effects effects) {
     const int id = mj_name2id(init.model, mjOBJ_SENSOR, mujoco_name(part).c_str());
     if (id < 0) {
       throw ValueError(
@@ -81,17 +82,17 @@ void ImuSensor::initialize(const SensorInit& init) {
     if (parts_.empty()) accelerometer_ = id;
     SensorSpec spec = kImuData.spec(part, {size}, axes);
     const double tick_s = init.model->opt.timestep;
-    EffectChainCfg chain_cfg;
+    effects::EffectChainCfg chain_cfg;
     chain_cfg.effects = std::move(effects);
-    EffectChain chain(name() + "/" + part, spec, chain_cfg, init.num_worlds, tick_s,
-                      tick_s * init.decimation);
+    effects::EffectChain chain(name() + "/" + part, spec, chain_cfg, init.num_worlds, tick_s,
+                               tick_s * init.decimation);
     needs_every_step_ |= chain.needs_every_step();
     Field& field = add_field(part, spec, init.num_worlds);
     parts_.push_back({&field, init.model->sensor_adr[id], std::move(chain),
                       std::vector<float>(static_cast<std::size_t>(init.num_worlds) * size)});
   };
   const auto device = [&](const ImuModel::Axis& axis) {
-    Effects effects = imu_effects(axis);
+    effects::Effects effects = imu_effects(axis);
     effects.insert(effects.end(), cfg_.effects.begin(), cfg_.effects.end());
     return effects;
   };
@@ -101,7 +102,7 @@ void ImuSensor::initialize(const SensorInit& init) {
 }
 
 void ImuSensor::compute(const World& world) {
-  const ChainTick tick{world.id, world.key, world.seed, world.tick, world.episode};
+  const effects::ChainTick tick{world.id, world.key, world.seed, world.tick, world.episode};
   for (Part& part : parts_) {
     const std::span<float> out = part.field->data.row<float>(world.id);
     float* clean = part.clean.data() + world.id * out.size();
@@ -114,12 +115,12 @@ void ImuSensor::compute(const World& world) {
 }
 
 void ImuSensor::reset(const World& world) {
-  const ChainTick tick{world.id, world.key, world.seed, world.tick, world.episode};
+  const effects::ChainTick tick{world.id, world.key, world.seed, world.tick, world.episode};
   for (Part& part : parts_) part.chain.reset(tick);
 }
 
 void ImuSensor::draw(const World& world, DebugShapes& shapes) {
-  draw_sensor_frame(world, accelerometer_, name(), shapes);
+  scene::draw_sensor_frame(world, accelerometer_, name(), shapes);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -14,7 +14,7 @@
 #include "mjsense/effects/chain.h"
 #include "mjsense/scene/entity.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // Values of a device's data sheet, in SI units. Tolerances are three standard deviations over
 // devices; a device is drawn for each episode. Values that a sheet does not give are 0.
@@ -75,16 +75,16 @@ void validate(const ImuModel::Axis& axis, std::string_view context);
 
 // The effects of the accelerometer or of the gyroscope, in the order of the signal path: scale and
 // axes, bias, noise, range, resolution.
-Effects imu_effects(const ImuModel::Axis& axis);
+effects::Effects imu_effects(const ImuModel::Axis& axis);
 
 inline constexpr std::array<std::string_view, 4> kImuPresets{"ideal", "mpu6050", "icm42688p", ""};
 
 struct ImuSensorCfg : SensorCfg {
-  ObjRef site;
+  scene::ObjRef site;
   std::string preset = "ideal";
   ImuModel model;
   bool orientation = false;
-  Effects effects;
+  effects::Effects effects;
 
   std::unique_ptr<Sensor> build() const override;
 };
@@ -130,7 +130,7 @@ class ImuSensor : public Sensor {
   struct Part {
     Field* field;
     int address;  // in mjData.sensordata
-    EffectChain chain;
+    effects::EffectChain chain;
     std::vector<float> clean;  // [B, size]
   };
   std::string mujoco_name(std::string_view part) const { return name() + "_" + std::string(part); }
@@ -142,4 +142,4 @@ class ImuSensor : public Sensor {
   bool needs_every_step_ = false;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

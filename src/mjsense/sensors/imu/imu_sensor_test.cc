@@ -14,7 +14,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::HasSubstr;
@@ -24,13 +24,13 @@ constexpr char kRest[] = R"(
 <mujoco><worldbody><body name="b" pos="0 0 1"><geom size=".1"/><site name="imu" euler="90 0 0"/></body>
 </worldbody></mujoco>)";
 
-std::shared_ptr<Scene> make_scene(const ImuSensorCfg& cfg) {
-  SceneCfg scene;
-  EntityCfg entity;
+std::shared_ptr<scene::Scene> make_scene(const ImuSensorCfg& cfg) {
+  scene::SceneCfg scene;
+  scene::EntityCfg entity;
   entity.model.xml = kRest;
   scene.entities.emplace_back("robot", entity);
   scene.sensors.push_back(std::make_shared<ImuSensorCfg>(cfg));
-  return std::make_shared<Scene>(std::move(scene));
+  return std::make_shared<scene::Scene>(std::move(scene));
 }
 
 ImuSensorCfg imu(std::string preset) {
@@ -43,7 +43,7 @@ ImuSensorCfg imu(std::string preset) {
 
 TEST(Imu, IdealReadsSpecificForceInSiteAxes) {
   auto scene = make_scene(imu("ideal"));
-  Simulation sim(scene, {});
+  sim::Simulation sim(scene, {});
   sim.step();
   sim.refresh(scene->sensor("imu"));
   const auto acc = scene->sensor("imu").field("acc").data.row<float>(0);
@@ -55,10 +55,10 @@ TEST(Imu, IdealReadsSpecificForceInSiteAxes) {
 
 TEST(Imu, ErrorsHaveTheStatisticsOfTheDataSheet) {
   auto scene = make_scene(imu("mpu6050"));
-  SimulationCfg cfg;
+  sim::SimulationCfg cfg;
   cfg.num_worlds = 256;
   cfg.decimation = 5;  // 10 ms per step
-  Simulation sim(scene, cfg);
+  sim::Simulation sim(scene, cfg);
   const double deg = std::numbers::pi / 180;
   double bias2 = 0, noise2 = 0;
   int n = 0;
@@ -91,14 +91,14 @@ TEST(Imu, ResetClearsTheFiltersOfItsWorldsOnly) {
   constexpr char kTop[] = R"(<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>
     <geom size=".1"/><site name="imu"/></body></worldbody></mujoco>)";
   ImuSensorCfg cfg = imu("");
-  auto delay = std::make_shared<Delay>(0.05);  // 5 rows
+  auto delay = std::make_shared<effects::Delay>(0.05);  // 5 rows
   cfg.effects = {delay};
   cfg.model.gyroscope.bias_tolerance = {0.3, 0.6, 0.9};
-  SceneCfg scene_cfg;
-  scene_cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kTop}});
+  scene::SceneCfg scene_cfg;
+  scene_cfg.entities.emplace_back("robot", scene::EntityCfg{.model = {.xml = kTop}});
   scene_cfg.sensors.push_back(std::make_shared<ImuSensorCfg>(cfg));
-  auto scene = std::make_shared<Scene>(std::move(scene_cfg));
-  Simulation sim(scene, {.num_worlds = 2, .decimation = 5});  // 10 ms per step
+  auto scene = std::make_shared<scene::Scene>(std::move(scene_cfg));
+  sim::Simulation sim(scene, {.num_worlds = 2, .decimation = 5});  // 10 ms per step
   const auto spin = [&](int world, double speed) {
     const ArrayView v = sim.worlds().state_component("qvel");
     *reinterpret_cast<double*>(v.data + world * v.strides[0]) = speed;
@@ -134,7 +134,7 @@ TEST(Imu, EveryAxisHasASeparateTolerance) {
   cfg.model.accelerometer.bias_tolerance = {0.3, 1.5, 6.0};
   auto scene = make_scene(cfg);
   constexpr int kWorlds = 2000;
-  Simulation sim(scene, {.num_worlds = kWorlds});
+  sim::Simulation sim(scene, {.num_worlds = kWorlds});
   sim.refresh(scene->sensor("imu"));
   double square[3] = {};
   const double rest[3] = {0, 9.81, 0};
@@ -155,7 +155,7 @@ TEST(Imu, CrossAxisSensitivityMixesAxes) {
   cfg.model.accelerometer.cross_axis_tolerance = 0.06;
   auto scene = make_scene(cfg);
   constexpr int kWorlds = 2000;
-  Simulation sim(scene, {.num_worlds = kWorlds});
+  sim::Simulation sim(scene, {.num_worlds = kWorlds});
   sim.refresh(scene->sensor("imu"));
   double square[3] = {};
   for (int w = 0; w < kWorlds; ++w) {
@@ -186,4 +186,4 @@ TEST(Imu, ErrorsNameSiteAndPreset) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

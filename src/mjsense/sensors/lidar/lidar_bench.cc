@@ -20,7 +20,7 @@
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 std::string number(double x) { return std::to_string(x) + " "; }
@@ -99,7 +99,7 @@ struct Fixture {
   mjData* d;                 // pose in this scan
   std::vector<mjData*> all;  // one per world, at least two; their joint positions differ too
   std::unique_ptr<LidarSensor> sensor;
-  std::unique_ptr<RayScene> rays;
+  std::unique_ptr<rays::RayScene> rays;
 
   explicit Fixture(int threads = 1, int worlds = 1) {
     // Saves the scene for the benchmarks of other libraries in Python (bench/peers).
@@ -118,7 +118,7 @@ struct Fixture {
     cfg.max_distance = 30;
     sensor = std::make_unique<LidarSensor>(cfg);
     sensor->initialize({.model = m, .num_worlds = worlds, .threads = threads});
-    rays = std::make_unique<RayScene>(m, worlds);
+    rays = std::make_unique<rays::RayScene>(m, worlds);
   }
   ~Fixture() {
     for (mjData* x : all) mj_deleteData(x);
@@ -231,4 +231,4 @@ BENCHMARK(lidar_worlds);
 BENCHMARK(lidar_worlds_mj_multiRay);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -13,7 +13,7 @@
 #include "mjsense/sensors/lidar/npy.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
@@ -148,10 +148,10 @@ void LidarSensor::compute(const World& world) {
   noise_[world.id] = world.rng(stream_of(name()));
 }
 
-void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
-                         const RayPacket& packet, const HitPacket& hits) {
+void LidarSensor::traced(const rays::RayScene& rays, int world, int frame, const RayBundle& bundle,
+                         int p, const rays::RayPacket& packet, const rays::HitPacket& hits) {
   const int first = frame * num_rays_per_frame();
-  LidarReturns rows;
+  rays::LidarReturns rows;
   rays.returns(world, bundle.packet(p), packet, hits, rows);
   float* points = points_->data.row<float>(world).data() + 3 * first;
   float* intensity = intensity_->data.row<float>(world).data() + first;
@@ -161,7 +161,7 @@ void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBu
   });
   if (origins_.empty()) return;
   float* origins = origins_.row<float>(world).data() + 3 * first;
-  for (int i = 0; i < kPacket; ++i) {
+  for (int i = 0; i < rays::kPacket; ++i) {
     const int r = bundle.rays(p)[i];
     if (r < 0) continue;
     for (int k = 0; k < 3; ++k)
@@ -170,7 +170,7 @@ void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBu
 }
 
 // Applies dropout, noise and rounding.
-void LidarSensor::finish(const RayScene& /*rays*/, int world, RayScratch& /*scratch*/) {
+void LidarSensor::finish(const rays::RayScene& /*rays*/, int world, rays::RayScratch& /*scratch*/) {
   Rng& rng = noise_[world];
   float* distance = distances_->data.row<float>(world).data();
   float* hit = hit_pos_->data.row<float>(world).data();
@@ -215,4 +215,4 @@ void LidarSensor::origin(int world, int r, float out[3]) const {
   for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(frame[k]);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

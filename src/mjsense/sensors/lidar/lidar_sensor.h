@@ -17,7 +17,7 @@
 
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // One reading is one sweep; the last firing is at the current time.
 struct SpinningScan {
@@ -75,8 +75,15 @@ void visit_fields(V& v, TableScan& c) {
 }
 
 using ScanCfg = std::variant<SpinningScan, TableScan>;
+
+}  // namespace mjsense::sensors
+
+namespace mjsense {
 template <>
-inline constexpr const char* kChoiceName<ScanCfg> = "LidarScanCfg";
+inline constexpr const char* kChoiceName<sensors::ScanCfg> = "LidarScanCfg";
+}  // namespace mjsense
+
+namespace mjsense::sensors {
 
 // Check fields that depend on each other. Throw ValueError. The sensor itself reads a table's file.
 void validate(const SpinningScan& scan, std::string_view context);
@@ -132,10 +139,10 @@ class LidarSensor : public RayCastSensor {
   RayPattern build_pattern(const mjModel* model) const override;
   int num_parts() const override { return num_parts_; }
   int part(const World& world) const override;
-  void traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
-              const RayPacket& packet, const HitPacket& hits) override;
+  void traced(const rays::RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
+              const rays::RayPacket& packet, const rays::HitPacket& hits) override;
   bool wants_finish() const override { return disturbed_; }
-  void finish(const RayScene& rays, int world, RayScratch& scratch) override;
+  void finish(const rays::RayScene& rays, int world, rays::RayScratch& scratch) override;
 
  private:
   void read_table(const TableScan& scan);
@@ -154,4 +161,4 @@ class LidarSensor : public RayCastSensor {
   Field *points_ = nullptr, *intensity_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

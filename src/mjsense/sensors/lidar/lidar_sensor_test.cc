@@ -18,7 +18,7 @@
 #include "mjsense/sensors/lidar/point_cloud.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::Each;
@@ -36,8 +36,8 @@ constexpr char kRoom[] = R"(
 
 struct Lab {
   std::shared_ptr<LidarSensorCfg> cfg = std::make_shared<LidarSensorCfg>();
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
   Lab() {
     cfg->name = "lidar";
@@ -45,13 +45,13 @@ struct Lab {
     cfg->include_geom_groups = {{0}};
     cfg->scan = SpinningScan{.channels = 4, .samples = 90};
   }
-  void start(SimulationCfg sim_cfg = {}) {
-    SceneCfg s;
-    s.entities.emplace_back("r", EntityCfg{.model = {.xml = kRoom}});
+  void start(sim::SimulationCfg sim_cfg = {}) {
+    scene::SceneCfg s;
+    s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kRoom}});
     s.options.gravity = {0, 0, 0};
     s.sensors = {cfg};
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, sim_cfg);
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, sim_cfg);
   }
   std::vector<float> read(std::string_view field) {
     Sensor& sensor = scene->sensor("lidar");
@@ -90,11 +90,11 @@ TEST(Lidar, IntensityIsAlbedoTimesCosine) {
   lab.cfg->include_geom_groups = {{0}};
   lab.cfg->max_distance = 8;
   lab.cfg->scan = SpinningScan{.channels = 1, .elevations_deg = {0}, .samples = 8};
-  SceneCfg s;
-  s.entities.emplace_back("r", EntityCfg{.model = {.xml = kWalls}});
+  scene::SceneCfg s;
+  s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kWalls}});
   s.sensors = {lab.cfg};
-  lab.scene = std::make_shared<Scene>(std::move(s));
-  lab.sim = std::make_unique<Simulation>(lab.scene, SimulationCfg{});
+  lab.scene = std::make_shared<scene::Scene>(std::move(s));
+  lab.sim = std::make_unique<sim::Simulation>(lab.scene, sim::SimulationCfg{});
   const std::vector<float> intensity = lab.read("intensity"), distance = lab.read("distances"),
                            points = lab.read("points");
   const double h = std::sqrt(0.5);
@@ -359,4 +359,4 @@ TEST(PointCloud, OmitsPointsWithoutAReturn) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -13,7 +13,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr long kMaxRows = 10'000'000;
@@ -98,4 +98,4 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path,
   return pairs;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -8,7 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 void write_point_cloud(const std::string& path, std::span<const float> points,
                        std::span<const float> intensity, std::span<const float> distances) {
@@ -45,4 +45,4 @@ void write_point_cloud(const std::string& path, std::span<const float> points,
   write_file(path, {std::as_bytes(std::span(header)), std::as_bytes(std::span(rows))});
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // `points` [N, 3], `intensity` [N] or empty, `distances` [N] or empty. Points without a return
 // (distance < 0) are left out. The format follows from the path's ending, .ply or .pcd. Throws
@@ -15,4 +15,4 @@ void write_point_cloud(const std::string& path, std::span<const float> points,
                        std::span<const float> intensity = {},
                        std::span<const float> distances = {});
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

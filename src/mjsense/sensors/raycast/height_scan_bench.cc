@@ -16,7 +16,7 @@
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr int kWorlds = 64;
@@ -87,7 +87,7 @@ struct Fixture {
   std::vector<mjData*> d;  // [kPoses, kWorlds]
   RayCastSensorCfg cfg;
   std::unique_ptr<RayCastSensor> sensor;
-  std::unique_ptr<RayScene> rays;
+  std::unique_ptr<rays::RayScene> rays;
   std::vector<int> ids = std::vector<int>(kWorlds);
 
   explicit Fixture(bool field, int threads = 1) : m(load(field)) {
@@ -112,7 +112,7 @@ struct Fixture {
     cfg.ray_alignment = "yaw";
     sensor = std::make_unique<RayCastSensor>(cfg);
     sensor->initialize({.model = m, .num_worlds = kWorlds, .threads = threads});
-    rays = std::make_unique<RayScene>(m, kWorlds);
+    rays = std::make_unique<rays::RayScene>(m, kWorlds);
     std::iota(ids.begin(), ids.end(), 0);
   }
   ~Fixture() {
@@ -186,4 +186,4 @@ BENCHMARK_CAPTURE(top_level, moving, true);
 BENCHMARK_CAPTURE(top_level, still, false);
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

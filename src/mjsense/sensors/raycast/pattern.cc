@@ -10,7 +10,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 constexpr double kMaxRays = 1 << 24;
@@ -60,7 +60,7 @@ RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view 
   if (!p.camera.empty()) {
     if (model == nullptr)
       throw ValueError(fmt::format("{}: camera '{}' needs a model", context, p.camera));
-    const int c = resolve(model, mjOBJ_CAMERA, p.camera, context);
+    const int c = scene::resolve(model, mjOBJ_CAMERA, p.camera, context);
     if (model->cam_projection[c] == mjPROJ_ORTHOGRAPHIC)
       throw ValueError(
           fmt::format("{}: camera '{}' is orthographic: its rays are parallel; use a grid pattern",
@@ -181,4 +181,4 @@ RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string
       cfg);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -12,7 +12,7 @@
 
 #include "mjsense/core/fields/field_traits.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // N rays; offsets in m, unit directions.
 struct RayPattern {
@@ -118,8 +118,15 @@ void visit_fields(V& v, UserPattern& c) {
 }
 
 using PatternCfg = std::variant<GridPattern, PinholePattern, RingPattern, UserPattern>;
+
+}  // namespace mjsense::sensors
+
+namespace mjsense {
 template <>
-inline constexpr const char* kChoiceName<PatternCfg> = "RayPatternCfg";
+inline constexpr const char* kChoiceName<sensors::PatternCfg> = "RayPatternCfg";
+}  // namespace mjsense
+
+namespace mjsense::sensors {
 
 // Throws ValueError if there are more rays than a sensor may have.
 void check_ray_count(double rays, std::string_view context);
@@ -135,4 +142,4 @@ void validate(const UserPattern& user, std::string_view context);
 // may be null unless the pattern names a camera.
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view context);
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

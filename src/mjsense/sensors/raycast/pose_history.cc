@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 PoseHistory::PoseHistory(int count, int capacity)
     : capacity_(capacity),
@@ -42,4 +42,4 @@ Pose PoseHistory::at(int frame, double time) const {
   return back(frame, used_[frame] - 1).pose;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

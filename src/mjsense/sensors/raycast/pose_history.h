@@ -8,7 +8,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/sensors/raycast/ray_frame.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 class PoseHistory {
  public:
@@ -36,4 +36,4 @@ class PoseHistory {
   std::vector<int> newest_, used_;  // [count]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <span>
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // Start of each ray and its point at `depth`. Rays that are close in these six numbers are put into
@@ -14,7 +14,7 @@ namespace {
 using Key = std::array<double, 6>;
 
 void split(std::span<int> rays, std::span<const Key> keys) {
-  if (static_cast<int>(rays.size()) <= kPacket) {
+  if (static_cast<int>(rays.size()) <= rays::kPacket) {
     std::sort(rays.begin(), rays.end());
     return;
   }
@@ -29,7 +29,8 @@ void split(std::span<int> rays, std::span<const Key> keys) {
       widest = k;
     }
   }
-  const std::size_t packets = (rays.size() + kPacket - 1) / kPacket, left = packets / 2 * kPacket;
+  const std::size_t packets = (rays.size() + rays::kPacket - 1) / rays::kPacket,
+                    left = packets / 2 * rays::kPacket;
   std::nth_element(rays.begin(), rays.begin() + left, rays.end(), [&](int a, int b) {
     return keys[a][widest] != keys[b][widest] ? keys[a][widest] < keys[b][widest] : a < b;
   });
@@ -51,17 +52,17 @@ RayBundle::RayBundle(const RayPattern& pattern, int first, int count, double dep
   std::iota(rays.begin(), rays.end(), 0);
   split(rays, keys);
 
-  const int num_packets = (num_rays_ + kPacket - 1) / kPacket;
+  const int num_packets = (num_rays_ + rays::kPacket - 1) / rays::kPacket;
   packets_.resize(num_packets);
-  order_.assign(num_packets * kPacket, -1);
+  order_.assign(num_packets * rays::kPacket, -1);
   std::copy(rays.begin(), rays.end(), order_.begin());
   first_run_.push_back(0);
   for (int p = 0; p < num_packets; ++p) {
     find_runs(p);
-    for (int i = 0; i < kPacket; ++i) {
-      const int ray = order_[p * kPacket + i];
+    for (int i = 0; i < rays::kPacket; ++i) {
+      const int ray = order_[p * rays::kPacket + i];
       // Lanes without a ray repeat the first lane.
-      const int source = ray >= 0 ? ray : order_[p * kPacket];
+      const int source = ray >= 0 ? ray : order_[p * rays::kPacket];
       packets_[p].active[i] = ray >= 0 ? 1.0f : -1.0f;
       for (int k = 0; k < 3; ++k) {
         packets_[p].o[k][i] = static_cast<float>(pattern.offsets[first + source][k]);
@@ -73,9 +74,9 @@ RayBundle::RayBundle(const RayPattern& pattern, int first, int count, double dep
 
 void RayBundle::find_runs(int p) {
   const int* ray = rays(p);
-  for (int begin = 0, end; begin < kPacket && ray[begin] >= 0; begin = end) {
+  for (int begin = 0, end; begin < rays::kPacket && ray[begin] >= 0; begin = end) {
     end = begin + 1;
-    while (end < kPacket && ray[end] == ray[begin] + end - begin) ++end;
+    while (end < rays::kPacket && ray[end] == ray[begin] + end - begin) ++end;
     const int count = std::min(4, end - begin);
     // The last part overlaps the one before, so that it is as long as the others.
     for (int i = begin; i < end; i += count) {
@@ -87,4 +88,4 @@ void RayBundle::find_runs(int p) {
   first_run_.push_back(static_cast<int>(runs_.size()));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -11,7 +11,7 @@
 #include "mjsense/rays/packet.h"
 #include "mjsense/sensors/raycast/pattern.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // Copies `count` values in one piece; the count is a compile-time constant.
 template <int count, class T>
@@ -28,9 +28,9 @@ class RayBundle {
 
   int num_rays() const { return num_rays_; }
   int num_packets() const { return static_cast<int>(packets_.size()); }
-  const LocalPacket& packet(int p) const { return packets_[p]; }
+  const rays::LocalPacket& packet(int p) const { return packets_[p]; }
   // Ray index of each lane of packet p; -1 for lanes without a ray.
-  const int* rays(int p) const { return &order_[p * kPacket]; }
+  const int* rays(int p) const { return &order_[p * rays::kPacket]; }
   // Calls put(n, lane, ray) until all rays of packet p are covered: lanes lane .. lane + n - 1 are
   // rays ray .. ray + n - 1. n is a compile-time constant, 1 to 4. A ray may be covered twice.
   template <class Put>
@@ -61,10 +61,10 @@ class RayBundle {
   void find_runs(int p);
 
   int num_rays_ = 0;
-  std::vector<LocalPacket> packets_;
+  std::vector<rays::LocalPacket> packets_;
   std::vector<int> order_;
   std::vector<Run> runs_;
   std::vector<int> first_run_;  // [packets + 1]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -10,9 +10,9 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
-void validate_frame(const ObjRef& ref, std::string_view context) {
+void validate_frame(const scene::ObjRef& ref, std::string_view context) {
   if (ref.name.empty()) throw ValueError(fmt::format("{}: a frame has no name", context));
   const std::array<std::string_view, 5> types = {"body", "xbody", "site", "geom", "camera"};
   if (std::find(types.begin(), types.end(), ref.type) == types.end())
@@ -22,10 +22,10 @@ void validate_frame(const ObjRef& ref, std::string_view context) {
                     context, ref.full_name(), ref.type));
 }
 
-RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
+RayFrame::RayFrame(const mjModel* m, const scene::Scene* scene, const scene::ObjRef& ref,
                    std::string_view context) {
   validate_frame(ref, context);
-  const ResolvedObj obj = resolve(m, scene, ref, context);
+  const scene::ResolvedObj obj = scene::resolve(m, scene, ref, context);
   type_ = obj.type;
   id_ = obj.id;
   switch (type_) {
@@ -86,4 +86,4 @@ void align_rays(RayAlignment alignment, const double mat[9], float out[9]) {
   std::copy_n(a, 9, out);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -10,18 +10,20 @@
 #include "mjsense/core/fields/named_enum.h"
 #include "mjsense/scene/entity.h"
 
-namespace mjsense {
-
+namespace mjsense::scene {
 class Scene;
+}  // namespace mjsense::scene
+
+namespace mjsense::sensors {
 
 enum class RayAlignment {
   kBase,   // rays rotate with the frame
   kYaw,    // rays rotate with the frame's heading only
   kWorld,  // rays do not rotate
 };
-
-template <>
-inline constexpr std::array<std::string_view, 3> kEnumNames<RayAlignment>{"base", "yaw", "world"};
+constexpr std::array<std::string_view, 3> enum_names(RayAlignment) {
+  return {"base", "yaw", "world"};
+}
 
 // Pose of a frame F, and the rotation of its rays.
 struct FramePose {
@@ -31,13 +33,14 @@ struct FramePose {
 };
 
 // Throws ValueError unless `ref` has a name and a type that can carry rays.
-void validate_frame(const ObjRef& ref, std::string_view context);
+void validate_frame(const scene::ObjRef& ref, std::string_view context);
 
 class RayFrame {
  public:
   // `ref` may name a body or xbody (both are the body's own frame, not its inertial one), a site, a
   // geom or a camera.
-  RayFrame(const mjModel* model, const Scene* scene, const ObjRef& ref, std::string_view context);
+  RayFrame(const mjModel* model, const scene::Scene* scene, const scene::ObjRef& ref,
+           std::string_view context);
 
   int body() const { return body_; }
   FramePose pose(const mjData* data, RayAlignment alignment) const;
@@ -53,4 +56,4 @@ class RayFrame {
 // its back therefore still point down.
 void align_rays(RayAlignment alignment, const double mat[9], float out[9]);
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -4,7 +4,7 @@
 
 #include "mjsense/core/fields/data_class.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // clang-format off
 inline constexpr DataField kRayCastDataFields[] = {
@@ -27,4 +27,4 @@ inline constexpr DataField kRayCastDataFields[] = {
 inline constexpr DataClass kRayCastData{
     "RayCastData", "Hits of ``R = F * n`` rays, frame by frame.", kRayCastDataFields};
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -7,7 +7,7 @@
 
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 // A sphere at each hit; if cfg().viz enables them, arrows along each ray and along the surface
 // normal.
@@ -40,4 +40,4 @@ void RayCastSensor::draw(const World& world, DebugShapes& shapes) {
   }
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

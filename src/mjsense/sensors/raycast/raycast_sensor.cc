@@ -14,7 +14,7 @@
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 // Number of packets that a thread takes at a time.
@@ -57,7 +57,7 @@ RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), c
   sensor_context(cfg.name);
   if (cfg.frame.empty()) throw ValueError(context() + ": no frame given");
   check_fields(cfg, context());
-  for (const ObjRef& ref : cfg.frame) {
+  for (const scene::ObjRef& ref : cfg.frame) {
     if (!cfg.any_frame && (ref.type == "xbody" || ref.type == "camera"))
       throw ValueError(
           fmt::format("{}: frame '{}' is a {}: must be 'body', 'site', or 'geom' "
@@ -69,7 +69,7 @@ RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), c
   if (!(cfg.min_distance < cfg.max_distance))
     throw ValueError(fmt::format("{}: min_distance is {} m: must be in [0, max_distance = {})",
                                  context(), cfg.min_distance, cfg.max_distance));
-  for (const ObjRef& ref : cfg.frame) validate_frame(ref, context());
+  for (const scene::ObjRef& ref : cfg.frame) validate_frame(ref, context());
 }
 
 RayCastSensor::~RayCastSensor() = default;
@@ -87,7 +87,7 @@ Field& RayCastSensor::add(std::string_view name, Shape shape, std::string frame,
 void RayCastSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
   frames_.clear();
-  for (const ObjRef& ref : cfg_.frame) frames_.emplace_back(m, init.scene, ref, context());
+  for (const scene::ObjRef& ref : cfg_.frame) frames_.emplace_back(m, init.scene, ref, context());
   pattern_ = build_pattern(m);
   const int count = static_cast<int>(pattern_.size()) / num_parts();
   bundles_.clear();
@@ -108,7 +108,7 @@ void RayCastSensor::initialize(const SensorInit& init) {
   }
   poses_.assign(static_cast<std::size_t>(init.num_worlds) * frames_.size(), FramePose{});
   const int objects = static_cast<int>(m->ngeom + m->nflex);
-  scratch_.assign(init.threads, RayScratch(objects));
+  scratch_.assign(init.threads, rays::RayScratch(objects));
 
   clear_fields();
   const int b = init.num_worlds, n = num_rays(), f = num_frames();
@@ -184,7 +184,8 @@ void RayCastSensor::cast(const CastContext& context) {
     });
 }
 
-void RayCastSensor::finish(const RayScene& /*rays*/, int /*world*/, RayScratch& /*scratch*/) {}
+void RayCastSensor::finish(const rays::RayScene& /*rays*/, int /*world*/,
+                           rays::RayScratch& /*scratch*/) {}
 
 void RayCastSensor::forget(int world, int r) {
   distances_->data.row<float>(world)[r] = -1.0f;
@@ -193,21 +194,21 @@ void RayCastSensor::forget(int world, int r) {
     if (ids != nullptr) ids->data.row<int>(world)[r] = -1;
 }
 
-RayFilter RayCastSensor::filter(int frame) const {
-  RayFilter filter = filter_;
+rays::RayFilter RayCastSensor::filter(int frame) const {
+  rays::RayFilter filter = filter_;
   const int body = frames_[frame].body();
   if (cfg_.exclude_parent_body && (body > 0 || exclude_world_)) filter.exclude_body = body;
   return filter;
 }
 
 void RayCastSensor::place_timed(int world, int frame, int packet, float reach,
-                                RayPacket& out) const {
+                                rays::RayPacket& out) const {
   const RayBundle& bundle = bundles_[parts_[world]];
-  const LocalPacket& local = bundle.packet(packet);
+  const rays::LocalPacket& local = bundle.packet(packet);
   const double* times = pattern_.times.data() + parts_[world] * num_rays_per_frame();
   double last = 1.0;  // not the time of any ray
   float shift[3] = {}, align[9] = {};
-  for (int i = 0; i < kPacket; ++i) {
+  for (int i = 0; i < rays::kPacket; ++i) {
     const int r = bundle.rays(packet)[i];
     if (r >= 0 && times[r] != last) {
       last = times[r];
@@ -242,8 +243,8 @@ RayCastSensor::WorldRay RayCastSensor::world_ray(int world, int r) const {
   return ray;
 }
 
-void RayCastSensor::packet_to_world(const RayScene& rays, int world, int frame, int p,
-                                    RayPacket& out) const {
+void RayCastSensor::packet_to_world(const rays::RayScene& rays, int world, int frame, int p,
+                                    rays::RayPacket& out) const {
   const FramePose& pose = frame_pose(world, frame);
   std::copy_n(pose.pos, 3, out.origin);
   // The tolerance avoids that rounding turns a hit at max_distance into a miss.
@@ -254,20 +255,20 @@ void RayCastSensor::packet_to_world(const RayScene& rays, int world, int frame, 
     place_timed(world, frame, p, reach, out);
 }
 
-void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
-                                  RayScratch& scratch) {
+void RayCastSensor::trace_packets(const rays::RayScene& rays, int world, int frame, int begin,
+                                  int end, rays::RayScratch& scratch) {
   const RayBundle& bundle = bundles_[parts_[world]];
-  const RayFilter seen_by = filter(frame);
+  const rays::RayFilter seen_by = filter(frame);
   const float nearest = static_cast<float>(cfg_.min_distance),
               farthest = static_cast<float>(cfg_.max_distance);
-  RayPacket packets[kChunk];
+  rays::RayPacket packets[kChunk];
   for (int p = begin; p < end; ++p) packet_to_world(rays, world, frame, p, packets[p - begin]);
   rays.cull(world, seen_by, {packets, static_cast<std::size_t>(end - begin)}, scratch);
   const Outputs out = outputs(world, frame);
-  HitPacket hits;
-  RayOutputs rows;
+  rays::HitPacket hits;
+  rays::RayOutputs rows;
   for (int p = begin; p < end; ++p) {
-    const RayPacket& packet = packets[p - begin];
+    const rays::RayPacket& packet = packets[p - begin];
     rays.trace_culled(world, seen_by, packet, hits, scratch);
     rays.rows(world, packet, nearest, farthest, out.geoms != nullptr, hits, rows);
     write(bundle, p, hits, rows, out);
@@ -275,9 +276,9 @@ void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, in
   }
 }
 
-void RayCastSensor::traced(const RayScene& /*rays*/, int /*world*/, int /*frame*/,
-                           const RayBundle& /*bundle*/, int /*p*/, const RayPacket& /*packet*/,
-                           const HitPacket& /*hits*/) {}
+void RayCastSensor::traced(const rays::RayScene& /*rays*/, int /*world*/, int /*frame*/,
+                           const RayBundle& /*bundle*/, int /*p*/,
+                           const rays::RayPacket& /*packet*/, const rays::HitPacket& /*hits*/) {}
 
 RayCastSensor::Outputs RayCastSensor::outputs(int world, int frame) {
   const int first = frame * num_rays_per_frame();
@@ -292,8 +293,8 @@ RayCastSensor::Outputs RayCastSensor::outputs(int world, int frame) {
           ids(material_id_)};
 }
 
-void RayCastSensor::write(const RayBundle& bundle, int p, const HitPacket& hits,
-                          const RayOutputs& rows, const Outputs& out) {
+void RayCastSensor::write(const RayBundle& bundle, int p, const rays::HitPacket& hits,
+                          const rays::RayOutputs& rows, const Outputs& out) {
   bundle.each_run(p, [&](auto n, int lane, int ray) {
     copy_some<n()>(rows.distance + lane, out.distances + ray);
     copy_some<3 * n()>(rows.pos + 3 * lane, out.hit_pos + 3 * ray);
@@ -307,4 +308,4 @@ void RayCastSensor::write(const RayBundle& bundle, int p, const HitPacket& hits,
   });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -34,7 +34,7 @@
 #include "mjsense/sensors/raycast/ray_bundle.h"
 #include "mjsense/sensors/raycast/ray_frame.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 struct RayCastVizCfg {
   bool show_rays = false;
@@ -62,7 +62,7 @@ void visit_fields(V& v, RayCastVizCfg& c) {
 }
 
 struct RayCastSensorCfg : SensorCfg {
-  std::vector<ObjRef> frame;
+  std::vector<scene::ObjRef> frame;
   PatternCfg pattern = GridPattern{};
   NamedEnum<RayAlignment> ray_alignment;
   double max_distance = 10.0;
@@ -155,10 +155,10 @@ class RayCastSensor : public Sensor {
   // Called when one packet of this world and frame has been traced. Lane i is ray bundle.rays(p)[i]
   // of the frame, or no ray if that is < 0. Lanes whose hit does not count have geom -1. Runs on
   // any thread.
-  virtual void traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
-                      const RayPacket& packet, const HitPacket& hits);
+  virtual void traced(const rays::RayScene& rays, int world, int frame, const RayBundle& bundle,
+                      int p, const rays::RayPacket& packet, const rays::HitPacket& hits);
   // Called when all rays of a world have been traced. Worlds run in parallel, each on one thread.
-  virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
+  virtual void finish(const rays::RayScene& rays, int world, rays::RayScratch& scratch);
   virtual bool wants_finish() const { return false; }
   std::string context() const;
   Field& add(std::string_view name, Shape shape, std::string frame, double low, double high,
@@ -166,7 +166,7 @@ class RayCastSensor : public Sensor {
   // Makes ray r of this world a miss. The caller sets hit_pos_w.
   void forget(int world, int r);
   // The geoms that rays of this frame can hit.
-  RayFilter filter(int frame) const;
+  rays::RayFilter filter(int frame) const;
 
   RayCastSensorCfg cfg_;
   // True if exclude_parent_body also applies to a frame on the world body.
@@ -182,16 +182,17 @@ class RayCastSensor : public Sensor {
     int *geoms, *bodies, *materials;
   };
   Outputs outputs(int world, int frame);
-  static void write(const RayBundle& bundle, int p, const HitPacket& hits, const RayOutputs& rows,
-                    const Outputs& out);
+  static void write(const RayBundle& bundle, int p, const rays::HitPacket& hits,
+                    const rays::RayOutputs& rows, const Outputs& out);
   void remember(const World& world);
   // Like RayScene::place(), but each ray has the frame's pose at its own time.
-  void packet_to_world(const RayScene& rays, int world, int frame, int p, RayPacket& out) const;
-  void place_timed(int world, int frame, int p, float reach, RayPacket& out) const;
-  void trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
-                     RayScratch& scratch);
+  void packet_to_world(const rays::RayScene& rays, int world, int frame, int p,
+                       rays::RayPacket& out) const;
+  void place_timed(int world, int frame, int p, float reach, rays::RayPacket& out) const;
+  void trace_packets(const rays::RayScene& rays, int world, int frame, int begin, int end,
+                     rays::RayScratch& scratch);
   RayAlignment alignment_ = RayAlignment::kBase;
-  RayFilter filter_;
+  rays::RayFilter filter_;
   RayPattern pattern_;
   std::vector<RayBundle> bundles_;  // one per part
   std::vector<int> parts_;          // [B] part to cast now
@@ -199,8 +200,8 @@ class RayCastSensor : public Sensor {
   // Of frames [B, F]; empty unless rays have different times.
   PoseHistory history_;
   std::vector<RayFrame> frames_;
-  std::vector<FramePose> poses_;     // [B, F]
-  std::vector<RayScratch> scratch_;  // one per thread
+  std::vector<FramePose> poses_;           // [B, F]
+  std::vector<rays::RayScratch> scratch_;  // one per thread
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

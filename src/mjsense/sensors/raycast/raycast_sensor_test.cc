@@ -13,7 +13,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::Each;
@@ -55,15 +55,15 @@ std::shared_ptr<Cfg> sensor_cfg(std::string name = "ray") {
 }
 
 struct Lab {
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
-  explicit Lab(std::vector<std::shared_ptr<const SensorCfg>> sensors, SimulationCfg cfg = {}) {
-    SceneCfg s;
-    s.entities.emplace_back("r", EntityCfg{.model = {.xml = kRobot}});
+  explicit Lab(std::vector<std::shared_ptr<const SensorCfg>> sensors, sim::SimulationCfg cfg = {}) {
+    scene::SceneCfg s;
+    s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kRobot}});
     s.sensors = std::move(sensors);
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, cfg);
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, cfg);
   }
   template <class T = float>
   std::vector<T> read(std::string_view field, std::string_view name = "ray") {
@@ -290,22 +290,23 @@ TEST(RayCast, TeleportChangesTheNextReadingOfItsWorldOnly) {
 // Height scans of robots at their spawn points, and at random places on the tiles, including seams.
 TEST(RayCast, HeightScansOnGeneratedTerrain) {
   constexpr int kWorlds = 96;
-  SceneCfg s;
-  s.terrain = TerrainCfg{.terrain_type = "generator",
-                         .sub_terrains = {{"slope", {.kind = "slope"}},
-                                          {"pit", {.kind = "slope", .inverted = true}},
-                                          {"rough", {.kind = "rough"}},
-                                          {"waves", {.kind = "waves"}}},
-                         .levels = 4};
+  scene::SceneCfg s;
+  s.terrain = scene::TerrainCfg{.terrain_type = "generator",
+                                .sub_terrains = {{"slope", {.kind = "slope"}},
+                                                 {"pit", {.kind = "slope", .inverted = true}},
+                                                 {"rough", {.kind = "rough"}},
+                                                 {"waves", {.kind = "waves"}}},
+                                .levels = 4};
   s.entities.emplace_back(
-      "r", EntityCfg{.model = {.xml = "<mujoco><worldbody><body name='base'><freejoint/><geom "
-                                      "size='.05'/></body></worldbody></mujoco>"}});
+      "r",
+      scene::EntityCfg{.model = {.xml = "<mujoco><worldbody><body name='base'><freejoint/><geom "
+                                        "size='.05'/></body></worldbody></mujoco>"}});
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->pattern = GridPattern{.size = {1.6, 1.0}};
   cfg->max_distance = 50;
   s.sensors = {cfg};
-  auto scene = std::make_shared<Scene>(std::move(s));
-  Simulation sim(scene, {.num_worlds = kWorlds});
+  auto scene = std::make_shared<scene::Scene>(std::move(s));
+  sim::Simulation sim(scene, {.num_worlds = kWorlds});
   const mjModel* m = sim.model();
   auto& sensor = dynamic_cast<RayCastSensor&>(scene->sensor("ray"));
   const std::vector<double> origins = scene->env_origins(kWorlds);
@@ -468,7 +469,7 @@ TEST(Pattern, EveryRayIsInExactlyOnePacket) {
     const RayBundle bundle(make_pattern(user, nullptr, "test"), 0, n);
     std::vector<int> seen(n, 0);
     for (int p = 0; p < bundle.num_packets(); ++p)
-      for (int i = 0; i < kPacket; ++i)
+      for (int i = 0; i < rays::kPacket; ++i)
         if (bundle.rays(p)[i] >= 0) ++seen[bundle.rays(p)[i]];
     EXPECT_THAT(seen, Each(1));
     EXPECT_EQ(bundle.num_packets(), (n + 15) / 16);
@@ -495,8 +496,8 @@ TEST(Pattern, LanesAreCopiedToTheirRays) {
       std::vector<float> rows(3 * n + 1, -1);
       for (int turn = 0; turn < bundle.num_packets(); ++turn) {
         const int p = back ? bundle.num_packets() - 1 - turn : turn;
-        float lanes[3 * kPacket];
-        for (int i = 0; i < kPacket; ++i)
+        float lanes[3 * rays::kPacket];
+        for (int i = 0; i < rays::kPacket; ++i)
           for (int k = 0; k < 3; ++k) lanes[3 * i + k] = 10.0f * bundle.rays(p)[i] + k;
         bundle.each_run(p, [&](auto n, int lane, int ray) {
           copy_some<3 * n()>(lanes + 3 * lane, rows.data() + 3 * ray);
@@ -508,4 +509,4 @@ TEST(Pattern, LanesAreCopiedToTheirRays) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

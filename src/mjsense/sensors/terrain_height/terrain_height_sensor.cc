@@ -10,7 +10,7 @@
 #include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 std::unique_ptr<Sensor> TerrainHeightSensorCfg::build() const {
   return std::make_unique<TerrainHeightSensor>(*this);
@@ -29,7 +29,7 @@ void TerrainHeightSensor::initialize(const SensorInit& init) {
   heights_ = &add_field("heights", kRayCastData.spec("heights", shape, "world"), init.num_worlds);
 }
 
-void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& scratch) {
+void TerrainHeightSensor::finish(const rays::RayScene& rays, int world, rays::RayScratch& scratch) {
   const int n = num_rays_per_frame();
   const float none = static_cast<float>(cfg_.max_distance);
   const float* distance = distances_->data.row<float>(world).data();
@@ -62,15 +62,15 @@ void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& sc
 
 // Casts two rays straight down without a limit: from the frame, and from max_distance above it. The
 // first one is used if it hits, otherwise the second one.
-float TerrainHeightSensor::height_without_hits(const RayScene& rays, int world, int frame,
-                                               RayScratch& scratch) const {
+float TerrainHeightSensor::height_without_hits(const rays::RayScene& rays, int world, int frame,
+                                               rays::RayScratch& scratch) const {
   const FramePose& pose = frame_pose(world, frame);
   double ground = 0;
-  RayPacket down{};
-  HitPacket hits;
-  for (int i = 0; i < kPacket; ++i) {
+  rays::RayPacket down{};
+  rays::HitPacket hits;
+  for (int i = 0; i < rays::kPacket; ++i) {
     down.d[2][i] = -1.0f;
-    down.tmax[i] = i < 2 ? kNoHit : -1.0f;
+    down.tmax[i] = i < 2 ? rays::kNoHit : -1.0f;
   }
   down.o[2][1] = static_cast<float>(cfg_.max_distance);
   std::copy_n(pose.pos, 3, down.origin);
@@ -80,4 +80,4 @@ float TerrainHeightSensor::height_without_hits(const RayScene& rays, int world, 
   return static_cast<float>(std::clamp(pose.pos[2] - ground, 0.0, cfg_.max_distance));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

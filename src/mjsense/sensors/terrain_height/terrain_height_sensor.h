@@ -15,12 +15,12 @@
 
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 enum class HeightReduction { kMin, kMax, kMean, kNone };
-template <>
-inline constexpr std::array<std::string_view, 4> kEnumNames<HeightReduction>{"min", "max", "mean",
-                                                                             "none"};
+constexpr std::array<std::string_view, 4> enum_names(HeightReduction) {
+  return {"min", "max", "mean", "none"};
+}
 
 struct TerrainHeightSensorCfg : RayCastSensorCfg {
   NamedEnum<HeightReduction> reduction;
@@ -45,13 +45,14 @@ class TerrainHeightSensor : public RayCastSensor {
 
  protected:
   bool wants_finish() const override { return true; }
-  void finish(const RayScene& rays, int world, RayScratch& scratch) override;
+  void finish(const rays::RayScene& rays, int world, rays::RayScratch& scratch) override;
 
  private:
-  float height_without_hits(const RayScene& rays, int world, int frame, RayScratch& scratch) const;
+  float height_without_hits(const rays::RayScene& rays, int world, int frame,
+                            rays::RayScratch& scratch) const;
 
   HeightReduction reduction_;
   Field* heights_ = nullptr;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

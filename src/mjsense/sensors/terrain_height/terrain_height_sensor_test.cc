@@ -11,7 +11,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 namespace {
 
 using ::testing::ElementsAre;
@@ -48,15 +48,15 @@ std::shared_ptr<TerrainHeightSensorCfg> height(HeightReduction reduction = Heigh
 }
 
 struct Lab {
-  std::shared_ptr<Scene> scene;
-  std::unique_ptr<Simulation> sim;
+  std::shared_ptr<scene::Scene> scene;
+  std::unique_ptr<sim::Simulation> sim;
 
   explicit Lab(std::shared_ptr<const SensorCfg> cfg) {
-    SceneCfg s;
-    s.entities.emplace_back("r", EntityCfg{.model = {.xml = kField}});
+    scene::SceneCfg s;
+    s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kField}});
     s.sensors = {std::move(cfg)};
-    scene = std::make_shared<Scene>(std::move(s));
-    sim = std::make_unique<Simulation>(scene, SimulationCfg{});
+    scene = std::make_shared<scene::Scene>(std::move(s));
+    sim = std::make_unique<sim::Simulation>(scene, sim::SimulationCfg{});
   }
   // Heights when the foot is at (x, 0, z), on its side.
   std::vector<float> at(double x, double z) {
@@ -116,4 +116,4 @@ TEST(TerrainHeight, EveryFrameHasItsOwnHeight) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -2,14 +2,15 @@
 #include "mjsense/effects/effect_sensor.h"
 #include "mjsense/sensors/testing/example.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs effect_examples() {
-  return {example<EffectSensorCfg>("noisy", [](EffectSensorCfg& c) {
+  return {example<effects::EffectSensorCfg>("noisy", [](effects::EffectSensorCfg& c) {
     c.sensor = "robot/acc";
-    c.effects = {std::make_shared<Noise>(Draw::gaussian({0.1})), std::make_shared<Delay>(0.004)};
+    c.effects = {std::make_shared<effects::Noise>(effects::Draw::gaussian({0.1})),
+                 std::make_shared<effects::Delay>(0.004)};
     c.history_length = 2;
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -14,7 +14,7 @@
 #include "mjsense/sensors/all_sensors.h"
 #include "mjsense/sensors/testing/example.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 #define MJSENSE_DECLARE(name) SensorCfgs name##_examples();
 MJSENSE_SENSORS(MJSENSE_DECLARE)
@@ -69,18 +69,18 @@ inline SensorCfgs every_sensor() {
 
 // A two-wheeled robot with an arm that swings; a box, a ball and a mesh that can be seen and
 // touched; textures and a light.
-inline SceneCfg every_sensor_scene() {
+inline scene::SceneCfg every_sensor_scene() {
   using namespace every_sensor_detail;
-  SceneCfg cfg;
+  scene::SceneCfg cfg;
   for (const auto& [name, xml] :
        {std::pair{"robot", kRobot}, {"box", kBox}, {"ball", kBall}, {"wedge", kWedge}}) {
-    EntityCfg entity;
+    scene::EntityCfg entity;
     entity.model.xml = xml;
     cfg.entities.emplace_back(name, entity);
   }
-  cfg.terrain = TerrainCfg{};
+  cfg.terrain = scene::TerrainCfg{};
   cfg.sensors = every_sensor();
   return cfg;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -8,7 +8,7 @@
 
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 using SensorCfgs = std::vector<std::shared_ptr<const SensorCfg>>;
 
@@ -20,4 +20,4 @@ std::shared_ptr<const SensorCfg> example(const char* name, Fill&& fill) {
   return cfg;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

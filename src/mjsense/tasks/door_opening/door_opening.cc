@@ -14,7 +14,7 @@
 #include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/robot_floor.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using std::numbers::pi;
@@ -45,41 +45,45 @@ constexpr std::array<const char*, 14> kSentences{
 
 }  // namespace
 
-DoorOpeningTask::DoorOpeningTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
+DoorOpeningTask::DoorOpeningTask(episode::TaskCfg cfg)
+    : scenes::ObjectTask(std::move(cfg), kScene, kRole) {}
 
 void DoorOpeningTask::initialize_task() {
-  ObjectTask::initialize_task();
-  doors_ = find_doors(model(), robot().prefix());
+  scenes::ObjectTask::initialize_task();
+  doors_ = scenes::find_doors(model(), robot().prefix());
   if (doors_.empty())
     throw ValueError(
         fmt::format("{} has no door: no body higher than {} m on a vertical hinge with a range",
-                    context(), Door::kMinHeight));
-  const RestingRobot rest(model(), robot());
+                    context(), scenes::Door::kMinHeight));
+  const scenes::RestingRobot rest(model(), robot());
   sides_.clear();
-  for (const Door& door : doors_)
-    sides_.push_back(
-        {leaf_middle(model(), rest.data(), door), opening_direction(model(), rest.data(), door)});
-  footprint_ = std::make_unique<Footprint>(rest.footprint());
-  trunk_ = std::make_unique<Footprint>(rest.trunk());
+  for (const scenes::Door& door : doors_)
+    sides_.push_back({scenes::leaf_middle(model(), rest.data(), door),
+                      scenes::opening_direction(model(), rest.data(), door)});
+  footprint_ = std::make_unique<scenes::Footprint>(rest.footprint());
+  trunk_ = std::make_unique<scenes::Footprint>(rest.trunk());
   const auto elsewhere = [this](int geom) { return scene().elsewhere(geom); };
   const auto of_door = [this](int geom) {
     const int body = model()->geom_bodyid[geom];
-    return std::ranges::any_of(
-        doors_, [&](const Door& door) { return is_descendant_or_self(model(), body, door.body); });
+    return std::ranges::any_of(doors_, [&](const scenes::Door& door) {
+      return observe::is_descendant_or_self(model(), body, door.body);
+    });
   };
-  floor_ = std::make_unique<OccupancyGrid>(rest.occupancy(footprint_->height(), elsewhere));
-  open_floor_ =
-      std::make_unique<OccupancyGrid>(rest.occupancy(footprint_->height(), elsewhere, of_door));
-  if (driving_base(robot()) >= 0) routes_ = std::make_unique<BasePlanner>(*floor_, *footprint_);
+  floor_ = std::make_unique<scenes::OccupancyGrid>(rest.occupancy(footprint_->height(), elsewhere));
+  open_floor_ = std::make_unique<scenes::OccupancyGrid>(
+      rest.occupancy(footprint_->height(), elsewhere, of_door));
+  if (scenes::driving_base(robot()) >= 0)
+    routes_ = std::make_unique<scenes::BasePlanner>(*floor_, *footprint_);
   episodes_.assign(num_worlds(), {});
   begin_with(doors_[0].handle, kHandle, true);
 }
 
-std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng,
+                                                  const robots::StateRow& state) {
   Episode& episode = episodes_[world];
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
-  const Door& door = doors_[episode.door];
+  const scenes::Door& door = doors_[episode.door];
   set_object(world, door.handle, kHandle);
   vary_scene(world);
   const Pose placed = scene().sample(world, -1, cfg().seed, number, rng, state);
@@ -102,7 +106,7 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
   return placed;
 }
 
-void DoorOpeningTask::choose_goal(int world, Rng& rng, const StateRow& state) {
+void DoorOpeningTask::choose_goal(int world, Rng& rng, const robots::StateRow& state) {
   Episode& episode = episodes_[world];
   adopt_scene(world, state);
   episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
@@ -110,7 +114,7 @@ void DoorOpeningTask::choose_goal(int world, Rng& rng, const StateRow& state) {
 }
 
 void DoorOpeningTask::begin(const World& world) {
-  ObjectTask::begin(world);
+  scenes::ObjectTask::begin(world);
   episodes_[world.id].push = pushes(world);
 }
 
@@ -119,7 +123,7 @@ bool DoorOpeningTask::pushes(const World& world) const {
   return dot(robot().base_pose(world).p - side.middle, side.direction) < 0;
 }
 
-Evaluation DoorOpeningTask::evaluate(const World& world) const {
+episode::Evaluation DoorOpeningTask::evaluate(const World& world) const {
   const bool success = fraction(world) >= kOpen;
   return make_evaluation_from(world.id, success ? 1.0 : 0.0,
                               success ? "" : "the door is not open far enough");
@@ -142,21 +146,21 @@ std::string DoorOpeningTask::paraphrase(const World& world, Rng& rng) const {
                                 : "the door with the handle on the right");
   }
   const bool push = pushes(world);
-  return one_of(kSentences, rng, doors[rng.below(static_cast<std::uint32_t>(doors.size()))],
-                push ? "Push" : "Pull", push ? "pushing" : "pulling",
-                push ? "away from" : "towards");
+  return scenes::one_of(kSentences, rng, doors[rng.below(static_cast<std::uint32_t>(doors.size()))],
+                        push ? "Push" : "Pull", push ? "pushing" : "pulling",
+                        push ? "away from" : "towards");
 }
 
-Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {
+episode::Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {
   return {
       {std::string(kRole), {{"door handle", 0.5}, {"handle of the door", 0.3}, {"handle", 0.2}}}};
 }
 
 void DoorOpeningTask::write_info(const World& world, JsonWriter& json) const {
   bool grasped = false;
-  for (const MoveGroup& group : robot().groups()) {
-    if (group.kind == GroupKind::kGripper)
-      grasped = grasped || fingers_touch(world, group, door(world.id).handle);
+  for (const robots::MoveGroup& group : robot().groups()) {
+    if (group.kind == robots::GroupKind::kGripper)
+      grasped = grasped || robots::fingers_touch(world, group, door(world.id).handle);
   }
   const double open = fraction(world);
   json.key("handle_grasped").value(grasped);
@@ -168,4 +172,4 @@ std::vector<std::pair<std::string, std::string>> DoorOpeningTask::scene_info(int
   return {{"text", description(world)}, {"object_name", "door"}};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

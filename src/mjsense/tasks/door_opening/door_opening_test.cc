@@ -12,20 +12,20 @@
 #include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-struct Played : PlayedTask<DoorOpeningTask> {
+struct Played : episode::PlayedTask<DoorOpeningTask> {
   explicit Played(const std::string& scene = "room_with_door")
-      : PlayedTask(task_cfg("rby1", scene), 2) {}
+      : PlayedTask(episode::task_cfg("rby1", scene), 2) {}
   double& position() { return data->qpos[model->jnt_qposadr[task.door(0).joint]]; }
   // Applies torques (N m) to the hinge (positive opens) and the lever (positive presses down) for
   // `seconds`.
   void turn(double hinge, double lever, double seconds) {
-    const Door& door = task.door(0);
+    const scenes::Door& door = task.door(0);
     const double sign = door.open > door.shut ? 1 : -1;
     for (int i = 0; i < seconds / model->opt.timestep; ++i) {
       data->qfrc_applied[model->jnt_dofadr[door.joint]] = sign * hinge;
@@ -53,7 +53,7 @@ TEST(DoorOpening, SuccessUsesTheCurrentFractionForBothHingeDirections) {
   for (const char* house : {"room_with_door:0", "room_with_door:2"}) {
     Played p(house);
     p.start(3);
-    const Door& door = p.task.door(0);
+    const scenes::Door& door = p.task.door(0);
     negative += door.open < door.shut ? 1 : 0;
     EXPECT_FALSE(p.task.evaluate(p.world).success) << "shut, at the end of the range that is 0";
     for (const auto& [part, success] :
@@ -61,7 +61,7 @@ TEST(DoorOpening, SuccessUsesTheCurrentFractionForBothHingeDirections) {
       p.position() = door.shut + part * (door.open - door.shut);
       mj_forward(p.model, p.data.get());
       EXPECT_NEAR(p.task.fraction(p.world), part, 1e-12);
-      const Evaluation e = p.task.evaluate(p.world);
+      const episode::Evaluation e = p.task.evaluate(p.world);
       EXPECT_EQ(e.success, success) << part << ": not latched";
       EXPECT_EQ(e.missing, success ? "" : "the door is not open far enough");
       EXPECT_EQ(e.reward, success ? 1 : 0);
@@ -77,8 +77,9 @@ TEST(DoorOpening, RobotStartsWithoutCollisionOnEitherSideOfTheDoor) {
     p.start(episode);
     EXPECT_EQ(p.task.start_error(p.world), "");
     const Pose base = p.task.robot().base_pose(p.world);
-    const Vec3 direction = opening_direction(p.model, p.data.get(), p.task.door(0));
-    const double side = dot(base.p - leaf_middle(p.model, p.data.get(), p.task.door(0)), direction);
+    const Vec3 direction = scenes::opening_direction(p.model, p.data.get(), p.task.door(0));
+    const double side =
+        dot(base.p - scenes::leaf_middle(p.model, p.data.get(), p.task.door(0)), direction);
     EXPECT_EQ(p.task.push(0), side < 0) << episode;
     EXPECT_EQ(p.task.description(0), side < 0 ? "Push the door open" : "Pull the door open");
     EXPECT_GT(std::abs(side), 0.9);
@@ -98,7 +99,7 @@ TEST(DoorOpening, DoorStateIsCurrent) {
   init.model = p.model;
   init.num_worlds = 2;
   sensor->initialize(init);
-  const Door& door = p.task.door(0);
+  const scenes::Door& door = p.task.door(0);
   for (const double part : {0.0, 0.4, 0.9}) {
     p.position() = door.shut + part * (door.open - door.shut);
     mj_forward(p.model, p.data.get());
@@ -154,7 +155,7 @@ TEST(DoorOpening, ObjectPosesAreMatricesInTheBaseFrame) {
 // Door recordings have the tools' poses under their own names. Other sensors stay, in their order.
 TEST(DoorOpening, TheSuiteHasEachToolPoseOnce) {
   Played p;
-  SensorSuite suite;
+  observe::SensorSuite suite;
   suite.extend(p.task.robot().create_robot_sensors());
   suite.extend(p.task.create_task_sensors());
   p.task.edit_suite(suite);
@@ -163,8 +164,8 @@ TEST(DoorOpening, TheSuiteHasEachToolPoseOnce) {
 }
 
 TEST(DoorOpening, SceneWithoutADoorIsRejected) {
-  DoorOpeningTask task(task_cfg("rby1", "table"));
-  Scene scene(task.scene_cfg_with_robot());
+  DoorOpeningTask task(episode::task_cfg("rby1", "table"));
+  scene::Scene scene(task.scene_cfg_with_robot());
   try {
     task.initialize(scene.model(), 1);
     FAIL();
@@ -174,4 +175,4 @@ TEST(DoorOpening, SceneWithoutADoorIsRejected) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -7,7 +7,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr int kStateLength = 1000;
@@ -16,27 +16,27 @@ constexpr int kStateLength = 1000;
 int handle_geom(const mjModel* m, int handle) {
   int fallback = -1;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!is_descendant_or_self(m, m->geom_bodyid[g], handle)) continue;
+    if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], handle)) continue;
     if (m->geom_group[g] < 3) return g;
     if (fallback < 0) fallback = g;
   }
   return fallback;
 }
 
-std::string side_of(const MoveGroup& gripper) {
+std::string side_of(const robots::MoveGroup& gripper) {
   return gripper.name.substr(0, gripper.name.find('_'));
 }
 
 }  // namespace
 
 std::shared_ptr<Sensor> door_state_sensor(const DoorOpeningTask& task) {
-  return std::make_shared<JsonFunctionSensor>(
+  return std::make_shared<observe::JsonFunctionSensor>(
       "door_state", kStateLength,
       "How far the door is open, and where its handle and its hinge are.",
       [&task](const World& world, JsonWriter& json) {
         const mjModel* m = world.model;
         const mjData* d = world.data;
-        const Door& door = task.door(world.id);
+        const scenes::Door& door = task.door(world.id);
         const int geom = handle_geom(m, door.handle);
         const double fraction = task.fraction(world), angle = d->qpos[m->jnt_qposadr[door.joint]];
         double extents[3] = {0, 0, 0};
@@ -56,35 +56,35 @@ std::shared_ptr<Sensor> door_state_sensor(const DoorOpeningTask& task) {
 std::vector<std::shared_ptr<Sensor>> DoorOpeningTask::create_task_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors{door_state_sensor(*this)};
   int grippers = 0;
-  for (const MoveGroup& group : robot().groups())
-    grippers += group.kind == GroupKind::kGripper ? 1 : 0;
-  for (const MoveGroup& group : robot().groups()) {
-    if (group.kind != GroupKind::kGripper || grippers < 2) continue;
-    sensors.push_back(std::make_shared<PoseSensor>(
+  for (const robots::MoveGroup& group : robot().groups())
+    grippers += group.kind == robots::GroupKind::kGripper ? 1 : 0;
+  for (const robots::MoveGroup& group : robot().groups()) {
+    if (group.kind != robots::GroupKind::kGripper || grippers < 2) continue;
+    sensors.push_back(std::make_shared<observe::PoseSensor>(
         side_of(group) + "_tcp_pose",
-        PoseSensor::Ref{"site", mjsense::name_of(model(), mjOBJ_SITE, group.leaf_site)},
-        PoseSensor::Ref{"body", mjsense::name_of(model(), mjOBJ_BODY, robot().base_body())},
+        observe::PoseSensor::Ref{"site", scene::name_of(model(), mjOBJ_SITE, group.leaf_site)},
+        observe::PoseSensor::Ref{"body", scene::name_of(model(), mjOBJ_BODY, robot().base_body())},
         "Pose of the point between the finger tips in the robot's base frame, whose origin is on "
         "the floor."));
   }
-  if (auto grasped = grasp_state_sensor(*this, std::string(kRole)))
+  if (auto grasped = episode::grasp_state_sensor(*this, std::string(kRole)))
     sensors.push_back(std::move(grasped));
-  sensors.push_back(
-      body_poses_sensor(*this, "object_poses",
-                        {{"door", [this](int world) { return door(world).body; }},
-                         {"door_handle", [this](int world) { return door(world).handle; }}}));
+  sensors.push_back(episode::body_poses_sensor(
+      *this, "object_poses",
+      {{"door", [this](int world) { return door(world).body; }},
+       {"door_handle", [this](int world) { return door(world).handle; }}}));
   return sensors;
 }
 
 // Removes tcp_pose_<side>: door recordings hold the same pose as <side>_tcp_pose.
-void DoorOpeningTask::edit_suite(SensorSuite& suite) const {
+void DoorOpeningTask::edit_suite(observe::SensorSuite& suite) const {
   std::vector<std::string> names = suite.names();
-  for (const MoveGroup& group : robot().groups()) {
+  for (const robots::MoveGroup& group : robot().groups()) {
     const std::string side = side_of(group);
-    if (group.kind == GroupKind::kGripper && suite.find(side + "_tcp_pose"))
+    if (group.kind == robots::GroupKind::kGripper && suite.find(side + "_tcp_pose"))
       std::erase(names, "tcp_pose_" + side);
   }
   suite.select(names);
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

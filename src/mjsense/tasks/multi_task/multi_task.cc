@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr std::array<const char*, 4> kIntroductions{"", "Do one of these. ", "Choose one. ",
@@ -17,13 +17,14 @@ constexpr std::array<const char*, 3> kJoints{"Or: ", "Alternatively: ", "Otherwi
 
 }  // namespace
 
-MultiTask::MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<Task>> children)
-    : Task(std::move(cfg)), name_(std::move(name)), children_(std::move(children)) {
+MultiTask::MultiTask(std::string name, episode::TaskCfg cfg,
+                     std::vector<std::unique_ptr<episode::Task>> children)
+    : episode::Task(std::move(cfg)), name_(std::move(name)), children_(std::move(children)) {
   if (size() < 2)
     throw ValueError(
         fmt::format("task '{}' consists of {} task, at least two are required", name_, size()));
   for (int i = 0; i < size(); ++i) {
-    const TaskCfg& own = children_[i]->cfg();
+    const episode::TaskCfg& own = children_[i]->cfg();
     if (own.scene != this->cfg().scene || own.robot.name != this->cfg().robot.name)
       throw ValueError(
           fmt::format("task '{}': its task '{}' has scene '{}' and robot '{}', but the combined "
@@ -50,17 +51,18 @@ void MultiTask::initialize_task() {
 }
 
 void MultiTask::collect_objects(int world) {
-  std::vector<TaskObject>& all = objects_[world];
+  std::vector<episode::TaskObject>& all = objects_[world];
   all.clear();
   for (const auto& child : children_) {
-    for (const TaskObject& object : child->objects(world)) {
-      if (std::ranges::count(all, object.role, &TaskObject::role) == 0) all.push_back(object);
+    for (const episode::TaskObject& object : child->objects(world)) {
+      if (std::ranges::count(all, object.role, &episode::TaskObject::role) == 0)
+        all.push_back(object);
     }
   }
 }
 
 // The first child samples the same episode that it would sample as the only task.
-std::optional<Pose> MultiTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> MultiTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
   for (const auto& child : children_) child->reseed(cfg().seed);
   const std::optional<Pose> base = children_[0]->sample_scene(world, rng, state);
   for (int i = 1; i < size(); ++i) {
@@ -73,14 +75,14 @@ std::optional<Pose> MultiTask::sample_scene(int world, Rng& rng, const StateRow&
 }
 
 void MultiTask::begin(const World& world) {
-  Task::begin(world);
+  episode::Task::begin(world);
   for (const auto& child : children_) child->begin(world);
   success_[world.id] = 0;
 }
 
-void MultiTask::begin_all(ActiveWorlds& worlds) {
+void MultiTask::begin_all(episode::ActiveWorlds& worlds) {
   worlds.for_each([this](const World& world) {
-    Task::begin(world);
+    episode::Task::begin(world);
     success_[world.id] = 0;
   });
   for (const auto& child : children_) child->begin_all(worlds);
@@ -90,8 +92,8 @@ void MultiTask::advance() {
   for (const auto& child : children_) child->advance();
 }
 
-Evaluation MultiTask::any(int world, std::span<const Evaluation> of_children,
-                          std::size_t stride) const {
+episode::Evaluation MultiTask::any(int world, std::span<const episode::Evaluation> of_children,
+                                   std::size_t stride) const {
   double reward = of_children[0].reward;
   bool success = false, over = false;
   for (std::size_t i = 0; i < of_children.size(); i += stride) {
@@ -100,19 +102,19 @@ Evaluation MultiTask::any(int world, std::span<const Evaluation> of_children,
     over = over || of_children[i].terminal;
   }
   success_[world] = success ? 1 : 0;
-  Evaluation all = make_evaluation(world, reward, success, over);
+  episode::Evaluation all = make_evaluation(world, reward, success, over);
   if (!success) all.missing = of_children[0].missing;
   return all;
 }
 
-Evaluation MultiTask::evaluate(const World& world) const {
-  std::vector<Evaluation> found;
+episode::Evaluation MultiTask::evaluate(const World& world) const {
+  std::vector<episode::Evaluation> found;
   for (const auto& child : children_) found.push_back(child->evaluate(world));
   return any(world.id, found, 1);
 }
 
-void MultiTask::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
-  const std::span<Evaluation> all(found_);
+void MultiTask::evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) {
+  const std::span<episode::Evaluation> all(found_);
   const auto B = static_cast<std::size_t>(num_worlds());
   for (int i = 0; i < size(); ++i) children_[i]->evaluate_all(worlds, all.subspan(i * B, B));
   for (int w : worlds.ids()) out[w] = any(w, all.subspan(w), B);
@@ -138,7 +140,7 @@ std::string MultiTask::paraphrase(const World& world, Rng& rng) const {
   return text;
 }
 
-Task::Referrals MultiTask::referrals(int world) const {
+episode::Task::Referrals MultiTask::referrals(int world) const {
   Referrals all;
   for (const auto& child : children_) {
     for (auto& [role, texts] : child->referrals(world)) {
@@ -150,12 +152,12 @@ Task::Referrals MultiTask::referrals(int world) const {
 }
 
 // The child that has an object with this role. Throws KeyError for an unknown role.
-const Task& MultiTask::with_role(std::string_view role) const {
+const episode::Task& MultiTask::with_role(std::string_view role) const {
   for (const auto& child : children_) {
-    if (std::ranges::count(child->objects(0), role, &TaskObject::role) > 0) return *child;
+    if (std::ranges::count(child->objects(0), role, &episode::TaskObject::role) > 0) return *child;
   }
   std::vector<std::string> roles;
-  for (const TaskObject& object : objects_[0]) roles.push_back(object.role);
+  for (const episode::TaskObject& object : objects_[0]) roles.push_back(object.role);
   throw_unknown(fmt::format("task '{}'", name_), "role", role, roles);
 }
 
@@ -189,9 +191,9 @@ std::vector<std::shared_ptr<Sensor>> MultiTask::create_task_sensors() const {
   return all;
 }
 
-const GraspScene* MultiTask::grasp_scene() const {
+const episode::GraspScene* MultiTask::grasp_scene() const {
   for (const auto& child : children_) {
-    if (const GraspScene* scene = child->grasp_scene()) return scene;
+    if (const episode::GraspScene* scene = child->grasp_scene()) return scene;
   }
   return nullptr;
 }
@@ -205,4 +207,4 @@ std::vector<std::pair<std::string, std::string>> MultiTask::scene_info(int world
   return info;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -11,22 +11,23 @@
 
 #include "mjsense/episode/task.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
-class MultiTask final : public Task {
+class MultiTask final : public episode::Task {
  public:
   // The first child samples the scene and provides the cameras; the others choose goals in that
   // scene. All children share this task's robot, policy and episodes. Throws ValueError for fewer
   // than two children, or if their scenes or robots differ.
-  MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<Task>> children);
+  MultiTask(std::string name, episode::TaskCfg cfg,
+            std::vector<std::unique_ptr<episode::Task>> children);
   std::string_view name() const override { return name_; }
   std::string_view type() const override { return "multi_task"; }
-  SceneCfg scene_cfg() const override { return children_[0]->scene_cfg(); }
+  scene::SceneCfg scene_cfg() const override { return children_[0]->scene_cfg(); }
   std::string robot_entity() const override { return children_[0]->robot_entity(); }
-  ActuatorGroups robot_groups() const override { return children_[0]->robot_groups(); }
-  std::vector<CameraMount> cameras() const override { return children_[0]->cameras(); }
+  robots::ActuatorGroups robot_groups() const override { return children_[0]->robot_groups(); }
+  std::vector<robots::CameraMount> cameras() const override { return children_[0]->cameras(); }
   int start_key() const override { return children_[0]->start_key(); }
-  void bind(const std::shared_ptr<Simulation>& simulation) override {
+  void bind(const std::shared_ptr<sim::Simulation>& simulation) override {
     children_[0]->bind(simulation);
   }
   std::string start_error(const World& world) const override {
@@ -34,15 +35,15 @@ class MultiTask final : public Task {
   }
 
   void begin(const World& world) override;
-  Evaluation evaluate(const World& world) const override;
-  void begin_all(ActiveWorlds& worlds) override;
+  episode::Evaluation evaluate(const World& world) const override;
+  void begin_all(episode::ActiveWorlds& worlds) override;
   void advance() override;
-  void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) override;
+  void evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) override;
   bool info_follows_evaluation() const override { return true; }
 
   // Objects of the first child, then those of later children. A later child's object is dropped if
   // its role is already taken. Referrals and sensors are merged in the same manner.
-  std::span<const TaskObject> objects(int world) const override { return objects_[world]; }
+  std::span<const episode::TaskObject> objects(int world) const override { return objects_[world]; }
   std::string description(int world) const override;  // the children's, joined by " OR "
   std::vector<int> absentees() const override { return children_[0]->absentees(); }
   bool present(int world, int body) const override { return children_[0]->present(world, body); }
@@ -52,31 +53,32 @@ class MultiTask final : public Task {
   // Writes success and tasks: {name: info of that child}. Repeated names are numbered: "pick_2".
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
-  void edit_suite(SensorSuite& suite) const override { children_[0]->edit_suite(suite); }
-  std::span<const std::unique_ptr<Task>> children() const override { return children_; }
-  const GraspScene* grasp_scene() const override;  // of the first child that has one
+  void edit_suite(observe::SensorSuite& suite) const override { children_[0]->edit_suite(suite); }
+  std::span<const std::unique_ptr<episode::Task>> children() const override { return children_; }
+  const episode::GraspScene* grasp_scene() const override;  // of the first child that has one
 
   int size() const { return static_cast<int>(children_.size()); }
-  Task& child(int index) { return *children_[index]; }
-  const Task& child(int index) const { return *children_[index]; }
+  episode::Task& child(int index) { return *children_[index]; }
+  const episode::Task& child(int index) const { return *children_[index]; }
 
  protected:
   void initialize_task() override;
-  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
   void collect_objects(int world);
-  const Task& with_role(std::string_view role) const;
-  Evaluation any(int world, std::span<const Evaluation> of_children, std::size_t stride) const;
+  const episode::Task& with_role(std::string_view role) const;
+  episode::Evaluation any(int world, std::span<const episode::Evaluation> of_children,
+                          std::size_t stride) const;
 
   std::string name_;
-  std::vector<std::unique_ptr<Task>> children_;
+  std::vector<std::unique_ptr<episode::Task>> children_;
   std::vector<std::pair<std::string, int>> names_;  // unique names, sorted, with the child's index
-  std::vector<std::vector<TaskObject>> objects_;    // [B]
-  mutable std::vector<char> success_;               // [B], result of the last evaluation
-  std::vector<Evaluation> found_;                   // [children, B]
+  std::vector<std::vector<episode::TaskObject>> objects_;  // [B]
+  mutable std::vector<char> success_;                      // [B], result of the last evaluation
+  std::vector<episode::Evaluation> found_;                 // [children, B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

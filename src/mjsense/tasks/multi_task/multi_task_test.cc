@@ -16,7 +16,7 @@
 #include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using testing::HasSubstr;
@@ -25,15 +25,15 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-TaskCfg cfg(const std::string& scene) {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("rby1");
+episode::TaskCfg cfg(const std::string& scene) {
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("rby1");
   cfg.scene = scene;
   return cfg;
 }
 
 std::unique_ptr<MultiTask> door_or_pick() {
-  std::vector<std::unique_ptr<Task>> children;
+  std::vector<std::unique_ptr<episode::Task>> children;
   children.push_back(std::make_unique<DoorOpeningTask>(cfg("room_with_door")));
   children.push_back(std::make_unique<PickTask>(cfg("room_with_door")));
   children.push_back(std::make_unique<PickTask>(cfg("room_with_door")));
@@ -42,17 +42,17 @@ std::unique_ptr<MultiTask> door_or_pick() {
 
 TEST(MultiTask, AnySuccessCountsAndTheRewardIsTheMaximum) {
   const auto task = door_or_pick();
-  Scene scene(task->scene_cfg_with_robot());
+  scene::Scene scene(task->scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task->initialize(model, 2);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
   for (int world = 0; world < 2; ++world) {
     mj_resetData(model, data.get());
-    task->sample(world, 4, state_row(data.get()));
+    task->sample(world, 4, robots::state_row(data.get()));
     mj_forward(model, data.get());
     const World w{.id = world, .model = model, .data = data.get()};
     task->begin(w);
-    const Evaluation none = task->evaluate(w);
+    const episode::Evaluation none = task->evaluate(w);
     EXPECT_FALSE(none.success);
     EXPECT_EQ(none.reward, 0);
     EXPECT_EQ(task->description(world), task->child(0).description(world) + " OR " +
@@ -86,19 +86,19 @@ TEST(MultiTask, AnySuccessCountsAndTheRewardIsTheMaximum) {
   }
 }
 
-struct Counting final : Policy {
+struct Counting final : episode::Policy {
   std::string_view name() const override { return "counting"; }
-  void initialize(Task& task) override {
+  void initialize(episode::Task& task) override {
     ++count;
     of = &task;
   }
   int count = 0;
-  const Task* of = nullptr;
+  const episode::Task* of = nullptr;
 };
 
 TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
   const auto task = door_or_pick();
-  Scene scene(task->scene_cfg_with_robot());
+  scene::Scene scene(task->scene_cfg_with_robot());
   task->initialize(scene.model(), 1);
   Counting policy, other;
   task->register_policy(policy);
@@ -107,17 +107,17 @@ TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
   EXPECT_THROW(task->child(1).register_policy(other), ValueError);
 
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
-  const StateRow state = state_row(data.get());
+  const robots::StateRow state = robots::state_row(data.get());
   task->reseed(5);
   task->sample(0, 7, state);
   mj_forward(scene.model(), data.get());
   const World w{.id = 0, .model = scene.model(), .data = data.get()};
   task->begin(w);
-  Action action;
+  robots::Action action;
   action.done = true;
   task->apply(w, action, state);
   for (int i = 0; i < task->size(); ++i) {
-    const Task& part = task->child(i);
+    const episode::Task& part = task->child(i);
     EXPECT_EQ(part.policy(), &policy);
     EXPECT_EQ(&part.robot(), &task->robot());
     EXPECT_EQ(part.cfg().seed, 5u);
@@ -130,10 +130,10 @@ TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
 
 TEST(MultiTask, CombinesRolesSensorsAndLacks) {
   const auto task = door_or_pick();
-  Scene scene(task->scene_cfg_with_robot());
+  scene::Scene scene(task->scene_cfg_with_robot());
   task->initialize(scene.model(), 1);
   std::vector<std::string> roles, sensors, expected;
-  for (const TaskObject& object : task->objects(0)) roles.push_back(object.role);
+  for (const episode::TaskObject& object : task->objects(0)) roles.push_back(object.role);
   EXPECT_EQ(roles, (std::vector<std::string>{std::string(DoorOpeningTask::kRole),
                                              std::string(PickTask::kRole)}));
   for (int i = 0; i < 2; ++i) {
@@ -144,7 +144,7 @@ TEST(MultiTask, CombinesRolesSensorsAndLacks) {
   EXPECT_EQ(sensors, expected);
   EXPECT_EQ(task->grasp_scene(), task->child(1).grasp_scene());
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
-  task->sample(0, 1, state_row(data.get()));
+  task->sample(0, 1, robots::state_row(data.get()));
   mj_forward(scene.model(), data.get());
   task->begin({.id = 0, .model = scene.model(), .data = data.get()});
   EXPECT_EQ(task->objects(0)[1].body, task->child(1).objects(0)[0].body);
@@ -156,35 +156,35 @@ TEST(MultiTask, CombinesRolesSensorsAndLacks) {
 TEST(MultiTask, FirstTaskSamplesTheSameEpisodeAsAlone) {
   std::vector<std::vector<double>> starts;
   for (const bool alone : {true, false}) {
-    std::unique_ptr<Task> task = std::make_unique<PickTask>(cfg("table"));
+    std::unique_ptr<episode::Task> task = std::make_unique<PickTask>(cfg("table"));
     if (!alone) {
-      std::vector<std::unique_ptr<Task>> children;
+      std::vector<std::unique_ptr<episode::Task>> children;
       children.push_back(std::move(task));
       children.push_back(std::make_unique<PickTask>(cfg("table")));
       task = std::make_unique<MultiTask>("multi_task", cfg("table"), std::move(children));
     }
-    Scene scene(task->scene_cfg_with_robot());
+    scene::Scene scene(task->scene_cfg_with_robot());
     task->initialize(scene.model(), 1);
     const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
-    task->sample(0, 3, state_row(data.get()));
+    task->sample(0, 3, robots::state_row(data.get()));
     starts.emplace_back(data->qpos, data->qpos + scene.model()->nq);
   }
   EXPECT_EQ(starts[0], starts[1]);
 }
 
 TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
-  std::vector<std::unique_ptr<Task>> children;
+  std::vector<std::unique_ptr<episode::Task>> children;
   children.push_back(std::make_unique<NavToObjTask>(cfg("floor")));
   children.push_back(std::make_unique<PickTask>(cfg("floor")));
   MultiTask task("multi_task", cfg("floor"), std::move(children));
-  Scene scene(task.scene_cfg_with_robot());
+  scene::Scene scene(task.scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task.initialize(model, 1);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
   std::set<int> bodies;
   for (int episode = 0; episode < 10; ++episode) {
     mj_resetData(model, data.get());
-    task.sample(0, episode, state_row(data.get()));
+    task.sample(0, episode, robots::state_row(data.get()));
     mj_forward(model, data.get());
     const int body = task.child(1).objects(0)[0].body;
     EXPECT_LT(data->xpos[3 * body + 1], 50) << "it is there";
@@ -194,7 +194,7 @@ TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
 }
 
 TEST(MultiTask, InvalidCombinationsThrow) {
-  const auto message = [](std::vector<std::unique_ptr<Task>> children) -> std::string {
+  const auto message = [](std::vector<std::unique_ptr<episode::Task>> children) -> std::string {
     try {
       MultiTask task("multi_task", cfg("floor"), std::move(children));
     } catch (const ValueError& e) {
@@ -202,7 +202,7 @@ TEST(MultiTask, InvalidCombinationsThrow) {
     }
     return "";
   };
-  std::vector<std::unique_ptr<Task>> one, two;
+  std::vector<std::unique_ptr<episode::Task>> one, two;
   one.push_back(std::make_unique<PickTask>(cfg("floor")));
   EXPECT_THAT(message(std::move(one)), HasSubstr("1 task, at least two"));
   two.push_back(std::make_unique<PickTask>(cfg("floor")));
@@ -211,15 +211,15 @@ TEST(MultiTask, InvalidCombinationsThrow) {
 }
 
 TEST(MultiTask, TaskThatChangesTheSceneMustBeFirst) {
-  std::vector<std::unique_ptr<Task>> children;
+  std::vector<std::unique_ptr<episode::Task>> children;
   children.push_back(std::make_unique<PickTask>(cfg("kitchen")));
   children.push_back(std::make_unique<OpeningTask>(cfg("kitchen"), OpeningKind::kOpen));
   MultiTask task("pick+open", cfg("kitchen"), std::move(children));
-  Scene scene(task.scene_cfg_with_robot());
+  scene::Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
   try {
-    task.sample(0, 0, state_row(data.get()));
+    task.sample(0, 0, robots::state_row(data.get()));
     FAIL();
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(), HasSubstr("task 'open' cannot choose its goal"));
@@ -227,4 +227,4 @@ TEST(MultiTask, TaskThatChangesTheSceneMustBeFirst) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

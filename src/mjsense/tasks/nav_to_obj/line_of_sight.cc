@@ -7,7 +7,7 @@
 
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 LineOfSight::LineOfSight(const mjModel* model, int camera, int width, int height) : camera(camera) {
   tan_y = std::tan(0.5 * model->cam_fovy[camera] * std::numbers::pi / 180);
@@ -32,12 +32,12 @@ bool LineOfSight::sees(const mjModel* m, const mjData* d, const Pose& from, int 
     write_vec(p - from.p, path);
     int geom = -1;
     mj_ray(m, d, eye, path, kDrawn, 1, m->cam_bodyid[camera], &geom, nullptr);
-    if (geom >= 0 && is_descendant_or_self(m, m->geom_bodyid[geom], body)) return true;
+    if (geom >= 0 && observe::is_descendant_or_self(m, m->geom_bodyid[geom], body)) return true;
   }
   return false;
 }
 
-std::vector<Vec3> sight_points(const ObjectShape& shape, int count) {
+std::vector<Vec3> sight_points(const episode::ObjectShape& shape, int count) {
   std::vector<Vec3> points{{0, 0, 0.5 * (shape.low + shape.high)}};
   // Farthest point sampling: each point is the farthest from all previous ones.
   std::vector<double> nearest(shape.points.size(), 1e10);
@@ -53,4 +53,4 @@ std::vector<Vec3> sight_points(const ObjectShape& shape, int count) {
   return points;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -12,7 +12,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/episode/object_shape.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 struct LineOfSight {
   int camera = -1;              // id in the model
@@ -29,6 +29,6 @@ struct LineOfSight {
 };
 
 // `count` points spread over the surface, body frame. The first one is the center of the shape.
-std::vector<Vec3> sight_points(const ObjectShape& shape, int count);
+std::vector<Vec3> sight_points(const episode::ObjectShape& shape, int count);
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

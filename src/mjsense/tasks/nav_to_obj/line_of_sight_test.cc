@@ -7,7 +7,7 @@
 #include <memory>
 #include <numbers>
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr double kDeg = std::numbers::pi / 180;
@@ -61,4 +61,4 @@ TEST_F(Sighting, EndsAtOccludingGeoms) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

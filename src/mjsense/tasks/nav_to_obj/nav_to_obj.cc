@@ -14,7 +14,7 @@
 #include "mjsense/scenes/referring_expressions.h"
 #include "mjsense/scenes/robot_floor.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using std::numbers::pi;
@@ -33,13 +33,14 @@ constexpr std::array<const char*, 13> kSentences{
 
 }  // namespace
 
-NavToObjTask::NavToObjTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
+NavToObjTask::NavToObjTask(episode::TaskCfg cfg)
+    : scenes::ObjectTask(std::move(cfg), kScene, kRole) {}
 
 // Uses the robot's head camera if it has one, otherwise its first recorded camera.
 void NavToObjTask::find_camera() {
-  const RobotCfg& cfg = robot().cfg();
+  const robots::RobotCfg& cfg = robot().cfg();
   std::vector<std::string> names{kCamera};
-  for (const CameraMount& mount : cfg.cameras) names.push_back(mount.mjcf_camera);
+  for (const robots::CameraMount& mount : cfg.cameras) names.push_back(mount.mjcf_camera);
   for (const std::string& name : names) {
     const int id = mj_name2id(model(), mjOBJ_CAMERA, (robot().prefix() + name).c_str());
     if (id < 0) continue;
@@ -51,22 +52,22 @@ void NavToObjTask::find_camera() {
 }
 
 void NavToObjTask::initialize_task() {
-  ObjectTask::initialize_task();
+  scenes::ObjectTask::initialize_task();
   if (scene().objects().empty())
     throw ValueError(fmt::format(
         "{} has no object to drive to: no graspable body with a free joint", context()));
   find_camera();
   points_.clear();
-  for (const SceneObject& object : scene().objects())
+  for (const scenes::SceneObject& object : scene().objects())
     points_.push_back(sight_points(object.shape, kPoints));
   places_.clear();
   routes_.reset();
-  if (driving_base(robot()) >= 0) {
-    const RestingRobot rest(model(), robot());
-    const Footprint footprint = rest.footprint();
-    const OccupancyGrid floor =
+  if (scenes::driving_base(robot()) >= 0) {
+    const scenes::RestingRobot rest(model(), robot());
+    const scenes::Footprint footprint = rest.footprint();
+    const scenes::OccupancyGrid floor =
         rest.occupancy(footprint.height(), [this](int geom) { return scene().elsewhere(geom); });
-    routes_ = std::make_unique<BasePlanner>(floor, footprint);
+    routes_ = std::make_unique<scenes::BasePlanner>(floor, footprint);
     for (int row = 0; row < floor.rows(); row += 2) {
       for (int column = 0; column < floor.columns(); column += 2) {
         if (floor.clearance(floor.x(column), floor.y(row)) > 0.3)
@@ -80,7 +81,7 @@ void NavToObjTask::initialize_task() {
 
 void NavToObjTask::set_target(int world, int target) {
   targets_[world] = target;
-  const SceneObject& object = scene().objects()[target];
+  const scenes::SceneObject& object = scene().objects()[target];
   set_object(world, object.body, object.text);
 }
 
@@ -92,7 +93,7 @@ bool NavToObjTask::alone(int world, int index) const {
   return true;
 }
 
-void NavToObjTask::choose_goal(int world, Rng& rng, const StateRow& state) {
+void NavToObjTask::choose_goal(int world, Rng& rng, const robots::StateRow& state) {
   std::vector<int> here = adopt_scene(world, state);
   std::vector<int> unique;
   std::ranges::copy_if(here, std::back_inserter(unique), [&](int i) { return alone(world, i); });
@@ -100,7 +101,7 @@ void NavToObjTask::choose_goal(int world, Rng& rng, const StateRow& state) {
   if (!here.empty()) set_target(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
 }
 
-std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   const int n = static_cast<int>(scene().objects().size());
   vary_scene(world);
@@ -119,18 +120,18 @@ std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateR
 }
 
 // A base placement from which a path leads to the target; nullopt if none is found.
-std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, const StateRow& state,
-                                              Rng& rng) const {
+std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed,
+                                              const robots::StateRow& state, Rng& rng) const {
   const double* at =
       state.qpos + model()->jnt_qposadr[model()->body_jntadr[this->object(world).body]];
   const auto distance = [at](double x, double y) { return std::hypot(x - at[0], y - at[1]); };
   for (int attempt = 0; attempt < kStarts && !places_.empty(); ++attempt) {
     const auto [x, y] = places_[rng.below(static_cast<std::uint32_t>(places_.size()))];
-    const BasePose from{x, y, rng.uniform(-pi, pi)};
+    const scenes::BasePose from{x, y, rng.uniform(-pi, pi)};
     if (attempt < kStarts / 2 && distance(x, y) < kFarStart) continue;
     if (!routes_->free(from)) continue;
     const auto path = routes_->find(
-        from, [&](const BasePose& p) { return distance(p.x, p.y) < kArrived; },
+        from, [&](const scenes::BasePose& p) { return distance(p.x, p.y) < kArrived; },
         [&](double px, double py) { return std::max(0.0, distance(px, py) - kArrived); });
     if (!path.empty()) return Pose{{x, y, placed.p.z}, axis_angle({0, 0, 1}, from.yaw)};
   }
@@ -139,7 +140,7 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
 
 // An object behind furniture may be close to a path without being visible from any point of it.
 std::string NavToObjTask::start_error(const World& world) const {
-  const std::string fault = ObjectTask::start_error(world);
+  const std::string fault = scenes::ObjectTask::start_error(world);
   if (!fault.empty()) return fault;
   if (!alone(world.id, targets_[world.id]))
     return fmt::format(
@@ -149,7 +150,7 @@ std::string NavToObjTask::start_error(const World& world) const {
   if (!routes_) return "";
   const Pose base = robot().base_pose(world), camera = inverse(base) * camera_pose(world);
   const Vec3 ahead = rotate(base.q, {1, 0, 0});
-  const auto seen = [&](const BasePose& p) {
+  const auto seen = [&](const scenes::BasePose& p) {
     const Pose there{{p.x, p.y, base.p.z}, axis_angle({0, 0, 1}, p.yaw)};
     return distance(world, p.x, p.y) < kNearby && sees(world, there * camera);
   };
@@ -188,7 +189,7 @@ NavToObjTask::Assessment NavToObjTask::assessment(const World& world) const {
   return out;
 }
 
-Evaluation NavToObjTask::evaluate(const World& world) const {
+episode::Evaluation NavToObjTask::evaluate(const World& world) const {
   const Assessment now = assessment(world);
   return make_evaluation_from(world.id, now.reward,
                               now.reward > 0          ? ""
@@ -201,14 +202,15 @@ std::string NavToObjTask::description(int world) const {
 }
 
 std::string NavToObjTask::paraphrase(const World& world, Rng& rng) const {
-  const std::string object = draw_reference(
-      object_references(world, scene(), targets_[world.id], robot().base_pose(world), {}, true),
-      rng);
-  return object.empty() ? "" : one_of(kSentences, rng, object);
+  const std::string object =
+      scenes::draw_reference(scenes::object_references(world, scene(), targets_[world.id],
+                                                       robot().base_pose(world), {}, true),
+                             rng);
+  return object.empty() ? "" : scenes::one_of(kSentences, rng, object);
 }
 
-Task::Referrals NavToObjTask::referrals(int world) const {
-  return {{"object_name", referring_expressions(scene().objects()[targets_[world]])}};
+episode::Task::Referrals NavToObjTask::referrals(int world) const {
+  return {{"object_name", scenes::referring_expressions(scene().objects()[targets_[world]])}};
 }
 
 void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
@@ -218,17 +220,17 @@ void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
 }
 
 std::vector<std::shared_ptr<Sensor>> NavToObjTask::create_task_sensors() const {
-  std::vector<NamedBody> bodies;
+  std::vector<episode::NamedBody> bodies;
   for (int i = 0; i < static_cast<int>(scene().objects().size()); ++i) {
     const int body = scene().objects()[i].body;
-    bodies.push_back({mjsense::name_of(model(), mjOBJ_BODY, body),
+    bodies.push_back({mjsense::scene::name_of(model(), mjOBJ_BODY, body),
                       [this, i, body](int world) { return targets_[world] == i ? body : -1; }});
   }
-  return {body_poses_sensor(*this, "pickup_obj_pose", std::move(bodies))};
+  return {episode::body_poses_sensor(*this, "pickup_obj_pose", std::move(bodies))};
 }
 
 std::vector<std::pair<std::string, std::string>> NavToObjTask::scene_info(int world) const {
   return {{"text", description(world)}, {"object_name", object(world).name}};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -11,9 +11,9 @@
 #include "mjsense/scenes/object_task.h"
 #include "mjsense/tasks/nav_to_obj/line_of_sight.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
-class NavToObjTask final : public ObjectTask {
+class NavToObjTask final : public scenes::ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
   static constexpr double kReach = 1.5;  // m, distance at which the reward becomes 0
@@ -21,7 +21,7 @@ class NavToObjTask final : public ObjectTask {
       1.45;  // m, maximum distance of a planner's goal from the target
 
   // Plays in cfg.scene; the default scene is a floor with several rooms.
-  explicit NavToObjTask(TaskCfg cfg);
+  explicit NavToObjTask(episode::TaskCfg cfg);
   std::string_view name() const override { return "nav_to_obj"; }
   std::string_view type() const override { return "nav_to_obj"; }
 
@@ -29,7 +29,7 @@ class NavToObjTask final : public ObjectTask {
   // not visible from any base pose that the robot can drive to.
   std::string start_error(const World& world) const override;
   // Reward: 1 - d / 1.5 m if the camera sees the target, else 0; success: reward > 0.
-  Evaluation evaluate(const World& world) const override;
+  episode::Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
@@ -42,13 +42,13 @@ class NavToObjTask final : public ObjectTask {
   // Whether the target is visible from the camera pose X_WC.
   bool sees(const World& world, const Pose& camera) const;
   Pose camera_pose(const World& world) const { return line_of_sight_.pose(world.data); }
-  const BasePlanner* routes() const { return routes_.get(); }
+  const scenes::BasePlanner* routes() const { return routes_.get(); }
 
  protected:
   void initialize_task() override;
-  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
-  void choose_goal(int world, Rng& rng, const StateRow& state) override;
+  void choose_goal(int world, Rng& rng, const robots::StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
@@ -60,14 +60,14 @@ class NavToObjTask final : public ObjectTask {
   void set_target(int world, int target);
   // Whether the text of this object is unique among the objects of the episode.
   bool alone(int world, int index) const;
-  std::optional<Pose> start_place(int world, const Pose& placed, const StateRow& state,
+  std::optional<Pose> start_place(int world, const Pose& placed, const robots::StateRow& state,
                                   Rng& rng) const;
 
   LineOfSight line_of_sight_;
   std::vector<std::vector<Vec3>> points_;          // surface points of each object, body frame
-  std::unique_ptr<BasePlanner> routes_;            // null if the base cannot drive
+  std::unique_ptr<scenes::BasePlanner> routes_;    // null if the base cannot drive
   std::vector<std::pair<double, double>> places_;  // possible start positions on the floor, m
   std::vector<int> targets_;                       // [B], index of a scene object
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -10,13 +10,13 @@
 
 #include "mjsense/episode/testing/played_task.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 std::string last_part(const std::string& name) { return name.substr(name.rfind('/') + 1); }
 
-struct Nav : testing::Test, PlayedTask<NavToObjTask> {
-  Nav() : PlayedTask(task_cfg("rby1"), 2) {}
+struct Nav : testing::Test, episode::PlayedTask<NavToObjTask> {
+  Nav() : PlayedTask(episode::task_cfg("rby1"), 2) {}
   // Places the robot at a distance (m) from its target, turned away from it by `turned` (rad).
   // False if no placement is free. Facing the target, the robot must also see it.
   bool stand(double distance, double turned) {
@@ -26,8 +26,8 @@ struct Nav : testing::Test, PlayedTask<NavToObjTask> {
     // Try directions all around the target until a placement is free.
     for (int k = 0; k < 36; ++k) {
       const double a = k * 3.14159265 / 18;
-      const BasePose p{target.x - distance * std::cos(a), target.y - distance * std::sin(a),
-                       a + turned};
+      const scenes::BasePose p{target.x - distance * std::cos(a), target.y - distance * std::sin(a),
+                               a + turned};
       data->qpos[base[0]] = p.x;
       data->qpos[base[1]] = p.y;
       data->qpos[base[2]] = p.yaw;
@@ -45,7 +45,7 @@ TEST_F(Nav, RewardDecreasesWithTheDistanceOfTheVisibleObject) {
     start(episode);
     EXPECT_EQ(task.evaluate(world).missing, "the object is too far away");
     if (!stand(1.25, 0)) continue;
-    const Evaluation e = task.evaluate(world);
+    const episode::Evaluation e = task.evaluate(world);
     EXPECT_NEAR(e.reward, 1 - 1.25 / 1.5, 1e-6);
     EXPECT_TRUE(e.success);
     EXPECT_EQ(e.missing, "");
@@ -95,7 +95,7 @@ TEST_F(Nav, TargetHasAUniqueName) {
   std::set<std::string> named;
   for (int episode = 0; episode < 40; ++episode) {
     start(episode);
-    const TaskObject& target = task.objects(0)[0];
+    const episode::TaskObject& target = task.objects(0)[0];
     EXPECT_EQ(task.description(0), "Navigate to the " + target.name);
     EXPECT_EQ(task.start_error(world), "");
     named.insert(target.name);
@@ -138,7 +138,7 @@ TEST_F(Nav, EpisodeDependsOnItsNumberOnly) {
   start(6);
   EXPECT_NE(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
   mj_resetData(model, data.get());
-  task.sample(1, 5, state_row(data.get()));
+  task.sample(1, 5, robots::state_row(data.get()));
   EXPECT_EQ(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
 }
 
@@ -162,4 +162,4 @@ TEST_F(Nav, FollowerCameraIsInsideTheHouse) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -9,7 +9,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr double kMinTravel = 0.05,
@@ -73,7 +73,7 @@ std::vector<Part> parts_of(const mjModel* m, int root) {
   for (int g = 0; g < m->ngeom; ++g) {
     if (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0) continue;
     const int body = m->geom_bodyid[g];
-    if (!is_descendant_or_self(m, body, root)) continue;
+    if (!observe::is_descendant_or_self(m, body, root)) continue;
     const std::optional<Pose> pose = rigid_pose(m, body, root);
     if (!pose) continue;
     const double* aabb = m->geom_aabb + 6 * g;
@@ -83,8 +83,8 @@ std::vector<Part> parts_of(const mjModel* m, int root) {
         vec3(aabb + 3),
         false,
         {}};
-    const std::string name =
-        lower(name_of(m, mjOBJ_GEOM, g) + " " + (body == root ? "" : name_of(m, mjOBJ_BODY, body)));
+    const std::string name = lower(scene::name_of(m, mjOBJ_GEOM, g) + " " +
+                                   (body == root ? "" : scene::name_of(m, mjOBJ_BODY, body)));
     part.named = name.find("handle") != name.npos || name.find("knob") != name.npos;
     for (int corner = 0; corner < 8; ++corner)
       part.box.add(part.pose * Vec3{corner & 1 ? part.half.x : -part.half.x,
@@ -167,7 +167,7 @@ std::optional<Handle> find_handle(const std::vector<Part>& parts) {
 std::string category_of(const mjModel* m, int body, bool slide) {
   std::string found;
   for (int b = body; b > 0 && found.empty(); b = m->body_parentid[b]) {
-    const std::string name = lower(name_of(m, mjOBJ_BODY, b));
+    const std::string name = lower(scene::name_of(m, mjOBJ_BODY, b));
     for (const auto& [word, category] : kWordsOfThings) {
       // "door" is ambiguous: it counts only in the name of a top-level body with the joint.
       // Otherwise the names of ancestors decide, then the name of the joint.
@@ -180,7 +180,7 @@ std::string category_of(const mjModel* m, int body, bool slide) {
   }
   if (found.empty()) {
     for (int j = m->body_jntadr[body]; j < m->body_jntadr[body] + m->body_jntnum[body]; ++j) {
-      const std::string name = lower(name_of(m, mjOBJ_JOINT, j));
+      const std::string name = lower(scene::name_of(m, mjOBJ_JOINT, j));
       for (const auto& [word, category] : kWordsOfThings) {
         if (found.empty() && name.find(word) != name.npos) found = category;
       }
@@ -219,8 +219,8 @@ std::vector<Articulation> find_articulations(const mjModel* m, std::string_view 
     const int body = m->jnt_bodyid[j];
     if (m->body_jntnum[body] != 1) continue;
     // Skip joints of the robot and joints of bodies that have an ancestor with a joint.
-    const std::string root = name_of(m, mjOBJ_BODY, m->body_rootid[body]);
-    const std::string name = name_of(m, mjOBJ_BODY, body);
+    const std::string root = scene::name_of(m, mjOBJ_BODY, m->body_rootid[body]);
+    const std::string name = scene::name_of(m, mjOBJ_BODY, body);
     if (!robot_prefix.empty() && (root.starts_with(robot_prefix) || name.starts_with(robot_prefix)))
       continue;
     bool carried = false;
@@ -258,4 +258,4 @@ std::vector<Articulation> find_articulations(const mjModel* m, std::string_view 
   return found;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

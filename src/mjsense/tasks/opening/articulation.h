@@ -12,7 +12,7 @@
 
 #include "mjsense/core/pose.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 // A bar or knob that a gripper can grasp, in the frame of the joint's body.
 struct Handle {
@@ -49,4 +49,4 @@ struct Articulation {
 // names start with `robot_prefix` (unless it is empty).
 std::vector<Articulation> find_articulations(const mjModel* model, std::string_view robot_prefix);
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

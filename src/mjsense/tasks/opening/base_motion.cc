@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr double kShares[] = {0.75, 1.0, 0.5, 0.25, 0.0};
@@ -36,9 +36,9 @@ std::vector<Drive> all() {
 
 }  // namespace
 
-BasePose driven(const BasePose& from, const Drive& drive, const HandleMotion& motion, Vec3 tool,
-                double part) {
-  BasePose base = from;
+scenes::BasePose driven(const scenes::BasePose& from, const Drive& drive,
+                        const HandleMotion& motion, Vec3 tool, double part) {
+  scenes::BasePose base = from;
   if (!motion.one->slide && std::abs(motion.axis.z) > kUpright) {
     // Rotate about the hinge in the horizontal plane.
     const double angle = drive.share * part * (motion.to - motion.from) * motion.axis.z;
@@ -63,4 +63,4 @@ const std::vector<Drive>& drives() {
   return known;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -7,7 +7,7 @@
 #include "mjsense/scenes/base_planner.h"
 #include "mjsense/tasks/opening/articulation.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 // Motion of an articulation in the world frame.
 struct HandleMotion {
@@ -26,10 +26,10 @@ struct Drive {
 
 // Base pose after a fraction `part` (0 to 1) of the motion, starting at `from`. `tool`: position of
 // the tool at the start, m, world frame.
-BasePose driven(const BasePose& from, const Drive& drive, const HandleMotion& motion, Vec3 tool,
-                double part);
+scenes::BasePose driven(const scenes::BasePose& from, const Drive& drive,
+                        const HandleMotion& motion, Vec3 tool, double part);
 
 // Candidates by increasing cost. Short drives that keep the arm's posture come first.
 const std::vector<Drive>& drives();
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -10,7 +10,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/tasks/opening/opening.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using std::numbers::pi;
@@ -23,15 +23,16 @@ using std::numbers::pi;
 TEST(Drive, WithAShareOfOneTheBaseRotatesAboutTheHinge) {
   Articulation one;
   const HandleMotion motion{&one, 0, -pi / 2, {0, 0, -1}, {1, 2, 0}};
-  const BasePose end = driven({2, 2, 0.1}, {.share = 1}, motion, {}, 1);
+  const scenes::BasePose end = driven({2, 2, 0.1}, {.share = 1}, motion, {}, 1);
   EXPECT_NEAR(end.x, 1, 1e-12);
   EXPECT_NEAR(end.y, 3, 1e-12);
   EXPECT_NEAR(end.yaw, 0.1 + pi / 2, 1e-12);
-  const BasePose half = driven({2, 2, 0.1}, {.share = 1}, motion, {}, 0.5);
+  const scenes::BasePose half = driven({2, 2, 0.1}, {.share = 1}, motion, {}, 0.5);
   EXPECT_NEAR(half.x, 1 + std::sqrt(0.5), 1e-12);
   EXPECT_NEAR(half.y, 2 + std::sqrt(0.5), 1e-12);
   // The additional offset grows linearly along the path.
-  const BasePose aside = driven({2, 2, 0}, {.x = 0.2, .y = -0.4, .turn = 0.3}, motion, {}, 0.5);
+  const scenes::BasePose aside =
+      driven({2, 2, 0}, {.x = 0.2, .y = -0.4, .turn = 0.3}, motion, {}, 0.5);
   EXPECT_NEAR(aside.x, 2.1, 1e-12);
   EXPECT_NEAR(aside.y, 1.8, 1e-12);
   EXPECT_NEAR(aside.yaw, 0.15, 1e-12);
@@ -42,13 +43,13 @@ TEST(Drive, OtherwiseTheBaseFollowsTheHandle) {
   Articulation drawer;
   drawer.slide = true;
   const HandleMotion out{&drawer, 0, 0.3, {-1, 0, 0}, {}};
-  const BasePose back = driven({-0.6, 0.2, 0.4}, {.share = 0.5}, out, {0, 0.1, 0.7}, 1);
+  const scenes::BasePose back = driven({-0.6, 0.2, 0.4}, {.share = 0.5}, out, {0, 0.1, 0.7}, 1);
   EXPECT_NEAR(back.x, -0.75, 1e-12);
   EXPECT_NEAR(back.y, 0.2, 1e-12);
   EXPECT_NEAR(back.yaw, 0.4, 1e-12);
   Articulation lid;
   const HandleMotion down{&lid, 0, pi / 2, {0, -1, 0}, {0, 0, 0.2}};
-  const BasePose away = driven({-0.6, 0.2, 0.4}, {.share = 1}, down, {0, 0.1, 0.7}, 1);
+  const scenes::BasePose away = driven({-0.6, 0.2, 0.4}, {.share = 1}, down, {0, 0.1, 0.7}, 1);
   EXPECT_NEAR(away.x, -1.1, 1e-12);
   EXPECT_NEAR(away.y, 0.2, 1e-12);
 }
@@ -56,17 +57,17 @@ TEST(Drive, OtherwiseTheBaseFollowsTheHandle) {
 // RB-Y1 opens the fridge farther than its arms alone can. The gripper stays on the handle to the
 // accuracy of inverse kinematics, and no other part of the robot touches anything.
 TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("rby1");
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("rby1");
   OpeningTask task(cfg, OpeningKind::kOpen);
-  const Scene scene(task.scene_cfg_with_robot());
+  const scene::Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(scene.model()),
                                                                mj_deleteData);
   mj_resetData(scene.model(), data.get());
-  const Robot& robot = task.robot();
+  const robots::Robot& robot = task.robot();
   const HandleReach& reach = task.reach();
-  task.sample(0, 0, state_row(data.get()));
+  task.sample(0, 0, robots::state_row(data.get()));
   for (const Articulation& one : task.articulations()) data->qpos[one.qpos] = one.closed;
   mj_kinematics(scene.model(), data.get());
   const World world{.id = 0, .model = scene.model(), .data = data.get()};
@@ -85,7 +86,7 @@ TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
   ASSERT_TRUE(path);
   ASSERT_GT(path->motion_joints.size(), 2u);
   const Pose last = reach.body_pose(there, *fridge, to) * path->on_body;
-  const RobotValues& end = path->motion_joints.back();
+  const robots::RobotValues& end = path->motion_joints.back();
   const auto at = end[reach.base()].values;
   const Pose base{{at[0], at[1], places.at[0].p.z}, axis_angle({0, 0, 1}, at[2])};
   const Pose tool = base * robot.fk(path->hand.arm, end);
@@ -108,10 +109,10 @@ TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
         other = scene.model()->geom_bodyid[data->contact[c].geom[1]];
     if (scene.model()->body_rootid[mine] != root) std::swap(mine, other);
     if (scene.model()->body_rootid[mine] != root || data->contact[c].dist > 0) continue;
-    EXPECT_TRUE(is_descendant_or_self(scene.model(), mine, hand) &&
-                is_descendant_or_self(scene.model(), other, fridge->body))
-        << name_of(scene.model(), mjOBJ_BODY, mine) << " in "
-        << name_of(scene.model(), mjOBJ_BODY, other);
+    EXPECT_TRUE(observe::is_descendant_or_self(scene.model(), mine, hand) &&
+                observe::is_descendant_or_self(scene.model(), other, fridge->body))
+        << scene::name_of(scene.model(), mjOBJ_BODY, mine) << " in "
+        << scene::name_of(scene.model(), mjOBJ_BODY, other);
     ++touching;
   }
   EXPECT_EQ(touching, 0) << "the hand is open";
@@ -119,14 +120,14 @@ TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
 
 TEST(Opening, OpenedFractionDependsOnTheRobot) {
   for (const auto& [name, opened] : {std::pair{"franka", 0.15}, {"rby1", 0.67}}) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(name);
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg(name);
     OpeningTask task(cfg, OpeningKind::kOpen);
-    const Scene scene(task.scene_cfg_with_robot());
+    const scene::Scene scene(task.scene_cfg_with_robot());
     task.initialize(scene.model(), 1);
     const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(scene.model()),
                                                                  mj_deleteData);
-    task.sample(0, 0, state_row(data.get()));
+    task.sample(0, 0, robots::state_row(data.get()));
     mj_forward(scene.model(), data.get());
     const World world{.id = 0, .model = scene.model(), .data = data.get()};
     task.begin(world);
@@ -146,4 +147,4 @@ TEST(Opening, OpenedFractionDependsOnTheRobot) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

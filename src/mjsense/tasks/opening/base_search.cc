@@ -4,19 +4,19 @@
 #include <cmath>
 #include <utility>
 
-namespace mjsense {
+namespace mjsense::tasks {
 
-BaseSearch::BaseSearch(const Robot& robot, const HandleReach& reach, HandleReach::Start empty,
-                       const Pose& usual, BaseSearchCfg cfg)
+BaseSearch::BaseSearch(const robots::Robot& robot, const HandleReach& reach,
+                       HandleReach::Start empty, const Pose& usual, BaseSearchCfg cfg)
     : robot_(robot), reach_(reach), empty_(std::move(empty)), usual_(usual), cfg_(cfg) {}
 
 HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pose& base) const {
   HandleReach::Start out = start;
   std::vector<double> qvel(start.model.nv), ctrl(start.model.nu);
   const bool mocap = start.model.nmocap > 0;
-  const StateRow row{out.qpos.data(), qvel.data(), ctrl.data(),
-                     mocap ? out.mocap_pos.data() : nullptr,
-                     mocap ? out.mocap_quat.data() : nullptr};
+  const robots::StateRow row{out.qpos.data(), qvel.data(), ctrl.data(),
+                             mocap ? out.mocap_pos.data() : nullptr,
+                             mocap ? out.mocap_quat.data() : nullptr};
   Rng none(0, 0, 0, 0);
   robot_.write_start(row, base, none);
   for (std::size_t g = 0; g < robot_.groups().size(); ++g) {
@@ -80,4 +80,4 @@ std::vector<Pose> BaseSearch::search(const Articulation& one, double from, doubl
   return found;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

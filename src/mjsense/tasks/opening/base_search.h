@@ -8,7 +8,7 @@
 
 #include "mjsense/tasks/opening/handle_reach.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 struct BaseSearchCfg {
   int candidates = 80;  // base placements tried for each target
@@ -29,7 +29,7 @@ class BaseSearch {
  public:
   // `empty`: a start without the objects that vary between episodes; `usual`: the base placement
   // there.
-  BaseSearch(const Robot& robot, const HandleReach& reach, HandleReach::Start empty,
+  BaseSearch(const robots::Robot& robot, const HandleReach& reach, HandleReach::Start empty,
              const Pose& usual, BaseSearchCfg cfg = {});
 
   // `start` with the robot's base at `base`, in the initial configuration without noise.
@@ -44,7 +44,7 @@ class BaseSearch {
               double turn) const;
   std::vector<Pose> search(const Articulation& one, double from, double to, bool driving) const;
 
-  const Robot& robot_;
+  const robots::Robot& robot_;
   const HandleReach& reach_;
   HandleReach::Start empty_;
   Pose usual_;
@@ -53,4 +53,4 @@ class BaseSearch {
   mutable std::map<int, BasePlaces> known_;  // by joint id
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

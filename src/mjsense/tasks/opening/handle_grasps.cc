@@ -11,7 +11,7 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr std::array<double, 5> kTilts{0, 0.35, -0.35, 0.7, -0.7};  // rad, about the handle
@@ -21,7 +21,7 @@ constexpr double kSideGap = 0.004;  // m, clearance between the pads and the han
 
 // Rotation about the approach axis to the closing direction, which is found from the positions of
 // the open pads in the tool frame.
-Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
+Quat closing_turn(const robots::MoveGroup& gripper, const mjModel* model) {
   if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
   const std::unique_ptr<mjData, void (*)(mjData*)> data(call_mujoco(mj_makeData, model),
                                                         mj_deleteData);
@@ -47,19 +47,19 @@ Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
 
 }  // namespace
 
-std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model) {
+std::vector<ArmAndHand> arms_with_hands(const robots::Robot& robot, const mjModel* model) {
   std::vector<ArmAndHand> hands;
   const auto groups = robot.groups();
-  const bool floats = std::ranges::any_of(groups, [](const MoveGroup& group) {
-    return group.kind == GroupKind::kBase && group.command_size == 7;
+  const bool floats = std::ranges::any_of(groups, [](const robots::MoveGroup& group) {
+    return group.kind == robots::GroupKind::kBase && group.command_size == 7;
   });
   for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
-    if (groups[g].kind != GroupKind::kGripper || groups[g].leaf_site < 0) continue;
+    if (groups[g].kind != robots::GroupKind::kGripper || groups[g].leaf_site < 0) continue;
     bool on_arm = false;
     for (int a = 0; a < static_cast<int>(groups.size()) && !on_arm; ++a) {
-      if (groups[a].kind != GroupKind::kArm || groups[a].leaf_site < 0) continue;
+      if (groups[a].kind != robots::GroupKind::kArm || groups[a].leaf_site < 0) continue;
       on_arm = groups[a].leaf_site == groups[g].leaf_site ||
-               is_descendant_or_self(model, groups[g].root_body, groups[a].root_body);
+               observe::is_descendant_or_self(model, groups[g].root_body, groups[a].root_body);
       if (on_arm) hands.push_back({a, g, closing_turn(groups[g], model)});
     }
     if (!on_arm && floats) hands.push_back({g, g, closing_turn(groups[g], model)});
@@ -101,4 +101,4 @@ std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose&
   return grasps;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

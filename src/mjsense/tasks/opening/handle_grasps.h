@@ -9,7 +9,7 @@
 #include "mjsense/robots/robot.h"
 #include "mjsense/tasks/opening/articulation.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 // Move groups of an arm and its gripper. A floating gripper is both (arm == gripper).
 struct ArmAndHand {
@@ -19,7 +19,7 @@ struct ArmAndHand {
 };
 // All pairs in which the gripper is attached to the arm, and all floating grippers, in the robot's
 // order.
-std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model);
+std::vector<ArmAndHand> arms_with_hands(const robots::Robot& robot, const mjModel* model);
 
 // Tool pose for grasping a handle: z is the approach direction, y the closing direction, and the
 // origin lies between the finger tips.
@@ -32,4 +32,4 @@ struct HandleGrasp {
 std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
                                                double max_opening);
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -9,7 +9,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/robot_floor.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr int kOfRobot = 1 << 30;  // contact bit of the robot's geoms
@@ -19,23 +19,23 @@ constexpr double kUnder = 0.7;  // minimum |z| of the normal of a contact with t
 
 }  // namespace
 
-HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
+HandleReach::HandleReach(const mjModel* model, const robots::Robot& robot, HandleReachCfg cfg)
     : own_(call_mujoco(mj_copyModel, nullptr, model), mj_deleteModel),
       robot_(robot),
       cfg_(cfg),
-      base_(driving_base(robot)),
+      base_(scenes::driving_base(robot)),
       hands_(arms_with_hands(robot, model)),
       of_robot_(model->nbody, 0),
       fixed_(model->nbody, 0),
       of_gripper_(model->nbody, -1),
       scratch_(own_.get()) {
   for (int b = 1; b < model->nbody; ++b) {
-    of_robot_[b] = name_of(model, mjOBJ_BODY, b).starts_with(robot.prefix());
+    of_robot_[b] = scene::name_of(model, mjOBJ_BODY, b).starts_with(robot.prefix());
     // A body without a name belongs to the robot if its parent does.
-    if (!of_robot_[b] && name_of(model, mjOBJ_BODY, b).empty())
+    if (!of_robot_[b] && scene::name_of(model, mjOBJ_BODY, b).empty())
       of_robot_[b] = of_robot_[model->body_parentid[b]];
     for (const ArmAndHand& hand : hands_) {
-      if (is_descendant_or_self(model, b, robot.groups()[hand.gripper].root_body))
+      if (observe::is_descendant_or_self(model, b, robot.groups()[hand.gripper].root_body))
         of_gripper_[b] = hand.gripper;
     }
   }
@@ -59,7 +59,7 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     own_->body_conaffinity[body] |= kOfRobot;
   }
   // Pairs of links in contact at the initial pose are exempt from collision checks.
-  const ScratchData::Loan loan = scratch_.borrow();
+  const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const auto& init = robot.cfg().groups[g].init;
@@ -88,10 +88,11 @@ mjModel HandleReach::with_margins(const mjModel& model) const {
 }
 
 HandleReach::Start HandleReach::start_of(const World& world) const {
-  return start_of(*world.model, state_row(world.data));
+  return start_of(*world.model, robots::state_row(world.data));
 }
 
-HandleReach::Start HandleReach::start_of(const mjModel& model, const StateRow& state) const {
+HandleReach::Start HandleReach::start_of(const mjModel& model,
+                                         const robots::StateRow& state) const {
   Start start{with_margins(model), {state.qpos, state.qpos + model.nq}, {}, {}};
   if (model.nmocap > 0) {
     start.mocap_pos.assign(state.mocap_pos, state.mocap_pos + 3 * model.nmocap);
@@ -100,7 +101,7 @@ HandleReach::Start HandleReach::start_of(const mjModel& model, const StateRow& s
   return start;
 }
 
-void HandleReach::show(mjData* data, const RobotValues& values) const {
+void HandleReach::show(mjData* data, const robots::RobotValues& values) const {
   const auto set = [&](int group) {
     const auto& qpos = robot_.groups()[group].qpos;
     for (std::size_t i = 0; i < qpos.size(); ++i) data->qpos[qpos[i]] = values[group].values[i];
@@ -109,10 +110,15 @@ void HandleReach::show(mjData* data, const RobotValues& values) const {
   if (base_ >= 0) set(base_);
 }
 
-// True if everything else is at least `clearance` away from the robot. `hand` may touch the `held`
-// articulation. A driving base may touch only the ground.
-bool HandleReach::free(mjData* data, const Start& start, double clearance, const Articulation* held,
-                       const ArmAndHand* hand, bool driving) const {
+robots::AllowedContact HandleReach::grasp_of(const ArmAndHand& hand,
+                                             const Articulation& one) const {
+  return {robot_.groups()[hand.gripper].root_body, one.body};
+}
+
+// True if everything else is at least `clearance` away from the robot, except for the `allowed`
+// contact. A driving base may touch only the ground.
+bool HandleReach::free(mjData* data, const Start& start, double clearance,
+                       const robots::AllowedContact& allowed, bool driving) const {
   const mjModel* m = &start.model;
   mj_kinematics(m, data);
   mj_collision(m, data);
@@ -132,24 +138,22 @@ bool HandleReach::free(mjData* data, const Start& start, double clearance, const
     if (beside) return false;
     // The ground touches the base, so bodies fixed to the base have a smaller clearance.
     if (contact.dist > (fixed_[mine] ? cfg_.contact : clearance)) continue;
-    if (held && of_gripper_[mine] == hand->gripper && is_descendant_or_self(m, other, held->body))
-      continue;
-    return false;
+    if (!allowed.permits(m, mine, other)) return false;
   }
   return true;
 }
 
 bool HandleReach::is_collision_free(const Start& start) const {
-  const ScratchData::Loan loan = scratch_.borrow();
+  const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   std::ranges::copy(start.qpos, data->qpos);
   std::ranges::copy(start.mocap_pos, data->mocap_pos);
   std::ranges::copy(start.mocap_quat, data->mocap_quat);
-  return free(data, start, cfg_.clearance, nullptr, nullptr);
+  return free(data, start, cfg_.clearance);
 }
 
 Pose HandleReach::body_pose(const Start& start, const Articulation& one, double q) const {
-  const ScratchData::Loan loan = scratch_.borrow();
+  const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   set(data, start, one, q);
   mj_kinematics(&start.model, data);
@@ -158,7 +162,7 @@ Pose HandleReach::body_pose(const Start& start, const Articulation& one, double 
 
 // Whether the arm can move in a straight line in joint space from each configuration to the next.
 bool HandleReach::path_is_free(mjData* data, const Start& start, int arm,
-                               std::span<const RobotValues> path) const {
+                               std::span<const robots::RobotValues> path) const {
   const std::size_t n = robot_.groups()[arm].qpos.size();
   for (std::size_t k = path.size() - 1; k > 0;
        --k) {  // start at the end, which is most likely blocked
@@ -167,11 +171,11 @@ bool HandleReach::path_is_free(mjData* data, const Start& start, int arm,
     for (std::size_t i = 0; i < n; ++i) maximum = std::max(maximum, std::abs(b[i] - a[i]));
     const int steps = std::max(2, static_cast<int>(std::ceil(maximum / cfg_.step)));
     for (int s = steps; s > 0; --s) {
-      RobotValues between = path[k];
+      robots::RobotValues between = path[k];
       for (std::size_t i = 0; i < n; ++i)
         between[arm].values[i] = std::lerp(a[i], b[i], static_cast<double>(s) / steps);
       show(data, between);
-      if (!free(data, start, cfg_.clearance, nullptr, nullptr)) return false;
+      if (!free(data, start, cfg_.clearance)) return false;
     }
   }
   return true;
@@ -179,12 +183,12 @@ bool HandleReach::path_is_free(mjData* data, const Start& start, int arm,
 
 // Quantities computed once per start and used for all grasps.
 struct HandleReach::Seen {
-  RobotValues now;
+  robots::RobotValues now;
   Pose to_base;  // X_BW
   Pose body;     // X_WB of the handle's body
   Vec3 axis, anchor;
-  BasePose base;  // of a driving base
-  double z = 0;   // m, height of its frame
+  scenes::BasePose base;  // of a driving base
+  double z = 0;           // m, height of its frame
 };
 
 HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Articulation& one,
@@ -214,7 +218,7 @@ void HandleReach::set(mjData* data, const Start& start, const Articulation& one,
 }
 
 // Computes the positions of arm and base while the handle is held, starting at `q`.
-bool HandleReach::follow_handle(const Seen& seen, const HandleMotion& motion, RobotValues q,
+bool HandleReach::follow_handle(const Seen& seen, const HandleMotion& motion, robots::RobotValues q,
                                 HandlePath& path) const {
   const int points = path.drive ? cfg_.drive_points : cfg_.points, arm = path.hand.arm;
   path.motion_joints.clear();
@@ -222,13 +226,14 @@ bool HandleReach::follow_handle(const Seen& seen, const HandleMotion& motion, Ro
     const double part = static_cast<double>(k) / (points - 1);
     Pose to_base = seen.to_base;
     if (path.drive) {
-      const BasePose at = driven(seen.base, *path.drive, motion, path.grasp.p, part);
+      const scenes::BasePose at = driven(seen.base, *path.drive, motion, path.grasp.p, part);
       to_base = inverse(Pose{{at.x, at.y, seen.z}, axis_angle({0, 0, 1}, at.yaw)});
       const double place[] = {at.x, at.y, at.yaw};
       q[base_].set(place);
     }
-    const RobotValues last = q;
-    if (!robot_.ik(arm, to_base * motion.at(part) * path.grasp, q, Chain::kTracking)) return false;
+    const robots::RobotValues last = q;
+    if (!robot_.ik(arm, to_base * motion.at(part) * path.grasp, q, robots::Chain::kTracking))
+      return false;
     // Joints are interpolated linearly between points. After a large jump, the gripper would leave
     // the handle in between.
     for (int i = 0; k > 0 && i < q[arm].size; ++i) {
@@ -245,7 +250,7 @@ bool HandleReach::motion_is_free(mjData* data, const Start& start, const HandleM
     const double part = static_cast<double>(k) / static_cast<double>(path.motion_joints.size() - 1);
     set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
     show(data, path.motion_joints[k]);
-    if (!free(data, start, cfg_.contact, motion.one, &path.hand, path.drive.has_value()))
+    if (!free(data, start, cfg_.contact, grasp_of(path.hand, *motion.one), path.drive.has_value()))
       return false;
   }
   return true;
@@ -254,20 +259,20 @@ bool HandleReach::motion_is_free(mjData* data, const Start& start, const HandleM
 // Tries to hold the handle with a driving base. The arm's pose at the end is checked first, because
 // this check is cheap.
 bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
-                             const HandleMotion& motion, const RobotValues& before,
+                             const HandleMotion& motion, const robots::RobotValues& before,
                              HandlePath& path) const {
-  RobotValues taken = before;
+  robots::RobotValues taken = before;
   const int arm = path.hand.arm;
-  if (!robot_.ik(arm, seen.to_base * path.grasp, taken, Chain::kTracking)) return false;
+  if (!robot_.ik(arm, seen.to_base * path.grasp, taken, robots::Chain::kTracking)) return false;
   set(data, start, *motion.one, motion.from);
   show(data, taken);
-  if (!free(data, start, cfg_.contact, motion.one, &path.hand)) return false;
+  if (!free(data, start, cfg_.contact, grasp_of(path.hand, *motion.one))) return false;
   const Pose last = motion.at(1) * path.grasp;
-  for (const Drive& drive : mjsense::drives()) {
-    const BasePose end = driven(seen.base, drive, motion, path.grasp.p, 1);
-    RobotValues q = taken;
+  for (const Drive& drive : tasks::drives()) {
+    const scenes::BasePose end = driven(seen.base, drive, motion, path.grasp.p, 1);
+    robots::RobotValues q = taken;
     const Pose base{{end.x, end.y, seen.z}, axis_angle({0, 0, 1}, end.yaw)};
-    if (!robot_.ik(arm, inverse(base) * last, q, Chain::kTracking)) continue;
+    if (!robot_.ik(arm, inverse(base) * last, q, robots::Chain::kTracking)) continue;
     path.drive = drive;
     if (follow_handle(seen, motion, before, path) && motion_is_free(data, start, motion, path))
       return true;
@@ -277,14 +282,14 @@ bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
 
 // Finds a path to the pregrasp: a straight one, or one through a via point behind the pregrasp.
 bool HandleReach::approach_path(mjData* data, const Start& start, const Seen& seen,
-                                const RobotValues& before, HandlePath& path) const {
+                                const robots::RobotValues& before, HandlePath& path) const {
   const int arm = path.hand.arm;
   path.approach_joints = {seen.now, before};
   bool ok = path_is_free(data, start, arm, path.approach_joints);
   for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
-    RobotValues by = before;
+    robots::RobotValues by = before;
     const Pose back = path.pregrasp * Pose{{0, 0, -cfg_.detours[k]}, {}};
-    if (!robot_.ik(arm, back, by, Chain::kTracking)) continue;
+    if (!robot_.ik(arm, back, by, robots::Chain::kTracking)) continue;
     path.approach_joints = {seen.now, by, before};
     ok = path_is_free(data, start, arm, path.approach_joints);
   }
@@ -297,10 +302,10 @@ bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
   path.pregrasp = seen.to_base * path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
   // Inverse kinematics starts from the initial posture without noise, so that noise does not change
   // the solution.
-  RobotValues before = seen.now;
+  robots::RobotValues before = seen.now;
   before[arm].set(robot_.cfg().groups[arm].init);
   if (before[arm].size != seen.now[arm].size) before[arm] = seen.now[arm];
-  if (!robot_.ik(arm, path.pregrasp, before, 2 * Chain::kTracking)) return false;
+  if (!robot_.ik(arm, path.pregrasp, before, 2 * robots::Chain::kTracking)) return false;
   // The pregrasp is reachable. Check the motion with the handle for collisions.
   if (driving ? !try_drives(data, start, seen, motion, before, path)
               : !follow_handle(seen, motion, before, path) ||
@@ -313,7 +318,7 @@ bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
 std::optional<HandlePath> HandleReach::find(const Start& start, const Articulation& one,
                                             double from, double to, int max_tries,
                                             bool driving) const {
-  const ScratchData::Loan loan = scratch_.borrow();
+  const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   const Seen seen = see(data, start, one, from);
   const HandleMotion motion{&one, from, to, seen.axis, seen.anchor};
@@ -341,7 +346,7 @@ std::optional<HandlePath> HandleReach::find(const Start& start, const Articulati
 std::optional<HandlePath> HandleReach::again(const Start& start, const Articulation& one,
                                              double from, double to,
                                              const HandlePath& before) const {
-  const ScratchData::Loan loan = scratch_.borrow();
+  const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   const Seen seen = see(data, start, one, from);
   HandlePath path;
@@ -353,10 +358,10 @@ std::optional<HandlePath> HandleReach::again(const Start& start, const Articulat
   path.end = motion.at(1) * path.grasp;
   if (path.hand.floats()) return path;
   path.pregrasp = seen.to_base * path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
-  RobotValues q = seen.now;
-  if (!robot_.ik(path.hand.arm, path.pregrasp, q, Chain::kTracking)) return {};
+  robots::RobotValues q = seen.now;
+  if (!robot_.ik(path.hand.arm, path.pregrasp, q, robots::Chain::kTracking)) return {};
   if (!follow_handle(seen, motion, q, path)) return {};
   return path;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -14,13 +14,14 @@
 #include <vector>
 
 #include "mjsense/core/rng.h"
+#include "mjsense/robots/allowed_contact.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/tasks/opening/articulation.h"
 #include "mjsense/tasks/opening/base_motion.h"
 #include "mjsense/tasks/opening/handle_grasps.h"
 #include "mjsense/worlds/scratch_data.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 // A path for one arm, or for a floating gripper, which moves on screws.
 struct HandlePath {
@@ -29,9 +30,9 @@ struct HandlePath {
   Pose on_body;                // the grasp in the frame of the handle's body
   std::vector<Pose> approach;  // X_WT of a floating gripper from the start to the pregrasp
   Pose end;                    // X_WT with the handle at the end of its motion
-  std::vector<RobotValues>
+  std::vector<robots::RobotValues>
       approach_joints;  // joint positions from the start to the pregrasp, at least two
-  std::vector<RobotValues>
+  std::vector<robots::RobotValues>
       motion_joints;           // while holding the handle; the first is at its current pose
   std::optional<Drive> drive;  // of the base, whose poses are part of `motion_joints`
   Pose pregrasp;               // X_BT
@@ -53,7 +54,7 @@ struct HandleReachCfg {
 
 class HandleReach {
  public:
-  HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg = {});
+  HandleReach(const mjModel* model, const robots::Robot& robot, HandleReachCfg cfg = {});
 
   std::span<const ArmAndHand> hands() const { return hands_; }
   // The state of a world in which paths are searched: its model with collision margins around the
@@ -64,7 +65,7 @@ class HandleReach {
     std::vector<double> qpos, mocap_pos, mocap_quat;
   };
   Start start_of(const World& world) const;
-  Start start_of(const mjModel& model, const StateRow& state) const;
+  Start start_of(const mjModel& model, const robots::StateRow& state) const;
   bool drives() const { return base_ >= 0; }
   int base() const { return base_; }  // move group; -1: the base cannot move
   // X_WB of a floating gripper whose tool is at X_WT.
@@ -87,30 +88,31 @@ class HandleReach {
   struct Seen;
   Seen see(mjData* data, const Start& start, const Articulation& one, double q) const;
   void set(mjData* data, const Start& start, const Articulation& one, double q) const;
-  bool follow_handle(const Seen& seen, const HandleMotion& motion, RobotValues q,
+  bool follow_handle(const Seen& seen, const HandleMotion& motion, robots::RobotValues q,
                      HandlePath& path) const;
   bool motion_is_free(mjData* data, const Start& start, const HandleMotion& motion,
                       const HandlePath& path) const;
   bool try_grasp(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
                  bool driving, HandlePath& path) const;
   bool try_drives(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
-                  const RobotValues& before, HandlePath& path) const;
-  bool approach_path(mjData* data, const Start& start, const Seen& seen, const RobotValues& before,
-                     HandlePath& path) const;
-  bool free(mjData* data, const Start& start, double clearance, const Articulation* held,
-            const ArmAndHand* hand, bool driving = false) const;
+                  const robots::RobotValues& before, HandlePath& path) const;
+  bool approach_path(mjData* data, const Start& start, const Seen& seen,
+                     const robots::RobotValues& before, HandlePath& path) const;
+  bool free(mjData* data, const Start& start, double clearance,
+            const robots::AllowedContact& allowed = {}, bool driving = false) const;
+  robots::AllowedContact grasp_of(const ArmAndHand& hand, const Articulation& one) const;
   bool try_floating(mjData* data, const Start& start, const Pose& base, const HandleMotion& motion,
                     HandlePath& path) const;
   bool screw_is_free(mjData* data, const Start& start, const ArmAndHand& hand, const Pose& from,
                      const Pose& to) const;
   void float_to(mjData* data, const ArmAndHand& hand, const Pose& tool) const;
-  void show(mjData* data, const RobotValues& values) const;
+  void show(mjData* data, const robots::RobotValues& values) const;
   bool path_is_free(mjData* data, const Start& start, int arm,
-                    std::span<const RobotValues> path) const;
+                    std::span<const robots::RobotValues> path) const;
   mjModel with_margins(const mjModel& model) const;
 
   std::unique_ptr<mjModel, decltype(&mj_deleteModel)> own_;  // with margins about the robot
-  const Robot& robot_;
+  const robots::Robot& robot_;
   HandleReachCfg cfg_;
   int base_;
   std::vector<ArmAndHand> hands_;
@@ -119,7 +121,7 @@ class HandleReach {
   std::vector<int> of_gripper_;  // [nbody] move group of the gripper, or -1
   std::vector<std::pair<int, int>>
       initial_contacts_;  // geoms of the robot in contact at the initial pose, exempt
-  mutable ScratchData scratch_;
+  mutable worlds::ScratchData scratch_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -6,10 +6,10 @@
 
 #include "mjsense/tasks/opening/handle_reach.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 Pose HandleReach::base_with(const ArmAndHand& hand, const Pose& tool) const {
-  const RobotValues none;
+  const robots::RobotValues none;
   return tool * inverse(robot_.fk(hand.gripper, none));
 }
 
@@ -27,7 +27,7 @@ bool HandleReach::screw_is_free(mjData* data, const Start& start, const ArmAndHa
   const int steps = std::max(1, static_cast<int>(std::ceil(length / cfg_.line_step)));
   for (int k = steps; k > 0; --k) {  // start at the end, which is most likely blocked
     float_to(data, hand, from * exp6((static_cast<double>(k) / steps) * screw));
-    if (!free(data, start, cfg_.clearance, nullptr, nullptr)) return false;
+    if (!free(data, start, cfg_.clearance)) return false;
   }
   return true;
 }
@@ -39,11 +39,11 @@ bool HandleReach::try_floating(mjData* data, const Start& start, const Pose& bas
     const double part = static_cast<double>(k) / (cfg_.points - 1);
     set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
     float_to(data, path.hand, motion.at(part) * path.grasp);
-    if (!free(data, start, cfg_.contact, motion.one, &path.hand)) return false;
+    if (!free(data, start, cfg_.contact, grasp_of(path.hand, *motion.one))) return false;
   }
   set(data, start, *motion.one, motion.from);
   path.pregrasp = path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
-  const RobotValues none;
+  const robots::RobotValues none;
   const Pose now = base * robot_.fk(path.hand.gripper, none);
   path.approach = {now, path.pregrasp};
   if (screw_is_free(data, start, path.hand, now, path.pregrasp)) return true;
@@ -55,4 +55,4 @@ bool HandleReach::try_floating(mjData* data, const Start& start, const Pose& bas
   });
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -11,7 +11,7 @@
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/scenes/object_references.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 constexpr std::string_view kScene = "kitchen";
@@ -51,11 +51,11 @@ constexpr std::array<const char*, 12> kCloseSentences{"Close {}",
 
 }  // namespace
 
-OpeningTask::OpeningTask(TaskCfg cfg, OpeningKind kind)
-    : ObjectTask(std::move(cfg), kScene, kRole), kind_(kind) {}
+OpeningTask::OpeningTask(episode::TaskCfg cfg, OpeningKind kind)
+    : scenes::ObjectTask(std::move(cfg), kScene, kRole), kind_(kind) {}
 
 void OpeningTask::initialize_task() {
-  ObjectTask::initialize_task();
+  scenes::ObjectTask::initialize_task();
   articulations_ = find_articulations(model(), robot_entity() + "/");
   if (articulations_.empty())
     throw ValueError(fmt::format(
@@ -64,7 +64,7 @@ void OpeningTask::initialize_task() {
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(call_mujoco(mj_makeData, model()),
                                                                mj_deleteData);
   if (start_key() >= 0) mj_resetDataKeyframe(model(), data.get(), start_key());
-  const StateRow empty = state_row(data.get());
+  const robots::StateRow empty = robots::state_row(data.get());
   const Pose usual = scene().clear(empty);
   for (const Articulation& one : articulations_) empty.qpos[one.qpos] = one.closed;
   bases_ = std::make_unique<BaseSearch>(robot(), *reach_, reach_->start_of(*model(), empty), usual);
@@ -102,7 +102,7 @@ std::optional<OpeningTask::Found> OpeningTask::find_base(const Articulation& one
   return {};
 }
 
-std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
   vary_scene(world);
   const Pose usual = scene().sample(world, -1, cfg().seed, episode, rng, state);
@@ -150,7 +150,7 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
 }
 
 void OpeningTask::begin(const World& world) {
-  ObjectTask::begin(world);
+  scenes::ObjectTask::begin(world);
   Target& target = targets_[world.id];
   const Articulation& one = articulations_[target.index];
   const double wanted = kind_ == OpeningKind::kOpen ? one.at(opened()) : one.at(1 - kClosed);
@@ -186,7 +186,7 @@ bool OpeningTask::succeeded(double reward) const {
   return reward >= (kind_ == OpeningKind::kOpen ? opened() : kClosed);
 }
 
-Evaluation OpeningTask::evaluate(const World& world) const {
+episode::Evaluation OpeningTask::evaluate(const World& world) const {
   const double reward = this->reward(world);
   return make_evaluation_from(world.id, reward,
                               succeeded(reward)             ? ""
@@ -237,11 +237,11 @@ std::vector<std::string> OpeningTask::references(const World& world) const {
 std::string OpeningTask::paraphrase(const World& world, Rng& rng) const {
   const std::vector<std::string> all = references(world);
   const std::string& object = all[rng.below(static_cast<std::uint32_t>(all.size()))];
-  return kind_ == OpeningKind::kOpen ? one_of(kOpenSentences, rng, object)
-                                     : one_of(kCloseSentences, rng, object);
+  return kind_ == OpeningKind::kOpen ? scenes::one_of(kOpenSentences, rng, object)
+                                     : scenes::one_of(kCloseSentences, rng, object);
 }
 
-Task::Referrals OpeningTask::referrals(int world) const {
+episode::Task::Referrals OpeningTask::referrals(int world) const {
   return {{"pickup_obj_name", {{object(world).name, 1.0}}}};
 }
 
@@ -258,4 +258,4 @@ void OpeningTask::write_info(const World& world, JsonWriter& json) const {
   json.key("success").value(succeeded(reward(world)));
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

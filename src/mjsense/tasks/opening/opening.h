@@ -11,11 +11,11 @@
 #include "mjsense/tasks/opening/base_search.h"
 #include "mjsense/tasks/opening/handle_reach.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 enum class OpeningKind { kOpen, kClose };
 
-class OpeningTask final : public ObjectTask {
+class OpeningTask final : public scenes::ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
   // Fractions of the range: success of `close`, and the range of its start. The success threshold
@@ -24,7 +24,7 @@ class OpeningTask final : public ObjectTask {
   static constexpr double kMinStart = 0.35, kMaxStart = 0.65;
 
   // Plays in cfg.scene; the default scene is a kitchen.
-  OpeningTask(TaskCfg cfg, OpeningKind kind);
+  OpeningTask(episode::TaskCfg cfg, OpeningKind kind);
   std::string_view name() const override { return type(); }
   std::string_view type() const override { return kind_ == OpeningKind::kOpen ? "open" : "close"; }
   // Rejects starts in which an object penetrates another one, or in which the target is unreachable
@@ -35,7 +35,7 @@ class OpeningTask final : public ObjectTask {
   // Reward of `open`: the maximum of |q| / range over all articulations of the target's category.
   // Reward of `close`: 1 - |q| / range of the target. Success: the reward is at least opened() for
   // `open`, 0.85 for `close`.
-  Evaluation evaluate(const World& world) const override;
+  episode::Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;  // "Open the drawer"
   Referrals referrals(int world) const override;
@@ -59,7 +59,7 @@ class OpeningTask final : public ObjectTask {
 
  protected:
   void initialize_task() override;
-  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
 
  private:
@@ -86,4 +86,4 @@ class OpeningTask final : public ObjectTask {
   std::vector<Target> targets_;  // [B]
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -4,19 +4,21 @@
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/tasks/opening/opening.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 std::vector<std::shared_ptr<Sensor>> OpeningTask::create_task_sensors() const {
   const std::string role(kRole);
-  std::vector<std::shared_ptr<Sensor>> sensors{start_pose_sensor(*this, "obj_start", role)};
-  if (auto grasped = grasp_state_sensor(*this, role)) sensors.push_back(std::move(grasped));
-  sensors.push_back(std::make_shared<FunctionSensor<float>>(
+  std::vector<std::shared_ptr<Sensor>> sensors{
+      episode::start_pose_sensor(*this, "obj_start", role)};
+  if (auto grasped = episode::grasp_state_sensor(*this, role))
+    sensors.push_back(std::move(grasped));
+  sensors.push_back(std::make_shared<observe::FunctionSensor<float>>(
       "obj_end",
-      pose_spec("world", "Pose of the drawer or door where it counts as open or closed."),
+      observe::pose_spec("world", "Pose of the drawer or door where it counts as open or closed."),
       [this](const World& world, std::span<float> row) {
         write_pose(*goal_pose(world.id, kRole), row.data());
       }));
   return sensors;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -18,7 +18,7 @@
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using std::numbers::pi;
@@ -28,22 +28,22 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-TaskCfg franka(const std::string& scene = "") {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("franka");
+episode::TaskCfg franka(const std::string& scene = "") {
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("franka");
   cfg.scene = scene;
   return cfg;
 }
 
 struct Stage {
-  Stage(TaskCfg cfg, OpeningKind kind, int worlds = 3)
+  Stage(episode::TaskCfg cfg, OpeningKind kind, int worlds = 3)
       : task(std::move(cfg), kind), scene(task.scene_cfg_with_robot()), model(scene.model()) {
     task.initialize(model, worlds);
     data.reset(mj_makeData(model));
   }
   World start(int world, std::int64_t episode) {
     mj_resetData(model, data.get());
-    task.sample(world, episode, state_row(data.get()));
+    task.sample(world, episode, robots::state_row(data.get()));
     mj_forward(model, data.get());
     const World w{.id = world, .model = model, .data = data.get()};
     task.begin(w);
@@ -59,7 +59,7 @@ struct Stage {
     return nlohmann::json::parse(reinterpret_cast<const char*>(row.data()));
   }
   OpeningTask task;
-  Scene scene;
+  scene::Scene scene;
   const mjModel* model;
   std::unique_ptr<mjData, DataDelete> data;
 };
@@ -174,7 +174,7 @@ TEST(Opening, KitchensHaveAllCategories) {
     std::map<std::string, int> count;
     for (const Articulation& one : stage.task.articulations()) {
       ++count[one.category];
-      EXPECT_THAT(name_of(stage.model, mjOBJ_GEOM, one.handle.geom), HasSubstr("/handle"));
+      EXPECT_THAT(scene::name_of(stage.model, mjOBJ_GEOM, one.handle.geom), HasSubstr("/handle"));
     }
     EXPECT_GE(count["drawer"], 5) << scene;
     EXPECT_GE(count["cabinet"], 6) << scene;
@@ -206,7 +206,7 @@ TEST(Opening, StartsAreFeasibleAndDiffer) {
     EXPECT_EQ(stage.task.start_error(w), "");
     for (int i = 0; i < stage.data->ncon; ++i)
       EXPECT_GT(stage.data->contact[i].dist, -0.002) << episode;
-    const Evaluation e = stage.task.evaluate(w);
+    const episode::Evaluation e = stage.task.evaluate(w);
     EXPECT_EQ(e.reward, 0);
     EXPECT_FALSE(e.success);
     texts.insert(stage.task.description(0));
@@ -241,7 +241,7 @@ TEST(Opening, CloseCountsOnlyTheTarget) {
   for (int episode = 0; episode < 4; ++episode) {
     const World w = stage.start(1, episode);
     const Articulation& target = stage.task.target(1);
-    const Evaluation e = stage.task.evaluate(w);
+    const episode::Evaluation e = stage.task.evaluate(w);
     EXPECT_GE(e.reward, 0.35);
     EXPECT_LE(e.reward, 0.65);
     for (const Articulation& one : stage.task.articulations()) {
@@ -278,7 +278,7 @@ TEST(Opening, RobotDoesNotStartInsideFurniture) {
       stage.task.reach().is_collision_free(at(0.1)));  // the pedestal penetrates the fronts
   EXPECT_TRUE(stage.task.reach().is_collision_free(at(-0.9)));
   // The pedestal penetrates a wall.
-  const int wall = resolve(stage.model, mjOBJ_GEOM, "room/wall_x0", "test");
+  const int wall = scene::resolve(stage.model, mjOBJ_GEOM, "room/wall_x0", "test");
   const double inside =
       stage.model->geom_pos[3 * wall] + stage.model->geom_size[3 * wall + 2];  // its face
   EXPECT_FALSE(stage.task.reach().is_collision_free(at(inside + 0.2)));
@@ -291,7 +291,7 @@ TEST(Opening, RobotDoesNotStartInsideFurniture) {
 TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
   Stage stage(franka(), OpeningKind::kClose);
   const HandleReach& reach = stage.task.reach();
-  const Robot& robot = stage.task.robot();
+  const robots::Robot& robot = stage.task.robot();
   Rng rng(1, 0, 0, 0);
   int found = 0;
   for (int episode = 0; episode < 50; ++episode) {
@@ -305,7 +305,7 @@ TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
     const int arm = path->hand.arm;
     const Pose base = robot.base_pose(w);
     for (std::size_t k = 1; k < path->motion_joints.size(); ++k) {
-      RobotValues between = path->motion_joints[k];
+      robots::RobotValues between = path->motion_joints[k];
       for (int i = 0; i < between[arm].size; ++i)
         between[arm].values[i] =
             0.5 * (between[arm].values[i] + path->motion_joints[k - 1][arm].values[i]);
@@ -325,8 +325,8 @@ TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
 // The tool of a floating gripper moves with the handle about the door's hinge. At the start, it
 // floats in front of the handle without touching anything.
 TEST(Opening, FloatingGripperMovesOnAScrew) {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("floating_rum");
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("floating_rum");
   Stage stage(cfg, OpeningKind::kOpen, 1);
   const HandleReach& reach = stage.task.reach();
   ASSERT_EQ(reach.hands().size(), 1u);
@@ -374,7 +374,7 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
   };
   int moved = 0, pad = -1;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (is_descendant_or_self(m, m->geom_bodyid[g], hand) && touches(g)) pad = g;
+    if (observe::is_descendant_or_self(m, m->geom_bodyid[g], hand) && touches(g)) pad = g;
   }
   for (const Articulation& one : stage.task.articulations()) {
     const int top = m->body_parentid[one.body];
@@ -387,7 +387,7 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
       double minimum = 1;
       for (int a = 0; a < m->ngeom; ++a) {
         for (int b = 0; b < m->ngeom && of_arm(a); ++b) {
-          if (is_descendant_or_self(m, m->geom_bodyid[b], top) && touches(b))
+          if (observe::is_descendant_or_self(m, m->geom_bodyid[b], top) && touches(b))
             minimum = std::min(minimum, mj_geomDistance(m, d, a, b, 1, nullptr));
         }
       }
@@ -471,4 +471,4 @@ TEST(Opening, InstructionsDescribeTheTarget) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -12,7 +12,7 @@
 #include "mjsense/scenes/referring_expressions.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using std::numbers::pi;
@@ -38,24 +38,24 @@ constexpr std::array<const char*, 15> kSentences{"Pick up {}",
 
 }  // namespace
 
-PickTask::PickTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
+PickTask::PickTask(episode::TaskCfg cfg) : scenes::ObjectTask(std::move(cfg), kScene, kRole) {}
 
 void PickTask::initialize_task() {
-  ObjectTask::initialize_task();
+  scenes::ObjectTask::initialize_task();
   things_ = scene().pickup_objects();
   if (things_.empty())
     throw ValueError(
         fmt::format("{} has no object to pick up: no graspable body with a free joint", context()));
   objects_.clear();
-  for (const SceneObject& object : scene().objects())
+  for (const scenes::SceneObject& object : scene().objects())
     objects_.push_back({object.body, object.kind, object.shape});
   targets_.assign(num_worlds(), 0);
   begin_with(objects_[0].body, scene().objects()[0].text);
-  standing_ = BasePlacementSearch(model(), robot(), scene());
+  standing_ = scenes::BasePlacementSearch(model(), robot(), scene());
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
-std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
   vary_scene(world);
   const int target = scene().draw(world, things_, robot(), rng);
@@ -63,7 +63,7 @@ std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& 
   return standing_(scene().sample(world, target, cfg().seed, episode, rng, state));
 }
 
-void PickTask::choose_goal(int world, Rng& rng, const StateRow& state) {
+void PickTask::choose_goal(int world, Rng& rng, const robots::StateRow& state) {
   std::vector<int> here = adopt_scene(world, state);
   std::erase_if(here, [this](int i) { return scene().objects()[i].receptacle; });
   if (here.empty()) here = things_;
@@ -73,7 +73,7 @@ void PickTask::choose_goal(int world, Rng& rng, const StateRow& state) {
 }
 
 void PickTask::set_target(int world, int target) {
-  const SceneObject& object = scene().objects()[target];
+  const scenes::SceneObject& object = scene().objects()[target];
   targets_[world] = target;
   set_object(world, object.body, object.text);
 }
@@ -118,7 +118,7 @@ std::string_view PickTask::missing(const World& world) const {
   return held ? "" : "the robot does not touch the object";
 }
 
-Evaluation PickTask::evaluate(const World& world) const {
+episode::Evaluation PickTask::evaluate(const World& world) const {
   const int body = object(world.id).body;
   const double height = world.data->xpos[3 * body + 2] - start(world.id).p.z;
   const double reward = supported_by_others(world, body) ? 0.0 : std::clamp(height, 0.0, 1000.0);
@@ -128,13 +128,13 @@ Evaluation PickTask::evaluate(const World& world) const {
 std::string PickTask::description(int world) const { return "Pick up the " + object(world).name; }
 
 std::string PickTask::paraphrase(const World& world, Rng& rng) const {
-  const std::string object = draw_reference(
-      object_references(world, scene(), targets_[world.id], robot().base_pose(world)), rng);
-  return object.empty() ? "" : one_of(kSentences, rng, object);
+  const std::string object = scenes::draw_reference(
+      scenes::object_references(world, scene(), targets_[world.id], robot().base_pose(world)), rng);
+  return object.empty() ? "" : scenes::one_of(kSentences, rng, object);
 }
 
-Task::Referrals PickTask::referrals(int world) const {
-  return {{"pickup_obj_name", referring_expressions(scene().objects()[targets_[world]])}};
+episode::Task::Referrals PickTask::referrals(int world) const {
+  return {{"pickup_obj_name", scenes::referring_expressions(scene().objects()[targets_[world]])}};
 }
 
 std::optional<Pose> PickTask::goal_pose(int world, std::string_view role) const {
@@ -157,4 +157,4 @@ std::vector<std::pair<std::string, std::string>> PickTask::scene_info(int world)
   return {{"text", description(world)}, {"object_name", object(world).name}};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

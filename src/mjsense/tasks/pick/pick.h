@@ -11,19 +11,19 @@
 #include "mjsense/scenes/base_placement_search.h"
 #include "mjsense/scenes/object_task.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
-class PickTask final : public ObjectTask, public GraspScene {
+class PickTask final : public scenes::ObjectTask, public episode::GraspScene {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
 
   // Plays in cfg.scene; the default scene is a table in a room.
-  explicit PickTask(TaskCfg cfg);
+  explicit PickTask(episode::TaskCfg cfg);
   std::string_view name() const override { return "pick"; }
   std::string_view type() const override { return "pick"; }
 
   // Reward: height above the start (m) while no other body supports the object.
-  Evaluation evaluate(const World& world) const override;
+  episode::Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
@@ -33,9 +33,9 @@ class PickTask final : public ObjectTask, public GraspScene {
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
-  const GraspScene* grasp_scene() const override { return this; }
-  std::span<const GraspObject> all_objects() const override { return objects_; }
-  const ObjectShape& shape(int world, int object) const override {
+  const episode::GraspScene* grasp_scene() const override { return this; }
+  std::span<const episode::GraspObject> all_objects() const override { return objects_; }
+  const episode::ObjectShape& shape(int world, int object) const override {
     return scene().shape(world, object);
   }
   int target(int world) const override { return targets_[world]; }
@@ -43,9 +43,9 @@ class PickTask final : public ObjectTask, public GraspScene {
 
  protected:
   void initialize_task() override;
-  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
-  void choose_goal(int world, Rng& rng, const StateRow& state) override;
+  void choose_goal(int world, Rng& rng, const robots::StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
@@ -53,11 +53,11 @@ class PickTask final : public ObjectTask, public GraspScene {
   bool supported_by_others(const World& world, int body) const;
   std::string_view missing(const World& world) const;
 
-  BasePlacementSearch standing_;
-  std::vector<GraspObject> objects_;
+  scenes::BasePlacementSearch standing_;
+  std::vector<episode::GraspObject> objects_;
   std::vector<int> things_;   // indices in objects_ of possible targets
   std::vector<int> targets_;  // [B], index in objects_
   int robot_root_ = -1;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

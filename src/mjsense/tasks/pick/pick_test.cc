@@ -13,7 +13,7 @@
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using testing::HasSubstr;
@@ -22,9 +22,9 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-TaskCfg franka() {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("franka");
+episode::TaskCfg franka() {
+  episode::TaskCfg cfg;
+  cfg.robot = robots::robot_cfg("franka");
   cfg.scene = "table";
   return cfg;
 }
@@ -32,7 +32,7 @@ TaskCfg franka() {
 struct Pick : testing::Test {
   void start(int world, std::int64_t episode) {
     mj_resetData(model, data.get());
-    task.sample(world, episode, state_row(data.get()));
+    task.sample(world, episode, robots::state_row(data.get()));
     mj_forward(model, data.get());
     w = {.id = world, .model = model, .data = data.get()};
     task.begin(w);
@@ -41,7 +41,7 @@ struct Pick : testing::Test {
   double* object_qpos() { return data->qpos + model->jnt_qposadr[model->body_jntadr[body()]]; }
 
   PickTask task{franka()};
-  Scene scene{task.scene_cfg_with_robot()};
+  scene::Scene scene{task.scene_cfg_with_robot()};
   const mjModel* model = scene.model();
   std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
   World w;
@@ -102,7 +102,7 @@ TEST_F(Pick, ObjectsStayWhereTheyStart) {
 
 TEST_F(Pick, LiftWithoutTheRobotIsNotSuccess) {
   start(0, 1);
-  Evaluation e = task.evaluate(w);
+  episode::Evaluation e = task.evaluate(w);
   EXPECT_EQ(e.reward, 0);
   EXPECT_FALSE(e.success || e.terminal || e.truncated);
   object_qpos()[2] += 0.05;
@@ -124,7 +124,7 @@ TEST_F(Pick, LyingOnAnotherObjectIsNotSuccess) {
   write_vec({at[0], at[1], top - 0.0005 - task.all_objects()[target].shape.low}, object_qpos());
   write_quat({}, object_qpos() + 3);
   mj_forward(model, data.get());
-  const Evaluation e = task.evaluate(w);
+  const episode::Evaluation e = task.evaluate(w);
   EXPECT_FALSE(e.success);
   EXPECT_EQ(e.reward, 0) << "the other object bears it";
 }
@@ -134,7 +134,7 @@ TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
   start(0, 1);
   const int target = task.target(0);
   // Move the object onto a colliding part of the gripper.
-  const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
+  const int gripper = scene::resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   const double* g = data->xpos + 3 * gripper;
   write_vec({g[0], g[1], g[2]}, object_qpos());
   mj_forward(model, data.get());
@@ -166,7 +166,7 @@ TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
 // Success begins at a lift of one centimeter.
 TEST_F(Pick, SuccessStartsAtALiftOfOneCentimetre) {
   start(0, 1);
-  const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
+  const int gripper = scene::resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   write_vec(vec3(data->xpos + 3 * gripper), object_qpos());
   mj_forward(model, data.get());
   task.begin(w);  // the episode starts here
@@ -237,14 +237,15 @@ TEST_F(Pick, BlocksRestOnEveryKindOfFace) {
 
 TEST_F(Pick, EndsAtTheHorizonOrWithADoneAction) {
   start(0, 0);
-  Action action;
-  for (int i = 0; i < task.cfg().horizon - 1; ++i) task.apply(w, action, state_row(data.get()));
+  robots::Action action;
+  for (int i = 0; i < task.cfg().horizon - 1; ++i)
+    task.apply(w, action, robots::state_row(data.get()));
   EXPECT_FALSE(task.evaluate(w).truncated);
-  task.apply(w, action, state_row(data.get()));
+  task.apply(w, action, robots::state_row(data.get()));
   EXPECT_TRUE(task.evaluate(w).truncated);
   EXPECT_FALSE(task.evaluate(w).terminal);
   action.done = true;
-  task.apply(w, action, state_row(data.get()));
+  task.apply(w, action, robots::state_row(data.get()));
   EXPECT_TRUE(task.evaluate(w).terminal);
   start(0, 1);
   EXPECT_FALSE(task.evaluate(w).terminal) << "a new episode";
@@ -257,7 +258,7 @@ TEST_F(Pick, ActionNoiseDependsOnEpisodeAndStep) {
   start(0, 5);
   const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
   const int arm = task.robot().arm();
-  RobotValues now;
+  robots::RobotValues now;
   task.robot().read_qpos(w, now);
   std::vector<double> target(now[arm].view().begin(), now[arm].view().end());
   for (double& q : target) q += 0.05;
@@ -265,9 +266,9 @@ TEST_F(Pick, ActionNoiseDependsOnEpisodeAndStep) {
     start(world, episode);
     std::copy(qpos.begin(), qpos.end(), data->qpos);
     mj_forward(model, data.get());
-    Action action;
+    robots::Action action;
     action.commands[arm].set(target);
-    for (int i = 0; i <= step; ++i) task.apply(w, action, state_row(data.get()));
+    for (int i = 0; i <= step; ++i) task.apply(w, action, robots::state_row(data.get()));
     return std::vector<double>(data->ctrl, data->ctrl + model->nu);
   };
   const std::vector<double> ctrl = noisy(0, 5, 0);
@@ -319,7 +320,7 @@ TEST_F(Pick, SensorsAreInThePublishedOrder) {
 }
 
 TEST(Task, InvalidConfigurationsThrow) {
-  TaskCfg cfg = franka();
+  episode::TaskCfg cfg = franka();
   cfg.policy_dt_ms = 65;
   EXPECT_THROW(PickTask{cfg}, ValueError);
   cfg = franka();
@@ -328,4 +329,4 @@ TEST(Task, InvalidConfigurationsThrow) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -12,7 +12,7 @@
 #include "mjsense/scenes/object_references.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using std::numbers::pi;
@@ -56,14 +56,14 @@ Pose pose_of(const World& world, int body) {
 }
 
 // Name of receptacles that differ only in color, such as "bowl".
-const std::string& noun(const SceneObject& object) {
+const std::string& noun(const scenes::SceneObject& object) {
   return object.others.empty() ? object.text : object.others[0];
 }
 
 }  // namespace
 
-PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, TaskCfg cfg)
-    : SceneTask(std::move(cfg), kScene), kind_(kind) {}
+PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, episode::TaskCfg cfg)
+    : scenes::SceneTask(std::move(cfg), kScene), kind_(kind) {}
 
 std::string_view PickAndPlaceTask::name() const {
   switch (kind_) {
@@ -79,7 +79,7 @@ std::string_view PickAndPlaceTask::name() const {
 }
 
 void PickAndPlaceTask::initialize_task() {
-  SceneTask::initialize_task();
+  scenes::SceneTask::initialize_task();
   const std::string context = this->context();
   if (scene().pickup_objects().empty())
     throw ValueError(
@@ -92,7 +92,7 @@ void PickAndPlaceTask::initialize_task() {
         fmt::format("{} has no receptacle: none of its objects has receptacle = true", context));
   }
   objects_.clear();
-  for (const SceneObject& object : scene().objects())
+  for (const scenes::SceneObject& object : scene().objects())
     objects_.push_back({object.body, object.kind, object.shape});
   if (kind_ == PlaceKind::kColor || kind_ == PlaceKind::kPacking) {
     Rng any(0, 0, 0, 0);
@@ -109,7 +109,7 @@ void PickAndPlaceTask::initialize_task() {
     episode.objects[1].role = kReceptacle;
     episode.supported.reserve(static_cast<std::size_t>(std::max(cfg().horizon, 0)) + 2);
   }
-  standing_ = BasePlacementSearch(model(), robot(), scene());
+  standing_ = scenes::BasePlacementSearch(model(), robot(), scene());
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
@@ -148,7 +148,8 @@ std::vector<int> PickAndPlaceTask::choose(int world, Rng& rng) const {
   return wanted;
 }
 
-std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng,
+                                                   const robots::StateRow& state) {
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   vary_scene(world);
   const std::vector<int> wanted = choose(world, rng);
@@ -156,7 +157,7 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const St
   episode.target = wanted[0];
   episode.receptacle = wanted[1];
   for (int k = 0; k < 2; ++k) {
-    const SceneObject& object = scene().objects()[wanted[k]];
+    const scenes::SceneObject& object = scene().objects()[wanted[k]];
     episode.objects[k].body = object.body;
     episode.objects[k].name = object.text;
   }
@@ -164,7 +165,7 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const St
 }
 
 void PickAndPlaceTask::begin(const World& world) {
-  Task::begin(world);
+  episode::Task::begin(world);
   Episode& episode = episodes_[world.id];
   episode.start = pose_of(world, episode.objects[0].body);
   episode.receptacle_start = pose_of(world, episode.objects[1].body);
@@ -227,7 +228,7 @@ std::string_view PickAndPlaceTask::missing_beside(const World& world, const Asse
 }
 
 std::string PickAndPlaceTask::start_error(const World& world) const {
-  const std::string fault = SceneTask::start_error(world);
+  const std::string fault = scenes::SceneTask::start_error(world);
   if (!fault.empty() || kind_ != PlaceKind::kNextTo) return fault;
   const auto& objects = episodes_[world.id].objects;
   const double gap =
@@ -237,7 +238,7 @@ std::string PickAndPlaceTask::start_error(const World& world) const {
                      objects[1].name);
 }
 
-Evaluation PickAndPlaceTask::evaluate(const World& world) const {
+episode::Evaluation PickAndPlaceTask::evaluate(const World& world) const {
   const Assessment& now = assess(world);
   return make_evaluation_from(world.id, std::exp(-now.position_error), now.missing);
 }
@@ -295,7 +296,7 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
 
 std::string PickAndPlaceTask::place_description(int world) const {
   const Episode& episode = episodes_[world];
-  const SceneObject& object = scene().objects()[episode.receptacle];
+  const scenes::SceneObject& object = scene().objects()[episode.receptacle];
   if (kind_ == PlaceKind::kColor) return object.color + " " + noun(object);
   return object.text;
 }
@@ -318,20 +319,20 @@ std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
   const Pose base = robot().base_pose(world);
   const std::array<int, 2> both{episode.target, episode.receptacle};
   const auto drawn = [&](int index) {
-    References all = object_references(world, scene(), index, base, both);
+    scenes::References all = scenes::object_references(world, scene(), index, base, both);
     // In "put the mug next to the plate" it must not be the mug that is next to the plate.
     if (kind_ == PlaceKind::kNextTo) {
       for (auto& texts : all)
         std::erase_if(texts, [](const auto& text) { return text.find(" next to ") != text.npos; });
     }
-    return draw_reference(all, rng);
+    return scenes::draw_reference(all, rng);
   };
   const std::string object = drawn(both[0]);
   const std::string where =
       kind_ == PlaceKind::kColor ? "the " + place_description(world.id) : drawn(both[1]);
   if (object.empty() || where.empty()) return "";
   const auto is_any = [name = std::string_view(scene().objects()[both[1]].text)](const auto& of) {
-    return std::ranges::any_of(of, [&](auto word) { return may_be_called(name, word); });
+    return std::ranges::any_of(of, [&](auto word) { return scenes::may_be_called(name, word); });
   };
   std::string at = "in or on ", to = "in or on ";
   if (kind_ == PlaceKind::kNextTo) {
@@ -341,18 +342,18 @@ std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
   } else if (is_any(kOnTop)) {
     at = "on ", to = "onto ";
   }
-  return one_of(kSentences, rng, object, at + where, to + where);
+  return scenes::one_of(kSentences, rng, object, at + where, to + where);
 }
 
-Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {
-  const SceneObject& object = scene().objects()[index];
-  std::vector<Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
+episode::Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {
+  const scenes::SceneObject& object = scene().objects()[index];
+  std::vector<episode::Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
   for (const std::string& other : object.others)
     texts.push_back({other, 0.5 / static_cast<double>(object.others.size())});
   return {key, std::move(texts)};
 }
 
-Task::Referrals PickAndPlaceTask::referrals(int world) const {
+episode::Task::Referrals PickAndPlaceTask::referrals(int world) const {
   const Episode& episode = episodes_[world];
   Referrals all{referral("pickup_name", episode.target),
                 referral("place_name", episode.receptacle)};
@@ -397,4 +398,4 @@ std::vector<std::pair<std::string, std::string>> PickAndPlaceTask::scene_info(in
           {"place_receptacle_name", episodes_[world].objects[1].name}};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

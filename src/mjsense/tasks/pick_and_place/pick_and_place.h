@@ -12,18 +12,20 @@
 #include "mjsense/scenes/base_placement_search.h"
 #include "mjsense/scenes/scene_task.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 // kInOrOn: any receptacle. kNextTo: next to any object. kColor: the receptacle of the given color
 // among several of one kind. kPacking: into a box.
 enum class PlaceKind { kInOrOn, kNextTo, kColor, kPacking };
 
-class PickAndPlaceTask final : public SceneTask, public GraspScene, public PlaceScene {
+class PickAndPlaceTask final : public scenes::SceneTask,
+                               public episode::GraspScene,
+                               public episode::PlaceScene {
  public:
   static constexpr std::string_view kObject = "pickup_obj", kReceptacle = "place_receptacle";
 
   // Plays in cfg.scene; the default scene is a table with tableware.
-  PickAndPlaceTask(PlaceKind kind, TaskCfg cfg);
+  PickAndPlaceTask(PlaceKind kind, episode::TaskCfg cfg);
   // pick_and_place, pick_and_place_next_to, pick_and_place_color, packing.
   std::string_view name() const override;
   std::string_view type() const override { return name(); }
@@ -33,10 +35,12 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   std::string start_error(const World& world) const override;
   void begin(const World& world) override;
   // Reward: exp(-d), with d the distance (m) from the object to the center of the receptacle's box.
-  Evaluation evaluate(const World& world) const override;
+  episode::Evaluation evaluate(const World& world) const override;
   bool info_follows_evaluation() const override { return true; }
 
-  std::span<const TaskObject> objects(int world) const override { return episodes_[world].objects; }
+  std::span<const episode::TaskObject> objects(int world) const override {
+    return episodes_[world].objects;
+  }
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
   Pose start_pose(int world, std::string_view role) const override;
@@ -49,20 +53,20 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
-  const GraspScene* grasp_scene() const override { return this; }
-  std::span<const GraspObject> all_objects() const override { return objects_; }
-  const ObjectShape& shape(int world, int object) const override {
+  const episode::GraspScene* grasp_scene() const override { return this; }
+  std::span<const episode::GraspObject> all_objects() const override { return objects_; }
+  const episode::ObjectShape& shape(int world, int object) const override {
     return scene().shape(world, object);
   }
   int target(int world) const override { return episodes_[world].target; }
   double support_height(int world) const override { return scene().support_height(world); }
-  const PlaceScene* place_scene() const override { return this; }
+  const episode::PlaceScene* place_scene() const override { return this; }
   int receptacle(int world) const override { return episodes_[world].objects[1].body; }
   void places(const World& world, const Quat& turn, std::vector<Vec3>& out) const override;
 
  protected:
   void initialize_task() override;
-  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
@@ -79,7 +83,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   };
   struct Episode {
     int target = 0, receptacle = 0;  // indices in objects_
-    std::array<TaskObject, 2> objects;
+    std::array<episode::TaskObject, 2> objects;
     Pose start, receptacle_start;
     std::vector<Pose> supported;  // X_RO of all earlier supported observations
     Assessment assessment;
@@ -92,10 +96,10 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   Referrals::value_type referral(const char* key, int object) const;
 
   PlaceKind kind_;
-  BasePlacementSearch standing_;
-  std::vector<GraspObject> objects_;
+  scenes::BasePlacementSearch standing_;
+  std::vector<episode::GraspObject> objects_;
   mutable std::vector<Episode> episodes_;  // [B]; evaluated once per observation
   int robot_root_ = -1;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

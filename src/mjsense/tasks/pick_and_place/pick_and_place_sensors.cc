@@ -2,16 +2,16 @@
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/tasks/pick_and_place/pick_and_place.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 std::vector<std::shared_ptr<Sensor>> PickAndPlaceTask::create_task_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors{
-      start_pose_sensor(*this, "obj_start", std::string(kObject))};
+      episode::start_pose_sensor(*this, "obj_start", std::string(kObject))};
   for (const std::string_view role : {kObject, kReceptacle}) {
-    if (auto grasped = grasp_state_sensor(*this, std::string(role)))
+    if (auto grasped = episode::grasp_state_sensor(*this, std::string(role)))
       sensors.push_back(std::move(grasped));
   }
   return sensors;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

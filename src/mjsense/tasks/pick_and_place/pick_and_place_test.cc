@@ -12,7 +12,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 using testing::HasSubstr;
@@ -21,19 +21,19 @@ using testing::StartsWith;
 // A task whose objects a test can move.
 struct Table {
   explicit Table(PlaceKind kind, const char* scene_name = "") : task(kind, cfg(scene_name)) {
-    scene = std::make_unique<Scene>(task.scene_cfg_with_robot());
+    scene = std::make_unique<scene::Scene>(task.scene_cfg_with_robot());
     task.initialize(scene->model(), 3);
     data.reset(mj_makeData(scene->model()));
   }
-  static TaskCfg cfg(const char* scene_name) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg("franka");
+  static episode::TaskCfg cfg(const char* scene_name) {
+    episode::TaskCfg cfg;
+    cfg.robot = robots::robot_cfg("franka");
     cfg.scene = scene_name;
     return cfg;
   }
   void start(int id, std::int64_t episode) {
     mj_resetData(scene->model(), data.get());
-    task.sample(id, episode, state_row(data.get()));
+    task.sample(id, episode, robots::state_row(data.get()));
     mj_forward(scene->model(), data.get());
     world = {.id = id, .model = scene->model(), .data = data.get()};
     task.begin(world);
@@ -72,8 +72,8 @@ struct Table {
     mj_forward(world.model, data.get());
   }
   // Evaluates the state as a new observation.
-  Evaluation look() {
-    task.apply(world, Action{}, state_row(data.get()));
+  episode::Evaluation look() {
+    task.apply(world, robots::Action{}, robots::state_row(data.get()));
     return task.evaluate(world);
   }
   nlohmann::json info() {
@@ -85,7 +85,7 @@ struct Table {
     return nlohmann::json::parse(std::string(text.begin(), std::ranges::find(text, 0)));
   }
   PickAndPlaceTask task;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<scene::Scene> scene;
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
   World world;
 };
@@ -119,7 +119,7 @@ TEST(PickAndPlace, StartsAreReachableAndWithoutCollision) {
 TEST(PickAndPlace, ObjectInTheBowlIsSuccessOnTheTableIsNot) {
   Table table(PlaceKind::kInOrOn);
   table.start_with("red bowl");
-  Evaluation e = table.task.evaluate(table.world);
+  episode::Evaluation e = table.task.evaluate(table.world);
   EXPECT_FALSE(e.success);
   EXPECT_EQ(e.missing, "the receptacle does not carry the object");
   const Vec3 middle = world_box(table.world, table.body(1)).center();
@@ -175,7 +175,7 @@ TEST(PickAndPlace, SupportIsKeptWithinFiveMillimetres) {
 TEST(PickAndPlace, RobotMustReleaseTheObject) {
   Table table(PlaceKind::kInOrOn);
   table.start(0, 0);
-  const int gripper = resolve(table.world.model, mjOBJ_BODY, "robot_0/gripper/base", "test");
+  const int gripper = scene::resolve(table.world.model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   table.put(0, {vec3(table.data->xpos + 3 * gripper), {}});
   table.look();
   EXPECT_TRUE(table.info()["robot_contact"].get<bool>());
@@ -212,7 +212,7 @@ TEST(PickAndPlace, NextToRequiresTheSameSupport) {
 TEST(PickAndPlace, NextToPlacesAreOnTheTable) {
   Table table(PlaceKind::kNextTo);
   table.start(0, 1);
-  const int top = resolve(table.world.model, mjOBJ_GEOM, "room/table_top", "test");
+  const int top = scene::resolve(table.world.model, mjOBJ_GEOM, "room/table_top", "test");
   const auto places = [&](double from_edge) {
     const double* at = table.data->geom_xpos + 3 * top;
     const double edge = at[0] - table.world.model->geom_size[3 * top];
@@ -292,4 +292,4 @@ TEST(PickAndPlace, SceneWithoutReceptaclesThrows) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -7,7 +7,7 @@
 
 #include "mjsense/observe/frame.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 const double kSteep = std::cos(30 * std::numbers::pi / 180);
@@ -32,8 +32,8 @@ void each_touch(const World& world, int object, F&& f) {
     const mjContact& contact = world.data->contact[i];
     if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
     const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-    const bool first = is_descendant_or_self(m, a, object),
-               second = is_descendant_or_self(m, b, object);
+    const bool first = observe::is_descendant_or_self(m, a, object),
+               second = observe::is_descendant_or_self(m, b, object);
     if (first == second) continue;
     f(Touch{second ? a : b, &contact, second ? 1.0 : -1.0, i});
   }
@@ -56,7 +56,7 @@ WorldBox world_box(const World& world, int body) {
   double* const low[3] = {&box.low.x, &box.low.y, &box.low.z};
   double* const high[3] = {&box.high.x, &box.high.y, &box.high.z};
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!is_descendant_or_self(m, m->geom_bodyid[g], body)) continue;
+    if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], body)) continue;
     const double *r = world.data->geom_xmat + 9 * g, *aabb = m->geom_aabb + 6 * g;
     for (int k = 0; k < 3; ++k) {
       double middle = world.data->geom_xpos[3 * g + k], half = 0;
@@ -76,7 +76,7 @@ WorldBox turned_box(const World& world, int body, const Quat& turn) {
   const Vec3 origin = vec3(world.data->xpos + 3 * body);
   WorldBox box{{1e10, 1e10, 1e10}, {-1e10, -1e10, -1e10}};
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!is_descendant_or_self(m, m->geom_bodyid[g], body)) continue;
+    if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], body)) continue;
     const Pose geom = pose_from_mat(world.data->geom_xpos + 3 * g, world.data->geom_xmat + 9 * g);
     const Pose turned{origin + rotate(turn, geom.p - origin), turn * geom.q};
     const double* aabb = m->geom_aabb + 6 * g;
@@ -94,7 +94,7 @@ WorldBox turned_box(const World& world, int body, const Quat& turn) {
 Vec3 contact_force(const World& world, int carrier, int object) {
   Vec3 sum;
   each_touch(world, object, [&](const Touch& touch) {
-    if (is_descendant_or_self(world.model, touch.other, carrier))
+    if (observe::is_descendant_or_self(world.model, touch.other, carrier))
       sum = sum + force_of(world, touch);
   });
   return sum;
@@ -110,7 +110,7 @@ bool likely_supports(const World& world, int carrier, int object) {
   const WorldBox box = world_box(world, object), below = world_box(world, carrier);
   bool found = false;
   each_touch(world, object, [&](const Touch& touch) {
-    if (found || !is_descendant_or_self(world.model, touch.other, carrier)) return;
+    if (found || !observe::is_descendant_or_self(world.model, touch.other, carrier)) return;
     found =
         touch.contact->pos[2] < box.center().z && touch.sign * touch.contact->frame[2] >= kSteep;
   });
@@ -167,9 +167,9 @@ double gap_from_above(const WorldBox& a, const WorldBox& b) {
 bool touched_by(const World& world, int body, int other_root) {
   bool found = false;
   each_touch(world, body, [&](const Touch& touch) {
-    found = found || is_descendant_or_self(world.model, touch.other, other_root);
+    found = found || observe::is_descendant_or_self(world.model, touch.other, other_root);
   });
   return found;
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

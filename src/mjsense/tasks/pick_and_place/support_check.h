@@ -6,7 +6,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/core/sensor.h"
 
-namespace mjsense {
+namespace mjsense::tasks {
 
 struct WorldBox {
   Vec3 low, high;  // m, axis-aligned in the world frame
@@ -47,4 +47,4 @@ double gap_from_above(const WorldBox& a, const WorldBox& b);
 // True if a geom in the subtree of `other_root` touches the subtree of `body`.
 bool touched_by(const World& world, int body, int other_root);
 
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-namespace mjsense {
+namespace mjsense::tasks {
 namespace {
 
 // A table, a tray on it, and a block of 0.2 kg; seen from the side:
@@ -170,4 +170,4 @@ TEST_F(Support, SurfaceMustBeUnderTheWholeObject) {
 }
 
 }  // namespace
-}  // namespace mjsense
+}  // namespace mjsense::tasks

@@ -15,7 +15,7 @@
 #include "mjsense/policies/planner/collision.h"
 #include "mjsense/scene/resolve.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 class MotionQuality {
  public:
@@ -39,10 +39,10 @@ class MotionQuality {
   Greatest joint_speed, joint_acceleration, base_speed, base_acceleration, base_turn,
       base_turn_acceleration;
 
-  MotionQuality(const mjModel* model, const Robot& robot) {
+  MotionQuality(const mjModel* model, const robots::Robot& robot) {
     std::vector<int> joints;
-    for (const MoveGroup& group : robot.groups()) {
-      if (group.kind != GroupKind::kArm) continue;
+    for (const robots::MoveGroup& group : robot.groups()) {
+      if (group.kind != robots::GroupKind::kArm) continue;
       joints.insert(joints.end(), group.joints.begin(), group.joints.end());
       dofs_.insert(dofs_.end(), group.dofs.begin(), group.dofs.end());
     }
@@ -53,7 +53,7 @@ class MotionQuality {
 
   // Call before the first step: the present state counts as the last command.
   void begin(const World& world) {
-    RobotValues now;
+    robots::RobotValues now;
     robot_->read_qpos(world, now);
     commands_.assign(1, now);
     commands_.push_back(now);
@@ -61,7 +61,7 @@ class MotionQuality {
   }
 
   // `action`: the policy's action of the last step; null: commands are not measured.
-  void look(const World& world, const Action* action = nullptr, int phase = 0) {
+  void look(const World& world, const robots::Action* action = nullptr, int phase = 0) {
     if (action) look_at_commands(world, *action, phase);
     const mjModel* m = world.model;
     const double time = world.time();
@@ -84,8 +84,8 @@ class MotionQuality {
       if ((m->body_rootid[a] == root_) == (m->body_rootid[b] == root_)) continue;
       if (-contact.dist <= depth) continue;
       depth = -contact.dist;
-      deepest = name_of(m, mjOBJ_BODY, a) + " in " + name_of(m, mjOBJ_BODY, b) + " at " +
-                std::to_string(time) + " s in phase " + std::to_string(phase);
+      deepest = scene::name_of(m, mjOBJ_BODY, a) + " in " + scene::name_of(m, mjOBJ_BODY, b) +
+                " at " + std::to_string(time) + " s in phase " + std::to_string(phase);
     }
     CollisionQuery query(*model_, world);
     for (int body = 1; body < m->nbody; ++body) {
@@ -95,9 +95,9 @@ class MotionQuality {
     if (query.free_here()) return;
     const auto gripper = [&](int geom) {
       for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
-        const MoveGroup& group = robot_->groups()[g];
-        if (group.kind == GroupKind::kGripper &&
-            is_descendant_or_self(m, m->geom_bodyid[geom], group.root_body))
+        const robots::MoveGroup& group = robot_->groups()[g];
+        if (group.kind == robots::GroupKind::kGripper &&
+            observe::is_descendant_or_self(m, m->geom_bodyid[geom], group.root_body))
           return static_cast<int>(g);
       }
       return -1;
@@ -105,21 +105,21 @@ class MotionQuality {
     const int one = gripper(query.touching().first);
     if (one >= 0 && one == gripper(query.touching().second)) return;  // fingers of a closed gripper
     ++self_collisions;
-    const auto link = [&](int geom) { return name_of(m, mjOBJ_BODY, m->geom_bodyid[geom]); };
+    const auto link = [&](int geom) { return scene::name_of(m, mjOBJ_BODY, m->geom_bodyid[geom]); };
     met = link(query.touching().first) + " and " + link(query.touching().second) + " at " +
           std::to_string(time) + " s in phase " + std::to_string(phase);
   }
 
  private:
-  void look_at_commands(const World& world, const Action& action, int phase) {
+  void look_at_commands(const World& world, const robots::Action& action, int phase) {
     const double dt = world.time() - time_;
     time_ = world.time();
-    RobotValues next = commands_[1];
+    robots::RobotValues next = commands_[1];
     for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
-      const MoveGroup& group = robot_->groups()[g];
-      const GroupValues& given = action.commands[g];
-      const bool free_base = group.kind == GroupKind::kBase && group.command_size == 7;
-      if (group.kind != GroupKind::kArm && group.kind != GroupKind::kBase) continue;
+      const robots::MoveGroup& group = robot_->groups()[g];
+      const robots::GroupValues& given = action.commands[g];
+      const bool free_base = group.kind == robots::GroupKind::kBase && group.command_size == 7;
+      if (group.kind != robots::GroupKind::kArm && group.kind != robots::GroupKind::kBase) continue;
       if (free_base) {
         if (given.given) next[g].set(given.view());
         look_at_pose(commands_[0][g], commands_[1][g], next[g], dt, phase);
@@ -127,7 +127,7 @@ class MotionQuality {
       }
       if (!group.targets_are_qpos()) continue;
       // A group without a command holds its position.
-      const GroupValues& target = robot_->targets(world.id)[g];
+      const robots::GroupValues& target = robot_->targets(world.id)[g];
       if (given.given) {
         next[g].set(given.view());
       } else if (commands_given_[g] && target.size == next[g].size) {
@@ -139,7 +139,7 @@ class MotionQuality {
                      c = next[g].values[i];
         const double v = std::abs(c - b) / dt, acc = std::abs(c - 2 * b + a) / (dt * dt);
         const bool turns = i == 2;
-        if (group.kind == GroupKind::kArm) {
+        if (group.kind == robots::GroupKind::kArm) {
           joint_speed.see(v, time_, phase);
           joint_acceleration.see(acc, time_, phase);
         } else {
@@ -151,12 +151,12 @@ class MotionQuality {
     commands_[0] = commands_[1];
     commands_[1] = next;
   }
-  void look_at_pose(const GroupValues& a, const GroupValues& b, const GroupValues& c, double dt,
-                    int phase) {
-    const auto pose = [](const GroupValues& v) {
+  void look_at_pose(const robots::GroupValues& a, const robots::GroupValues& b,
+                    const robots::GroupValues& c, double dt, int phase) {
+    const auto pose = [](const robots::GroupValues& v) {
       return Pose{vec3(v.values.data()), quat(v.values.data() + 3)};
     };
-    const auto turn = [&](const GroupValues& from, const GroupValues& to) {
+    const auto turn = [&](const robots::GroupValues& from, const robots::GroupValues& to) {
       return (1 / dt) * rotate(pose(from).q, log3(conjugate(pose(from).q) * pose(to).q));
     };
     const Vec3 v = (1 / dt) * (pose(c).p - pose(b).p), before = (1 / dt) * (pose(b).p - pose(a).p);
@@ -167,9 +167,9 @@ class MotionQuality {
     base_turn_acceleration.see(norm(w - last) / dt, time_, phase);
   }
 
-  const Robot* robot_ = nullptr;
-  std::vector<RobotValues> commands_;  // the last two
-  std::array<bool, RobotValues::kMaxGroups> commands_given_{};
+  const robots::Robot* robot_ = nullptr;
+  std::vector<robots::RobotValues> commands_;  // the last two
+  std::array<bool, robots::RobotValues::kMaxGroups> commands_given_{};
   double time_ = 0;
   std::unique_ptr<CollisionModel> model_;
   std::vector<int> dofs_;
@@ -178,4 +178,4 @@ class MotionQuality {
   int root_;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

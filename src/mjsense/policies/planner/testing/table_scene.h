@@ -8,31 +8,31 @@
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/tasks/pick/pick.h"
 
-namespace mjsense {
+namespace mjsense::policies {
 
 // A robot at a table in plain MuJoCo.
 struct TableStage {
   explicit TableStage(const char* robot_name) {
-    TaskCfg cfg = task_cfg(robot_name, "table");
+    episode::TaskCfg cfg = episode::task_cfg(robot_name, "table");
     cfg.action_noise = false;
-    task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg_with_robot());
+    task = std::make_unique<tasks::PickTask>(cfg);
+    scene = std::make_unique<scene::Scene>(task->scene_cfg_with_robot());
     task->initialize(scene->model(), 1);
     data.reset(mj_makeData(scene->model()));
     world = {.id = 0, .model = scene->model(), .data = data.get()};
-    task->sample(0, 0, state_row(data.get()));
+    task->sample(0, 0, robots::state_row(data.get()));
     mj_forward(world.model, world.data);
     task->begin(world);
   }
-  const Robot& robot() const { return task->robot(); }
-  void step(const Action& action) {
-    task->apply(world, action, state_row(world.data));
+  const robots::Robot& robot() const { return task->robot(); }
+  void step(const robots::Action& action) {
+    task->apply(world, action, robots::state_row(world.data));
     physics_steps(*task, world, data.get());
   }
-  std::unique_ptr<PickTask> task;
-  std::unique_ptr<Scene> scene;
+  std::unique_ptr<tasks::PickTask> task;
+  std::unique_ptr<scene::Scene> scene;
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
   World world;
 };
 
-}  // namespace mjsense
+}  // namespace mjsense::policies

@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs builtin_examples() {
   return {example<BuiltinSensorCfg>("acc", [](BuiltinSensorCfg& c) {
@@ -12,4 +12,4 @@ SensorCfgs builtin_examples() {
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs camera_examples() {
   return {example<CameraSensorCfg>("eye",
@@ -25,4 +25,4 @@ SensorCfgs camera_examples() {
           })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -17,8 +17,8 @@
 namespace mjsense::testing {
 
 // Returns a camera with the image of the current state of `m`; `rays` must be up to date.
-inline std::unique_ptr<Sensor> shoot(const CameraSensorCfg& cfg, const TestModel& m,
-                                     RayScene& rays) {
+inline std::unique_ptr<Sensor> shoot(const sensors::CameraSensorCfg& cfg, const TestModel& m,
+                                     rays::RayScene& rays) {
   std::unique_ptr<Sensor> camera = cfg.build();
   SensorInit init;
   init.model = m.model;
@@ -36,8 +36,8 @@ struct Pair {
   std::unique_ptr<Sensor> rays, opengl;
   std::string missing;
 
-  Pair(CameraSensorCfg cfg, const TestModel& m) {
-    RayScene scene(m.model, 1);
+  Pair(sensors::CameraSensorCfg cfg, const TestModel& m) {
+    rays::RayScene scene(m.model, 1);
     scene.update(m.world());
     rays = shoot(cfg, m, scene);
     cfg.renderer = "opengl";

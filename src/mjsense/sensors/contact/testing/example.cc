@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/contact/contact_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs contact_examples() {
   return {example<ContactSensorCfg>("touch", [](ContactSensorCfg& c) {
@@ -15,4 +15,4 @@ SensorCfgs contact_examples() {
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/imu/imu_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs imu_examples() {
   return {example<ImuSensorCfg>("imu", [](ImuSensorCfg& c) {
@@ -13,4 +13,4 @@ SensorCfgs imu_examples() {
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

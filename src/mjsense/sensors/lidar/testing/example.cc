@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs lidar_examples() {
   return {example<LidarSensorCfg>("lidar", [](LidarSensorCfg& c) {
@@ -15,4 +15,4 @@ SensorCfgs lidar_examples() {
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs raycast_examples() {
   return {example<RayCastSensorCfg>("scan", [](RayCastSensorCfg& c) {
@@ -12,4 +12,4 @@ SensorCfgs raycast_examples() {
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors

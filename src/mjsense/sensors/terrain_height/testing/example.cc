@@ -3,7 +3,7 @@
 
 #include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
 
-namespace mjsense {
+namespace mjsense::sensors {
 
 SensorCfgs terrain_height_examples() {
   return {example<TerrainHeightSensorCfg>("height", [](TerrainHeightSensorCfg& c) {
@@ -11,4 +11,4 @@ SensorCfgs terrain_height_examples() {
   })};
 }
 
-}  // namespace mjsense
+}  // namespace mjsense::sensors
