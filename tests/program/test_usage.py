@@ -341,5 +341,5 @@ def test_physics_that_fails_prints_no_table(mjsense):
 
 
 def test_record_reports_the_contact_sheet(mjsense):
-    text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "-q", "--out", "d").stdout
+    text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "--out", "d").stdout
     assert "contact sheet, every camera over time (4 of 5 episodes): d/contact_sheet.png" in text

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
-    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show progress.")
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
 
 

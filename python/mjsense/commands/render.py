@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--crf", type=int, metavar="N", help="Quality of the videos, from 0 (lossless) to 51 (worst); by default as recorded.")
     parser.add_argument("--preset", metavar="NAME", help="Speed preset of the video encoder; by default as recorded.")
     parser.add_argument("--resume", action="store_true", help="Continue an interrupted rendering.")
-    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show progress.")
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -85,5 +85,6 @@ def run(arguments: argparse.Namespace) -> int:
         sensors=(lambda: sensors_of(arguments.sensors)) if arguments.sensors else (),
         **{name: getattr(arguments, name) for name in same},
     )  # fmt: skip
-    print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
+    if not arguments.quiet:
+        print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
     return 0

@@ -136,7 +136,7 @@ class LiveViewer(Viewer):
         source, world = self._source, self._world
         if source.version != self._version:
             self._model_changed()
-        self._stage.set_poses(*source.poses(world))
+        self._stage.show(lambda name: source.field(name, world))
         if self._layer_used:
             self._draw()
         now = time.perf_counter()

@@ -160,7 +160,7 @@ class RecordingViewer(Viewer):
         t = self._shown = min(int(self._time.value), self._episode.length - 1)
         if self._model is not None:
             self._episode.set_state(self._model, self._data, t)
-            self._stage.set_poses(self._data.xpos, self._data.xquat)
+            self._stage.show(lambda name: getattr(self._data, name))
             if self._drawn:
                 self._draw()
         self._stale = True

@@ -74,10 +74,9 @@ class LiveSource:
         """The model with the values of one world."""
         return self.sim.model_of(world)
 
-    def poses(self, world: int) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [nbody, 3] and orientations [nbody, 4] of the bodies."""
-        data = self.sim.data
-        return data.xpos[world], data.xquat[world]
+    def field(self, name: str, world: int) -> np.ndarray:
+        """A field of MjData in a world."""
+        return getattr(self.sim.data, name)[world]
 
     def streams(self) -> dict[str, StreamInfo]:
         """Streams that can be drawn as curves, by name."""

@@ -97,7 +97,7 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   add_ray("--ray-pip", "NAMES",
           "With --ray: Python packages that workers install, separated by commas.");
   app.add_flag("--json", options.json, "Print the summary as JSON.");
-  app.add_flag("-q,--quiet", options.quiet, "Do not show progress.");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors.");
   add_examples(app, {{"mjsense record pick --episodes 8 --worlds 4 --out data",
                       "Record eight episodes of the task pick, four at a time."},
                      {"mjsense record open --scene kitchen:7 --robot rby1 --depth --out data",
