@@ -336,6 +336,15 @@ def test_recordings(recording, port):
             viewer.seek(t)
             took.append(time.perf_counter() - began)
         assert np.median(took) < 0.05
+        viewer.update()
+        plain = viewer._pictures._panels["exo_camera_1"].image
+        viewer._pictures._points_box.value = True
+        viewer._show()
+        viewer.update()
+        marked = viewer._pictures._panels["exo_camera_1"].image
+        points = viewer._image_points("exo_camera_1")
+        x, y = (points[np.isfinite(points).all(1)][0] * (48, 32)).astype(int)
+        assert points.shape == (20, 2) and tuple(marked[y, x]) == (255, 0, 255) and not np.array_equal(plain, marked)
         model, data = viewer._model, mujoco.MjData(viewer._model)
         viewer.seek(20)
         viewer._episode.set_state(model, data, 20)

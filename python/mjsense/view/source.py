@@ -15,6 +15,7 @@ from mjsense.simulation import Simulation
 from mjsense.vector import TaskVectorEnv
 from mjsense.view.camera import View, first_view
 from mjsense.view.curves import MAX_CURVES, StreamInfo
+from mjsense.view.pictures import point_streams
 from mjsense.view.poses import POSE, PoseStream
 
 _CONTACTS = "contacts"
@@ -106,6 +107,10 @@ class LiveSource:
             return own[world]
         sensor, _, field = name.rpartition("/")
         return self.sim.scene[sensor].fields[field][world]
+
+    def image_points(self, name: str, world: int) -> np.ndarray | None:
+        """Points on an image, as fractions [N, 2]; None: it never has any."""
+        return None
 
     def _user_rows(self) -> dict[str, tuple[Sensor, np.ndarray]]:
         """Rows of the sensors that are written in Python, as they were last computed."""
@@ -277,6 +282,10 @@ class TaskSource(LiveSource):
             if name in rows:
                 return rows[name]
         return super()._row(name)
+
+    def image_points(self, name: str, world: int) -> np.ndarray | None:
+        names = point_streams(name.split("/")[0], self._env.rows)
+        return np.concatenate([self._env.rows[one][world] for one in names]) if names else None
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()
