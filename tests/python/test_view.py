@@ -16,6 +16,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
+from mjsense._rotations import rotation_of
 from mjsense.view import curves, geometry, surfaces
 from mjsense.view.poses import PoseStream
 from scenes import BALL
@@ -433,6 +434,28 @@ def test_results_and_warnings_of_a_task(port):
         for _ in range(30):
             source.step()
         assert abs(source.value("qpos/arm", 0)[0] - 0.5) < 0.05
+
+
+@needs_viser
+def test_the_plan_is_where_the_tool_goes(port):
+    with mjs.view("pick", port=port, block=False, open_browser=False, cameras=[], seed=2) as viewer:
+        source = viewer._source
+        parts = source._env.planned_paths(0)
+        assert len(parts) > 3 and "grasp" in " ".join(phase for phase, _ in parts)
+        points = np.concatenate([points for _, points in parts])
+        assert np.abs(np.diff(points, axis=0)).max() < 0.1  # parts begin where the one before ends
+        assert np.linalg.norm(points - source._env.rows["grasp_pose"][0, :3], axis=1).min() < 1e-3
+        source.step()
+        base = source._env.rows["robot_base_pose"][0]
+        while not source.value("success", 0)[0]:
+            source.step()
+            tool = base[:3] + rotation_of(base[3:]) @ source._env.rows["tcp_pose"][0, :3]
+            assert np.linalg.norm(points - tool, axis=1).min() < 0.06
+            assert source.time(0) < 20
+        assert source.value("policy_num_retries", 0)[0] == 0
+        assert len(source.shapes(0, ["plan"]).of("line")) > 10
+    with pytest.raises(ValueError, match=r"world 1: must be in \[0, 1\)"):
+        mjs.make_vec("pick", num_envs=1, policy="planner", cameras=[]).planned_paths(1)
 
 
 # -------------------------------------------------------------------------------------------------------------------- browser

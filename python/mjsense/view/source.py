@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,8 @@ from mjsense.view.curves import MAX_CURVES, StreamInfo
 from mjsense.view.pictures import point_streams
 from mjsense.view.poses import POSE, PoseStream
 
-_CONTACTS = "contacts"
+_CONTACTS, _PLAN = "contacts", "plan"
+_PLAN_COLOURS = ((0.1, 0.5, 0.9, 1), (0.95, 0.6, 0.1, 1), (0.2, 0.7, 0.3, 1), (0.7, 0.3, 0.8, 1))  # of successive parts
 _CONTACT_COLOUR = (0.9, 0.3, 0.1, 1.0)
 
 
@@ -161,18 +163,22 @@ class LiveSource:
             except (ValueError, TypeError, RuntimeError):
                 continue  # this sensor never has anything to draw
             found.append(name)
-        return [*found, *self._pose_rows(), _CONTACTS]
+        return [*found, *self._pose_rows(), *([_PLAN] if self.policy is not None else []), _CONTACTS]
 
     def shapes(self, world: int, names: list[str]) -> DebugShapes:
         """The shapes of one world."""
         poses = self._pose_rows()
-        sensors = [name for name in names if name not in poses and name != _CONTACTS]
+        sensors = [name for name in names if name not in poses and name not in (_CONTACTS, _PLAN)]
         shapes = self.sim.debug_shapes(world, sensors) if sensors else DebugShapes(world, float(self.sim.model.stat.meansize))
         if poses:
             model, data = self.sim.model, self.sim.data
             for name in (name for name in names if name in poses):
                 frame, rows = poses[name]
                 PoseStream(name, frame).draw(shapes, rows[world], model, data.xpos[world], data.xmat[world])
+        if _PLAN in names:
+            for k, points in enumerate(self._planned(world)):
+                for start, end in pairwise(points):
+                    shapes.add_line(start, end, _PLAN_COLOURS[k % len(_PLAN_COLOURS)], 3.0)
         if _CONTACTS in names:
             for contact in self._contacts(world):
                 shapes.add_sphere(contact[:3], 0.05 * shapes.meansize, _CONTACT_COLOUR)
@@ -181,6 +187,10 @@ class LiveSource:
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {}
+
+    def _planned(self, world: int) -> list[np.ndarray]:
+        """Positions of the tool along each part of the policy's plan."""
+        return []
 
     def _contacts(self, world: int) -> np.ndarray:
         """Point and normal of each contact, float64 [n, 6]."""
@@ -290,6 +300,9 @@ class TaskSource(LiveSource):
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()
                 if spec.unit == POSE and PoseStream.can_draw(spec.frame)}  # fmt: skip
+
+    def _planned(self, world: int) -> list[np.ndarray]:
+        return [points for _, points in self._env.planned_paths(world)]
 
     def controls(self) -> list[Control]:
         space: Any = self._env.single_action_space
