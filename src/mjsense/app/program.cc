@@ -23,6 +23,7 @@
 #include "mjsense/app/field_options.h"
 #include "mjsense/app/help.h"
 #include "mjsense/app/list_command.h"
+#include "mjsense/app/progress.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/app/scan_command.h"
 #include "mjsense/app/schema.h"
@@ -169,7 +170,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
 
 struct PathOptions {
   std::string path, sheet, ffmpeg;
-  bool json = false, decode = false;
+  bool json = false, decode = false, quiet = false;
 };
 
 CLI::App& add_path_command(CLI::App& program, const char* name, const char* help,
@@ -244,6 +245,7 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
   CLI::App& verify_app = add_path_command(
       program, "verify", "Check that a recording is complete and undamaged.", verify_options);
   verify_app.add_flag("--decode", verify_options.decode, "Decode every frame of the videos.");
+  verify_app.add_flag("-q,--quiet", verify_options.quiet, "Print nothing but errors.");
   verify_app.add_option("--ffmpeg", verify_options.ffmpeg, "Path of the ffmpeg program.")
       ->type_name("PATH");
   CLI::App& repair_app = add_path_command(
@@ -364,9 +366,15 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     return 0;
   }
   if (verify_app.parsed()) {
-    const VerifyResult result =
-        verify(existing(verify_options.path), {verify_options.decode, verify_options.ffmpeg});
-    print(verify_options.json ? result.json() : result.text());
+    const VerifyResult result = [&] {
+      StatusLine line(verify_options.quiet);
+      return verify(existing(verify_options.path),
+                    {.decode = verify_options.decode,
+                     .ffmpeg = verify_options.ffmpeg,
+                     .progress = [&](const std::string& text) { line.show(text); }});
+    }();
+    if (!verify_options.quiet || verify_options.json || !result.ok())
+      print(verify_options.json ? result.json() : result.text());
     return result.ok() ? 0 : kFailed;
   }
   const RepairResult result = repair(existing(repair_options.path));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -276,7 +277,11 @@ class Verifier {
 
   VerifyResult run(const fs::path& path) {
     listed_ = recorded_files(path);
-    for (const RecordedFile& file : listed_) check_file(file);
+    for (std::size_t i = 0; i < listed_.size(); ++i) {
+      check_file(listed_[i]);
+      if (options_.progress)
+        options_.progress(fmt::format("{} of {} files", i + 1, listed_.size()));
+    }
     check_videos();
     for (const auto& [folder, name] : archives_) check_archive(folder, name);
     for (const fs::path& house : recorded_houses(path)) {
@@ -362,8 +367,15 @@ class Verifier {
     result_.videos = static_cast<int>(videos_.size());
     std::vector<std::string> wrong(videos_.size());
     ThreadPool pool(0);
-    pool.run(static_cast<int>(videos_.size()),
-             [&](int i, int) { wrong[i] = check_video(videos_[i]); });
+    std::mutex counting;
+    int done = 0;
+    pool.run(static_cast<int>(videos_.size()), [&](int i, int) {
+      wrong[i] = check_video(videos_[i]);
+      const std::scoped_lock lock(counting);
+      ++done;
+      if (options_.progress)
+        options_.progress(fmt::format("{} of {} videos", done, videos_.size()));
+    });
     for (std::size_t i = 0; i < videos_.size(); ++i) {
       if (!wrong[i].empty()) error(videos_[i].context, wrong[i]);
     }
