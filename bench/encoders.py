@@ -19,7 +19,7 @@ import tempfile
 from harness import Row, program, report
 
 RUNS = 5
-OURS = ("-c:v", "libx264", "-preset", "veryfast", "-crf", "25", "-bf", "0", "-g", "20")
+OURS = ("-c:v", "libx264", "-preset", "veryfast", "-crf", "25", "-bf", "0", "-g", "20", "-tune", "fastdecode")
 OTHERS = {
     "libx264, superfast, crf 28": ("-c:v", "libx264", "-preset", "superfast", "-crf", "28"),
     "libx265, ultrafast, crf 18": ("-c:v", "libx265", "-preset", "ultrafast", "-crf", "18", "-x265-params", "pools=1:frame-threads=1"),

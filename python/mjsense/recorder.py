@@ -58,6 +58,7 @@ class Recorder(KnownAttributes):
         ffmpeg: str = "",
         crf: int = 25,
         preset: str = "veryfast",
+        tune: str = "fastdecode",
         keyint: int = 20,
         molmospaces_depth: bool = False,
         settings: Mapping[str, Any] | None = None,
@@ -80,6 +81,7 @@ class Recorder(KnownAttributes):
             ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
             crf: Quality of the videos, from 0 (lossless) to 51 (worst).
             preset: Speed preset of the video encoder, from ultrafast to veryslow.
+            tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a seventh larger.
             keyint: Maximum number of frames between key frames.
             molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read.
             settings: Settings that produced the data, as JSON. They are stored in every file and must be equal when a recording
@@ -89,7 +91,7 @@ class Recorder(KnownAttributes):
         rate = _rate(fps, simulation)
         options = {
             "episodes": episodes, "resume": resume, "append": append, "overwrite": overwrite, "house": house, "batches": batches, "gzip": gzip, "ffmpeg": ffmpeg, "crf": crf,
-            "preset": preset, "keyint": keyint, "molmospaces_depth": molmospaces_depth,
+            "preset": preset, "tune": tune, "keyint": keyint, "molmospaces_depth": molmospaces_depth,
         }  # fmt: skip
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
         self._core = _core.Recorder(

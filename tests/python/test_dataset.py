@@ -37,7 +37,7 @@ def dataset(root):
 def decoder(request, monkeypatch):
     if request.param == "av":
         pytest.importorskip("av")
-    monkeypatch.setattr(video, "_have_av", lambda: request.param == "av")
+    monkeypatch.setattr(video, "have_av", lambda: request.param == "av")
 
 
 def trajectories(root):
@@ -151,7 +151,7 @@ def test_every_frame_of_a_long_video(tmp_path, decoder, encoding):
     source = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=32x24:rate=500/33", "-frames:v", "400"]
     subprocess.run([*source, *codec, path], check=True)
     expected = decode(path, "rgb24", (24, 32, 3)) if rgb else decode(path, "gray16le", (24, 32)) * np.float32(0.0002)
-    reader = video.FrameReader(Cache(150_000))
+    reader = video.FrameReader(Cache(150_000), Cache(150_000))
     frames = mjs.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
     for t in [*np.random.default_rng(0).permutation(400)[:16], 89, 90, 88, 179, 180, 399, 0, *range(200, 212)]:
         np.testing.assert_array_equal(frames[int(t)], expected[t], err_msg=str(t))

@@ -134,10 +134,10 @@ class Dataset:
             rows, single = self._rows(name, episode, t)
             values = episode._large_rows(name, rows if isinstance(rows, list) else [rows])
             sample[name] = values[0] if single else values
-        for name in self._videos:
-            rows, single = self._rows(name, episode, t)
-            video = episode.video(name)
-            sample[name] = video[rows] if single else np.stack([video[r] for r in rows])
+        if self._videos:
+            places = [self._rows(name, episode, t) for name in self._videos]
+            frames = episode._frames(self._videos, [[rows] if single else rows for rows, single in places])
+            sample |= {name: images[0] if single else np.stack(images) for name, images, (_, single) in zip(self._videos, frames, places)}
         for name, steps in self._windows.items():
             if not _is_mask(name):
                 sample[f"{name}_is_pad"] = np.array([not 0 <= t + step < episode.length for step in steps])

@@ -87,7 +87,7 @@ class Store:
     def __init__(self, recordings: list[dict[str, Any]], cache_bytes: int) -> None:
         self.recordings = recordings
         self.rows = Cache(cache_bytes // 2)
-        self.frames = FrameReader(Cache(cache_bytes // 2))
+        self.frames = FrameReader(Cache(cache_bytes // 2), self.rows)
         self.models = Cache(4)  # one unit per model
         self.leaves: set[str] | None = None
         """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
@@ -214,14 +214,21 @@ class Episode:
 
     def video(self, camera: str) -> Video:
         """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
+        return Video(self._video(camera), self._store.frames)
+
+    # The next functions are for this package.
+
+    def _video(self, camera: str) -> VideoInfo:
         videos = self._store.rows.get((self.index, "videos"), self._find_videos)
         info = videos.get(camera if camera.startswith(VIDEOS) else VIDEOS + camera)
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
             raise UnknownNameError(f"Episode {self.index} has no video '{camera}'; it has {cameras or 'no videos'}")
-        return Video(info, self._store.frames)
+        return info
 
-    # The next functions are for this package.
+    def _frames(self, cameras: list[str], rows: list[list[int]]) -> list[list[np.ndarray]]:
+        """Images of each camera at its rows."""
+        return self._store.frames.frames([(self._video(camera), at) for camera, at in zip(cameras, rows)])
 
     @property
     def _recording(self) -> dict[str, Any]:

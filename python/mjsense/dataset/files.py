@@ -23,6 +23,12 @@ def open_h5(path: Path) -> Any:
     return h5py.File(path, "r")
 
 
+def video_options(recording: dict[str, Any]) -> dict[str, Any]:
+    """The recorder's options that give equal videos of equal images. Recordings of older versions have no tuning."""
+    about = {"tune": "", **recording["video"]} if "video" in recording else {}
+    return {"encoder_threads" if key == "threads" else key: value for key, value in about.items()}
+
+
 def text_of(value: Any) -> str:
     """A text attribute or a text dataset's value; a row of bytes ends at the first 0."""
     if isinstance(value, str):

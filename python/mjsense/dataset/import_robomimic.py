@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
+import hashlib
 import io
 import json
 import zipfile
@@ -128,7 +129,7 @@ def _archive(path: Path, demo: Any, assets: str | Path | None) -> tuple[str, byt
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in {"model.xml": ElementTree.tostring(tree), **dict(sorted(files.items()))}.items():
             archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
-    return f"model_{zlib.crc32(buffer.getvalue()):08x}.zip", buffer.getvalue()
+    return f"model_{hashlib.sha256(buffer.getvalue()).hexdigest()[:12]}.zip", buffer.getvalue()
 
 
 def _leaves(group: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:

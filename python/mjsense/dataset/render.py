@@ -21,7 +21,7 @@ from mjsense.core_sensors import CoreSensor
 from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.files import open_h5
+from mjsense.dataset.files import open_h5, video_options
 from mjsense.dataset.playback import archive_of, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
@@ -129,7 +129,7 @@ class _House:
         description = first._recording
         files = FILE_OPTIONS | {"episodes": len(episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
                  "gzip": description.get("gzip", 4)}  # fmt: skip
-        video = {"encoder_threads" if key == "threads" else key: value for key, value in description.get("video", {}).items()}
+        video = video_options(description)
         video |= {key: options[key] for key in ("crf", "preset") if options[key] is not None}
         archive = archive_of(first)
         files["archive"] = archive.name, archive.read_bytes()

@@ -14,6 +14,7 @@
 #include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/recording_lock.h"
+#include "mjsense/record/sha256.h"
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/recording_tools.h"
@@ -343,16 +344,21 @@ class Verifier {
     }
   }
 
-  // The name of a model archive contains the checksum of its bytes: model_1a2b3c4d.zip.
+  // The name of a model archive contains the start of its SHA-256, model_1a2b3c4d5e6f.zip, and in
+  // earlier recordings its CRC-32, model_1a2b3c4d.zip.
   void check_archive(const fs::path& folder, const std::string& name) {
     const std::string context = folder.filename().string();
     if (!is_plain_name(name))
       return error(context,
                    fmt::format("names a model archive '{}', which is not a plain file name", name));
     try {
-      const std::string crc = checksum_of(open_plain(folder, name).get());
-      if (name != fmt::format("model_{}.zip", crc))
-        error(context, fmt::format("'{}' is damaged: its checksum is {}", name, crc));
+      const Fd file = open_plain(folder, name);
+      const std::string crc = fmt::format("model_{}.zip", checksum_of(file.get()));
+      const std::string expected =
+          name.size() == crc.size() ? crc : archive_name(sha256_of(file.get()));
+      if (name != expected)
+        error(context,
+              fmt::format("'{}' is damaged: its checksum is that of '{}'", name, expected));
     } catch (const Error& e) {
       error(context, fmt::format("the model archive, which replay needs: {}", e.what()));
     }
