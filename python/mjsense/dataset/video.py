@@ -18,7 +18,7 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.dataset.cache import Cache
-from mjsense.dataset.video_decoder import Decoder, Packets, have_av
+from mjsense.dataset.video_decoder import Decoder, Packets, have_av, to_array
 from mjsense.ffmpeg import use_installed_ffmpeg
 
 _CHUNK = 64  # frames that one start of ffmpeg decodes; a start costs as much as about 50 frames of 640x368
@@ -89,9 +89,7 @@ class _Job:
         return [self._image(self.found[t]) for t in self.indices]
 
     def _image(self, frame: Any) -> np.ndarray:
-        # One thread: with more, a frame keeps the converter's threads, and its copy in a forked process waits for them forever.
-        pixels = frame if isinstance(frame, np.ndarray) else frame.to_ndarray(format=self.info.pixel_format, threads=1)
-        return decoded(self.info, pixels)
+        return decoded(self.info, frame if isinstance(frame, np.ndarray) else to_array(frame, self.info.pixel_format))
 
 
 def _no_frame(info: VideoInfo, index: int) -> Exception:
@@ -121,8 +119,9 @@ class FrameReader:
             else:
                 results = [job.run() for job in jobs]
             for job in work:
+                size = sum(plane.buffer_size for plane in job.new[0][1].planes)
                 for number, frame in job.new:
-                    self._cache.add((job.info.path, number), frame, sum(plane.buffer_size for plane in frame.planes))
+                    self._cache.add((job.info.path, number), frame, size)
         return results
 
     def _job(self, info: VideoInfo, indices: list[int]) -> _Job:

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import threading
 from bisect import bisect_right
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 _FLUSH = 1 << 62  # as the newest frame: every frame is before it, so the next call begins at a key frame
 
@@ -17,6 +20,20 @@ def have_av() -> bool:
     except ImportError:
         return False
     return int(av.__version__.split(".")[0]) >= 18  # to_ndarray(threads=...)
+
+
+_converters = threading.local()
+
+
+def to_array(frame: Any, pixel_format: str) -> np.ndarray:
+    """The pixels of a decoded frame."""
+    import av  # pyright: ignore[reportMissingImports]
+
+    # A converter takes 0.1 ms to create, as long as it needs for an image of 300 x 300 pixels, so each thread keeps one for each size.
+    key = str((frame.width, frame.height, frame.format.name, pixel_format))
+    converter = vars(_converters).get(key) or vars(_converters).setdefault(key, av.video.reformatter.VideoReformatter())
+    # One thread: a copy of a converter in a forked process would wait for the others forever.
+    return converter.reformat(frame, format=pixel_format, threads=1).to_ndarray()
 
 
 class Packets:
