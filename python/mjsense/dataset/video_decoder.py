@@ -27,11 +27,11 @@ _converters = threading.local()
 
 def to_array(frame: Any, pixel_format: str) -> np.ndarray:
     """The pixels of a decoded frame."""
-    import av  # pyright: ignore[reportMissingImports]
+    from av.video.reformatter import VideoReformatter  # pyright: ignore[reportMissingImports]
 
     # A converter takes 0.1 ms to create, as long as it needs for an image of 300 x 300 pixels, so each thread keeps one for each size.
     key = str((frame.width, frame.height, frame.format.name, pixel_format))
-    converter = vars(_converters).get(key) or vars(_converters).setdefault(key, av.video.reformatter.VideoReformatter())
+    converter = vars(_converters).get(key) or vars(_converters).setdefault(key, VideoReformatter())
     # One thread: a copy of a converter in a forked process would wait for the others forever.
     return converter.reformat(frame, format=pixel_format, threads=1).to_ndarray()
 
@@ -93,12 +93,13 @@ class Decoder:
     def __init__(self, packets: Packets) -> None:
         import av  # pyright: ignore[reportMissingImports]
 
-        self._packet = av.Packet
+        self._packet: Any = av.Packet
         self._packets = packets
-        context = self._context = av.CodecContext.create(packets.codec, "r")
+        context: Any = av.CodecContext.create(packets.codec, "r")
         context.extradata = packets.extradata
         context.width, context.height = packets.size
         context.thread_count = 1
+        self._context = context
         self._next = 0  # packet
         self._newest = -1  # frame
 
