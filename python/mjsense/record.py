@@ -173,8 +173,8 @@ def record(
         ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
         crf: Quality of the videos, from 0 (lossless) to 51 (worst).
         preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
-        tune: x264's tuning for a purpose, or empty. ``fastdecode`` halves the time of reading and makes files a seventh
-            larger.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
         keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
