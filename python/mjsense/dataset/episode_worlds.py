@@ -25,7 +25,7 @@ _LIGHT = ("light_ambient", "light_diffuse", "light_specular")
 # Elements that sensors and edits may add to the archived model, which renumbers the others.
 _RENUMBERED = {"cam": (_mujoco.Obj.CAMERA, "ncam"), "light": (_mujoco.Obj.LIGHT, "nlight"), "site": (_mujoco.Obj.SITE, "nsite")}
 
-_PARTS = "time qpos qvel act qacc_warmstart ctrl qfrc_applied xfrc_applied eq_active mocap_pos mocap_quat userdata".split()
+_PARTS = ["time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "userdata"]
 
 
 def _model_fields(episode: Episode) -> dict[str, np.ndarray]:

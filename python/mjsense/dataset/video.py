@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -115,7 +115,9 @@ class FrameReader:
             work = [job for job in jobs if job.missing]
             if len(work) > 1 and work[0].info.width * work[0].info.height >= _LARGE_IMAGE and _threads() > 1:
                 pool = self._pools.get("pool", lambda: (ThreadPoolExecutor(_threads()), 1))
-                results = list(pool.map(_Job.run, jobs))
+                futures = [pool.submit(job.run) for job in jobs]
+                wait(futures)  # also if one fails: no decoder is in use after this call
+                results = [future.result() for future in futures]
             else:
                 results = [job.run() for job in jobs]
             for job in work:
@@ -128,9 +130,12 @@ class FrameReader:
         found = {t: self._cache.find((info.path, t)) for t in indices}
         missing = sorted(t for t, frame in found.items() if frame is None)
         if missing and not self._av:
-            found |= {t: self._decode_program(info, t) for t in missing}
+            for t in missing:  # one call decodes many frames
+                frame = self._cache.find((info.path, t))
+                found[t] = self._decode_program(info, t) if frame is None else frame
             missing = []
-        return _Job(info, indices, found, missing, self._decoders.get(info.path, lambda: (Decoder(self._packets(info)), 1)) if missing else None)
+        decoder = self._decoders.get(info.path, lambda: (Decoder(self._packets(info)), 1)) if missing else None
+        return _Job(info, indices, found, missing, decoder)
 
     def _packets(self, info: VideoInfo) -> Packets:
         def read() -> tuple[Packets, int]:
