@@ -11,6 +11,7 @@ from itertools import pairwise
 from mjsense import _core, commands
 from mjsense.assets import use_installed_meshes
 from mjsense.cluster import program as cluster
+from mjsense.cluster import tools
 from mjsense.ffmpeg import use_installed_ffmpeg
 
 
@@ -25,6 +26,8 @@ def main() -> int:
     if cluster.is_wanted(words):
         signal.signal(signal.SIGINT, signal.default_int_handler)
         return cluster.run(words)
+    if tools.path_of(words) is not None:
+        return tools.run(words)
     if words[:2] == ["complete", "--"] and len(words) > 3 and words[2] in commands.COMMANDS:
         print(*commands.completions(words[2:]), sep="\n")
         return 0

@@ -5,16 +5,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mjsense.dataset.remote import open_address
+
 
 class Storage:
     """Files by their paths relative to the root."""
 
     def __init__(self, root: str) -> None:
-        try:
-            from fsspec.core import url_to_fs  # pyright: ignore[reportMissingImports]
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(f"Recording with Ray needs fsspec: pip install 'mjsense[ray]' ({error})", name=error.name) from error
-        self._fs, self._root = url_to_fs(root)
+        self._fs, self._root = open_address(root)
 
     def _path(self, path: str) -> str:
         return f"{self._root}/{path}"
@@ -32,6 +30,14 @@ class Storage:
             return self._fs.cat_file(self._path(path))
         except FileNotFoundError:
             return None
+
+    def exists(self, path: str) -> bool:
+        """Whether there is such a file."""
+        return self._fs.exists(self._path(path))
+
+    def remove(self, path: str) -> None:
+        """Removes a file."""
+        self._fs.rm_file(self._path(path))
 
     def find(self, pattern: str) -> list[str]:
         """Paths that match a glob pattern."""

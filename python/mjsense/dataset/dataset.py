@@ -20,6 +20,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
 from mjsense.dataset.files import entries_of
+from mjsense.dataset.remote import resolved
 from mjsense.errors import UnknownNameError
 
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
@@ -34,7 +35,8 @@ class Dataset:
     workers, forked or spawned. Row t of ``actions/*`` is the action that led to observation t.
 
     Args:
-        root: Output directory of a recording or of its shards, one of the ``house_N`` folders, or one HDF5 file.
+        root: Output directory of a recording or of its shards, its ``index.parquet``, one of the ``house_N`` folders, one HDF5 file, or an
+            address that fsspec reads (``s3://bucket/pick``).
         episodes: Positions of episodes in the recording; by default all.
         delta_timestamps: Windows: seconds relative to the observation, by stream or group. The stream becomes ``[n, ...]``, and
             ``{stream}_is_pad`` says which entries lie outside the episode; those repeat its first or last row.
@@ -60,9 +62,9 @@ class Dataset:
         tolerance_s: float = 1e-4,
         cache_mb: float = 512,
     ) -> None:
-        self.root = Path(root)
-        """The folder or file."""
-        entries, recordings = entries_of(self.root)
+        self.root, source = resolved(root)
+        """The folder or file; of an address, its copy on this machine."""
+        entries, recordings = entries_of(self.root, source)
         store = Store(recordings, int(cache_mb * 1e6))
         chosen = [Episode(entry, i, store) for i, entry in enumerate(entries)]
         if episodes is not None:

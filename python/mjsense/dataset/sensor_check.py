@@ -240,9 +240,9 @@ def _compare(recorded: Episode, replayed: Episode, worlds: Any, otherwise: str) 
 
 def check_sensors(episodes: list[Episode], *, worlds: int = 4, threads: int = 0) -> Iterator[tuple[Episode, SensorCheck]]:
     """Yields the comparison of every episode."""
-    houses: dict[Path, list[Episode]] = {}
+    houses: dict[str, list[Episode]] = {}
     for episode in episodes:
-        houses.setdefault(episode.path.parent, []).append(episode)
+        houses.setdefault(episode.path.parent.name, []).append(episode)
     use_installed_ffmpeg()
     for chosen in houses.values():
         playing, otherwise = _worlds_of(chosen[0], min(worlds, len(chosen)), threads)
