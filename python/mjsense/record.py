@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -115,6 +116,9 @@ def record(
     molmospaces_depth: bool = False,
     # end of options
     sensors: Iterable[Any] = (),
+    format: Literal["mjsense", "lerobot"] = "mjsense",
+    map: Any = None,
+    keep_recording: bool = False,
     progress: bool | Callable[[RecordProgress], None] | None = None,
 ) -> RecordSummary:
     """Records episodes of a task as HDF5 and MP4 files in ``out/house_<house>/``.
@@ -180,17 +184,37 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
+        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` with
+            ``statistics_frames="key"`` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
+        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
+            data set is complete.
         progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
             True where stderr is a terminal or a notebook.
     """
     options = dict(locals())
-    del options["sensors"], options["progress"]
-    options["out"] = str(out)
+    for name in ("sensors", "progress", "format", "map", "keep_recording"):
+        del options[name]
+    if format == "mjsense":
+        if map is not None or keep_recording:
+            raise ValueError("record: map and keep_recording are options of format='lerobot'")
+        return _record(options, sensors, progress)
+    if shard or append or overwrite:
+        raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
+    # Formats are modules of a folder that this one may not import; they are found by name, as `mjsense export` finds them.
+    module = importlib.import_module(f"mjsense.export.record_{format}")
+    with module.converted(out, resume=resume, map=map, keep_recording=keep_recording) as folder:
+        summary = _record({**options, "out": folder}, sensors, progress)
+    return replace(summary, path=Path(out))
+
+
+def _record(options: dict[str, Any], sensors: Iterable[Any], progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
+    options["out"] = str(options["out"])
     objects = parts_of(options, sensors)
     line = ProgressLine() if progress is True or (progress is None and interactive()) else None
     show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
     report = None if show is None else lambda p: show(RecordProgress(**p))
-    if meshes == "real":
+    if options["meshes"] == "real":
         use_installed_meshes()
     use_installed_ffmpeg()
     made = _core.record(options, report, objects, Simulation._of)

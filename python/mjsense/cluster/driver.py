@@ -128,6 +128,8 @@ def record_on_ray(
         raise ModuleNotFoundError(f"Recording on a cluster needs Ray: pip install 'mjsense[ray]' ({error})", name=error.name) from error
     if episodes < 1 or shard_attempts < 1:
         raise ValueError(f"episodes is {episodes} and shard_attempts is {shard_attempts}: both must be at least 1")
+    if (job.arguments or {}).get("format", "mjsense") != "mjsense":
+        raise ValueError("record: format cannot be combined with a recording on Ray; export its index afterwards")
     _check_pickle(job)
     storage, fingerprint = Storage(job.out), job.fingerprint()
     _claim(storage, job, shard_attempts, resume)

@@ -20,7 +20,7 @@ from mjsense import _core
 from mjsense.cluster.storage import Storage
 
 _FREE = {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite", "ffmpeg",
-         "batches", "out", "progress", "sensors"}  # fmt: skip
+         "batches", "out", "progress", "sensors", "format", "map", "keep_recording"}  # fmt: skip
 """Arguments of ``record`` that do not change the episodes, or that the driver sets."""
 
 

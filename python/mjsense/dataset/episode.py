@@ -89,6 +89,8 @@ class Store:
         self.rows = Cache(cache_bytes // 2)
         self.frames = FrameReader(Cache(cache_bytes // 2))
         self.models = Cache(4)  # one unit per model
+        self.known: dict[int, dict[str, Stream | None]] = {}
+        """Arrays of each recording by their places in a trajectory; None: no stream."""
         self.leaves: set[str] | None = None
         """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
 
@@ -251,19 +253,30 @@ class Episode:
     def _find_streams(self) -> tuple[dict[str, Stream], int]:
         streams: dict[str, Stream] = {}
         videos = self._store.rows.get((self.index, "videos"), self._find_videos)
+        # Opening a dataset takes most of the time. Arrays have the same type and attributes in all episodes of a recording.
+        known = self._store.known.setdefault(self._entry.recording, {})
 
-        def visit(name: str, dataset: Any) -> None:
-            if not hasattr(dataset, "dtype") or name in ("obs_scene", REPLAY + "held") or name.startswith(REPLAY + "model/"):
+        def visit(place: str) -> None:
+            if place not in known:
+                add(place)
+            elif (stream := known[place]) is not None:
+                streams[stream.name] = stream
+
+        def add(place: str) -> None:
+            dataset = trajectory[place]
+            if not hasattr(dataset, "dtype") or place in ("obs_scene", REPLAY + "held") or place.startswith(REPLAY + "model/"):
+                known[place] = None
                 return
             about = {key: text_of(dataset.attrs.get(key, "")) for key in ("unit", "frame", "description")}
-            name = name.removeprefix(NUMBERS)
+            name = place.removeprefix(NUMBERS)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
                     dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
                     streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
             elif _is_json(dataset):
-                if NUMBERS + name in file[self.trajectory]:
+                if NUMBERS + name in trajectory:
+                    known[place] = None
                     return
                 for leaf, values in self._decode(name, dataset).items():
                     unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
@@ -271,10 +284,12 @@ class Episode:
                     if mask := given_name(leaf):
                         streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
             else:
-                streams[name] = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
+                stream = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
+                streams[name] = known[place] = stream
 
         with open_h5(self.path) as file:
-            file[self.trajectory].visititems(visit)
+            trajectory = file[self.trajectory]
+            trajectory.visit(visit)
         return dict(sorted(streams.items())), 500 * len(streams)
 
     def _decode(self, place: str, dataset: Any) -> dict[str, np.ndarray]:

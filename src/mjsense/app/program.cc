@@ -79,23 +79,35 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
       ->type_name("FILE");
   app.add_flag_callback(
       "--no-sheet", [&options] { options.sheet = false; }, "Do not write a contact sheet.");
-  // Options of the Python package (mjsense/cluster), which handles a command with --ray itself.
-  const auto add_ray = [&](const char* name, const char* type, const char* help) {
+  // Options of the Python package, which handles a command with --ray or --format itself.
+  const auto add_python = [&](const char* name, const char* type, const char* help) {
     app.add_option_function<std::string>(
            name,
            [name](const std::string&) {
              throw ValueError(fmt::format(
-                 "{} needs the Python package and --ray: run python -m mjsense record", name));
+                 "{} needs the Python package, and --ray or --format: run python -m mjsense record",
+                 name));
            },
            help)
         ->type_name(type);
   };
-  add_ray("--ray", "ADDRESS",
-          "Record on a Ray cluster: local (the CPUs of this machine), auto, or its address.");
-  add_ray("--shard-attempts", "N", "With --ray: attempts of one task of the cluster; default 16.");
-  add_ray("--ray-working-dir", "DIR", "With --ray: directory with your code, sent to the workers.");
-  add_ray("--ray-pip", "NAMES",
-          "With --ray: Python packages that workers install, separated by commas.");
+  add_python("--ray", "ADDRESS",
+             "Record on a Ray cluster: local (the CPUs of this machine), auto, or its address.");
+  add_python("--shard-attempts", "N",
+             "With --ray: attempts of one task of the cluster; default 16.");
+  add_python("--ray-working-dir", "DIR",
+             "With --ray: directory with your code, sent to the workers.");
+  add_python("--ray-pip", "NAMES",
+             "With --ray: Python packages that workers install, separated by commas.");
+  add_python("--format", "FORMAT", "lerobot: write a LeRobot data set (v3.0) instead of HDF5.");
+  add_python("--map", "FILE", "With --format: TOML file that chooses features and cameras.");
+  app.add_flag_callback(
+      "--keep-recording",
+      [] {
+        throw ValueError(
+            "--keep-recording needs the Python package and --format: run python -m mjsense record");
+      },
+      "With --format: keep the recording itself too.");
   app.add_flag("--json", options.json, "Print the summary as JSON.");
   app.add_flag("-q,--quiet", options.quiet, "Do not show progress.");
   add_examples(app, {{"mjsense record pick --episodes 8 --worlds 4 --out data",
