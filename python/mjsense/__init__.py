@@ -25,7 +25,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
-                                 export_zarr; import_robomimic
+                                 export_zarr; import_lerobot, import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
@@ -79,6 +79,7 @@ from mjsense.dataset import (
     render,
     replay,
 )
+from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
@@ -130,7 +131,7 @@ __all__ = [
     "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
     "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
     "WorldState", "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
-    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations",
+    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_lerobot", "import_robomimic", "make", "make_vec", "observations",
     "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names",
     "view",
     "__version__",

@@ -43,7 +43,7 @@ def test_it_equals_an_exported_recording(exported, tmp_path):
     with pytest.raises(CompleteError):
         mjs.record("pick", out=tmp_path / "out", format="lerobot", resume=True, **ARGUMENTS)
     assert [path.name for path in tmp_path.iterdir()] == ["out"]  # without keep_recording
-    with pytest.raises(ValueError, match="append .*cannot be combined with format='lerobot'"):
+    with pytest.raises(ValueError, match=r"append .*cannot be combined with format='lerobot'"):
         mjs.record("pick", out=tmp_path / "more", format="lerobot", append=True, **ARGUMENTS)
 
 

@@ -254,7 +254,8 @@ class Writer:
         self._tasks: list[str] = []
         self._data, self._episodes = _Tables(path / "data"), _Tables(path / "meta/episodes")
         self._videos = {camera: _Videos(path / "videos" / image_key(camera), source.fps) for camera in source.cameras}
-        self._statistics, self._statistics_frames = Statistics(), statistics_frames
+        self._statistics = Statistics()
+        self._statistics_frames: int | Literal["key"] = statistics_frames
         self._count = self._frames = 0
         self._codec: dict[str, Any] = {}
 

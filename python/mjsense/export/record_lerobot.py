@@ -49,7 +49,8 @@ def converted(out: str | Path, *, resume: bool = False, map: Any = None, keep_re
     """
     final = Path(out)
     folder, removed = (final.with_name(f"{final.name}{end}") for end in (".recording", ".removed"))
-    needs("av"), needs("pyarrow")
+    for module in ("av", "pyarrow"):
+        needs(module)
     shutil.rmtree(removed, ignore_errors=True)
     if final.is_dir() and any(final.iterdir()):
         if not resume:
