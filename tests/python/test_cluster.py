@@ -17,7 +17,7 @@ import pytest
 pytest.importorskip("ray", reason="Ray is not installed")
 h5py = pytest.importorskip("h5py")
 
-from mjsense.cluster import Job, record_on_ray
+from mjsense.cluster import Job, export_on_ray, record_on_ray, render_on_ray
 from mjsense.cluster import driver as driver_module
 
 import mjsense as mjs
@@ -58,6 +58,30 @@ def test_episodes_are_those_of_one_process(alone, tmp_path):
         record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=1, shard_attempts=ATTEMPTS)
     with pytest.raises(ValueError, match="contains a different recording: options"):
         record_on_ray(Job(str(tmp_path / "out"), {**ARGUMENTS, "seed": 6}), episodes=1, shard_attempts=ATTEMPTS, resume=True)
+
+
+def test_render_and_export_on_ray(tmp_path):
+    """Both equal what one process makes, from the index of a recording on Ray."""
+    data, ray = tmp_path / "data", pytest.importorskip("ray")
+    pytest.importorskip("av")
+    options = {"width": 48, "height": 32, "cameras": ["wrist_camera"]}
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
+    try:
+        record_on_ray(Job(str(data), ARGUMENTS), episodes=5, shard_attempts=2)
+        summary = render_on_ray(data, tmp_path / "rendered", shard_episodes=2, **options)
+        assert summary.enough and summary.kept == 5
+        mjs.render(data, tmp_path / "alone", **options)
+        assert content(tmp_path / "rendered") == content(tmp_path / "alone")
+        with pytest.raises(ValueError, match="contains a different recording: options"):
+            render_on_ray(data, tmp_path / "rendered", shard_episodes=2, resume=True, **{**options, "width": 64})
+        for format, export in (("lerobot", mjs.export_lerobot), ("lerobot21", mjs.export_lerobot21)):
+            made = [export_on_ray(format, data / "index.parquet", tmp_path / f"{format}_ray"), export(data, tmp_path / format)]
+            files = [{str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file()} for out in made]
+            assert files[0] == files[1]
+        with pytest.raises(ValueError, match="zarr is written by one process"):
+            export_on_ray("zarr", data, tmp_path / "zarr")
+    finally:
+        ray.shutdown()
 
 
 def test_killed_workers(alone, tmp_path):

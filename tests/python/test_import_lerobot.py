@@ -62,11 +62,11 @@ def test_errors(made, tmp_path, capsys):
         mjs.import_lerobot(made / "out", tmp_path / "a", scene=tmp_path / "scene.xml")
     with pytest.raises(ValueError, match=r"names 1 joints, but observation.state has 7 numbers"):
         mjs.import_lerobot(made / "out", tmp_path / "a", scene=tmp_path / "scene.xml", joints=["arm_9"])
-    with pytest.raises(FileNotFoundError, match="is no LeRobot data set"):
+    with pytest.raises(FileNotFoundError, match="is not a LeRobot data set"):
         mjs.import_lerobot(made / "data", tmp_path / "a")
     (tmp_path / "old/meta").mkdir(parents=True)
     (tmp_path / "old/meta/info.json").write_text(json.dumps({"codebase_version": "v2.1"}))
     with pytest.raises(ValueError, match=r"has the version 'v2.1', expected v3.0"):
         mjs.import_lerobot(tmp_path / "old", tmp_path / "a")
     assert commands.run(["import", "robomimic", "x.hdf5", "a", "--scene", "x.xml"]) == 2
-    assert "--scene is no option of the format robomimic" in capsys.readouterr().err
+    assert "--scene is not an option of the format robomimic" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from typing import Any
 from mjsense.cluster.index import write_index
 from mjsense.cluster.job import Job, Shard, ShardResult, run_shard
 from mjsense.cluster.storage import Storage
+from mjsense.cluster.tasks import check_pickle, cluster, running
 
 
 @dataclass(frozen=True)
@@ -73,9 +74,9 @@ class _Results:
         }  # fmt: skip
 
 
-def _claim(storage: Storage, job: Job, shard_attempts: int, resume: bool) -> None:
+def _claim(storage: Storage, job: Any, more: dict[str, Any], resume: bool) -> None:
     """Writes what the directory contains, or compares it with what it contains already."""
-    ours = {**job.settings(), "shard_attempts": shard_attempts}
+    ours = {**job.settings(), **more}
     found = storage.read("job.json")
     if found is None:
         return storage.write("job.json", json.dumps(ours, indent=1, sort_keys=True).encode())
@@ -122,67 +123,54 @@ def record_on_ray(
         TypeError: An argument of the job cannot be sent to the workers.
         ModuleNotFoundError: Ray, fsspec or pyarrow is not installed.
     """
-    try:
-        import ray  # pyright: ignore[reportMissingImports]
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"Recording on a cluster needs Ray: pip install 'mjsense[ray]' ({error})", name=error.name) from error
     if episodes < 1 or shard_attempts < 1:
         raise ValueError(f"episodes is {episodes} and shard_attempts is {shard_attempts}: both must be at least 1")
     if (job.arguments or {}).get("format", "mjsense") != "mjsense":
         raise ValueError("record: format cannot be combined with a recording on Ray; export its index afterwards")
-    _check_pickle(job)
-    storage, fingerprint = Storage(job.out), job.fingerprint()
-    _claim(storage, job, shard_attempts, resume)
-    results = _Results(storage, fingerprint)
+    check_pickle("record", job.arguments)
     attempts = max_attempts or 6 * episodes
     shards = [Shard(n, n * shard_attempts, min(shard_attempts, attempts - n * shard_attempts)) for n in range(math.ceil(attempts / shard_attempts))]
+    return run_job(job, shards, episodes, {"shard_attempts": shard_attempts}, address, resume, runtime_env, progress)
 
-    started_here = not ray.is_initialized()
-    if started_here:
-        options: dict[str, Any] = {"log_to_driver": False, "runtime_env": runtime_env, "logging_level": "ERROR"}
-        ray.init(**options, include_dashboard=False) if address == "local" else ray.init(address=address, **options)
-    began, running = time.perf_counter(), {}
+
+def run_job(
+    job: Any, shards: list[Shard], episodes: int, more: dict[str, Any], address: str, resume: bool, runtime_env: dict[str, Any] | None,
+    progress: Callable[[ClusterProgress], None] | None,
+) -> ClusterSummary:  # fmt: skip
+    """Runs the shards of a job until ``episodes`` are there without a gap, and writes the index.
+
+    Args:
+        job: A :class:`Job`, or an object with its attributes ``out``, ``arguments``, ``settings``, ``fingerprint`` and ``record``.
+        more: Settings of the division into shards.
+    """
+    storage, fingerprint = Storage(job.out), job.fingerprint()
+    _claim(storage, job, more, resume)
+    results = _Results(storage, fingerprint)
+    began = time.perf_counter()
+    workers = 0
 
     def report() -> dict[str, Any]:
-        now = results.progress(episodes, len(running), time.perf_counter() - began)
+        now = results.progress(episodes, workers, time.perf_counter() - began)
         if progress is not None:
             progress(ClusterProgress(**now))
         return now
 
-    try:
-        task = ray.remote(num_cpus=1, max_retries=-1)(run_shard)
-        waiting = [shard for shard in shards if shard.number not in results.done]
-        while report()["kept"] < episodes and (waiting or running):
-            slots = max(1, int(ray.cluster_resources().get("CPU", 1)))
-            while waiting and len(running) < slots + 1:  # one more, so that no worker waits for the driver
-                shard = waiting.pop(0)
-                running[task.remote(job, shard, fingerprint)] = shard
-            for ref in ray.wait(list(running), timeout=1.0)[0]:
-                shard = running.pop(ref)
-                try:
-                    results.done[shard.number] = ray.get(ref)
-                except ray.exceptions.RayTaskError as error:
-                    raise (error.cause if isinstance(error.cause, Exception) else error) from None
+    with cluster(address, runtime_env) as ray:
+        began = time.perf_counter()
+        waiting = ((job, shard, fingerprint) for shard in shards if shard.number not in results.done)
+        with running(ray, run_shard, waiting) as tasks:
+            while report()["kept"] < episodes:
+                done = tasks.wait()
+                workers = tasks.count
+                for (_, shard, _), result in done:
+                    results.done[shard.number] = result
+                if not done and not workers:
+                    break
+        workers = 0
         final = report()
-    finally:
-        for ref in running:
-            ray.cancel(ref, force=True)
-        if started_here:
-            ray.shutdown()
     write_index(storage, results.without_gap(), episodes)
     failures: dict[str, int] = {}
     for result in results.done.values():
         for reason, count in result.failures.items():
             failures[reason] = failures.get(reason, 0) + count
-    return ClusterSummary(**{**final, "workers": 0}, enough=final["kept"] >= episodes, failures=failures, out=job.out)
-
-
-def _check_pickle(job: Job) -> None:
-    """Raises TypeError that names the argument which cannot be sent to workers."""
-    from ray import cloudpickle  # pyright: ignore[reportMissingImports]
-
-    for name, value in (job.arguments or {}).items():
-        try:
-            cloudpickle.dumps(value)
-        except Exception as error:
-            raise TypeError(f"record: {name} cannot be sent to the workers: {error}. Pass the class or a function that creates it") from error
+    return ClusterSummary(**final, enough=final["kept"] >= episodes, failures=failures, out=job.out)

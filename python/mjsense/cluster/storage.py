@@ -44,9 +44,13 @@ class Storage:
         return [str(found)[len(self._root) + 1 :] for found in self._fs.glob(self._path(pattern))]
 
     def put_folder(self, local: Path, path: str) -> None:
-        """Copies a local folder. Files that are already there are replaced."""
+        """Copies a local folder. Files that are already there are replaced.
+
+        Args:
+            path: The folder's path; empty: the root.
+        """
         for file in sorted(local.rglob("*")):
             if file.is_file():
-                target = self._path(f"{path}/{file.relative_to(local)}")
+                target = self._path(f"{path}/{file.relative_to(local)}".lstrip("/"))
                 self._fs.makedirs(target.rsplit("/", 1)[0], exist_ok=True)
                 self._fs.put_file(str(file), target)

@@ -129,7 +129,7 @@ def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str
     """Rows of the index that differ from the files, and how."""
     found: list[tuple[int, str]] = []
     files: dict[str, dict[str, EpisodeEntry] | str] = {}
-    before = -1
+    before: dict[str, int] = {}
     for number, row in enumerate(rows):
         if row["path"] not in files:
             try:
@@ -145,9 +145,10 @@ def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str
             ours = row | {"number": row["episode"]}
             found += [(number, f"{name} is {ours[name]!r}, but {getattr(entry, name)!r} in {row['path']} {row['trajectory']}")
                       for name in _ATTRIBUTES if ours[name] != getattr(entry, name)]  # fmt: skip
-        if row["episode"] <= before:
-            found.append((number, f"episode {row['episode']} follows episode {before}: the order is wrong, or one is there twice"))
-        before = row["episode"]
+        house = Path(row["path"]).parent.name
+        if row["episode"] <= before.get(house, -1):
+            found.append((number, f"episode {row['episode']} follows episode {before[house]}: the order is wrong, or one is there twice"))
+        before[house] = row["episode"]
     return found
 
 

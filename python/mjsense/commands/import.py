@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = {"robomimic": ("fps", "assets"), "lerobot": ("scene", "joints")}
     others = [name for kind, names in options.items() for name in names if kind != arguments.format and getattr(arguments, name) is not None]
     if others:
-        raise ValueError(f"--{others[0]} is no option of the format {arguments.format}")
+        raise ValueError(f"--{others[0]} is not an option of the format {arguments.format}")
     given = {name: getattr(arguments, name) for name in ("episodes", *options[arguments.format])}
     if arguments.format == "robomimic":
         from mjsense.dataset.import_robomimic import import_robomimic

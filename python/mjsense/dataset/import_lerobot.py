@@ -58,7 +58,7 @@ def import_lerobot(
         ``out``.
 
     Raises:
-        FileNotFoundError: ``root`` is no data set, or ``scene`` names a file that does not exist.
+        FileNotFoundError: ``root`` is not a data set, or ``scene`` names a file that does not exist.
         ValueError: The data set has another version, or ``joints`` does not fit its state.
         UnknownNameError: The scene has no such joint.
     """
@@ -93,7 +93,7 @@ class _Source:
     def __init__(self, root: Path) -> None:
         self.root = root
         if not (root / "meta/info.json").exists():
-            raise FileNotFoundError(f"{root} is no LeRobot data set: it has no meta/info.json")
+            raise FileNotFoundError(f"{root} is not a LeRobot data set: it has no meta/info.json")
         self.info: dict[str, Any] = json.loads((root / "meta/info.json").read_text())
         if not str(self.info.get("codebase_version", "")).startswith("v3."):
             raise ValueError(f"{root} has the version {self.info.get('codebase_version')!r}, expected v3.0; "

@@ -37,6 +37,7 @@ def export_lerobot(
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
     statistics_frames: int | Literal["key"] = 0,
+    histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
@@ -49,6 +50,7 @@ def export_lerobot(
         success: Only successful (True) or only failed (False) episodes.
         statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
             by default every 20th, which takes a tenth of the time.
+        histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
@@ -56,7 +58,7 @@ def export_lerobot(
     """
     source = Source(root, map=map, episodes=episodes, success=success)
     with new_output(out) as path:
-        writer = Writer(source, path, statistics_frames)
+        writer = Writer(source, path, statistics_frames, histograms)
         for n, episode in enumerate(source.episodes, 1):
             writer.add(episode)
             if progress:

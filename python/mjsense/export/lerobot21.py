@@ -13,6 +13,7 @@ from mjsense._arguments import checked
 from mjsense.export.frame_statistics import frame_histograms
 from mjsense.export.lerobot import (
     FILES_PER_CHUNK,
+    Histograms,
     Statistics,
     codec_of,
     columns_of,
@@ -42,6 +43,7 @@ def export_lerobot21(
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
     statistics_frames: int | Literal["key"] = 0,
+    histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``. See docs/export.md.
@@ -54,6 +56,7 @@ def export_lerobot21(
         success: Only successful (True) or only failed (False) episodes.
         statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
             by default every 20th, which takes a tenth of the time.
+        histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
@@ -63,11 +66,12 @@ def export_lerobot21(
     if depth := [camera for camera in source.cameras if is_depth(source, camera)]:
         raise ValueError(f"LeRobot v2.1 has no depth images; leave '{depth[0]}' out of the map, or export to LeRobot v3.0")
     with new_output(out) as path:
-        _write(source, path, statistics_frames, progress)
+        _write(source, path, statistics_frames, histograms, progress)
     return Path(out)
 
 
-def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], progress: Callable[[int, int], None] | None) -> None:
+def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], histograms_of: Histograms,
+           progress: Callable[[int, int], None] | None) -> None:  # fmt: skip
     entries: list[dict[str, Any]] = []
     found: list[dict[str, Any]] = []
     codec: dict[str, Any] = {}
@@ -82,7 +86,7 @@ def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], 
         for camera in source.cameras:
             video = source.video(episode, camera).path
             codec = codec or codec_of(video)
-            histograms[image_key(camera)] = frame_histograms(video, episode.length - 1, statistics_frames)
+            histograms[image_key(camera)] = histograms_of(video, episode.length - 1, statistics_frames)
             shutil.copyfile(video, _made(path / _VIDEO.format(video_key=image_key(camera), **place)))
         entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1})
         stats = {name: lists(value) for name, value in statistics.add(columns, histograms).items()}
