@@ -91,7 +91,7 @@ def test_verify_and_repair_compare_the_index_with_the_shards(recording):
     actions = tools.repair(str(recording))["actions"]
     assert "shard_1" in actions[0] and "record --resume" in actions[0] and "2 episodes of 1 complete shards" in actions[1]
     assert tools.verify(str(recording))["ok"]  # the damaged shard is no longer named
-    assert sorted(_Results(Storage(str(recording)), Job(str(recording), ARGUMENTS).fingerprint()).done) == [0, 2]
+    assert sorted(_Results.read(Storage(str(recording)), Job(str(recording), ARGUMENTS).fingerprint()).done) == [0, 2]
 
 
 def test_verify_reports_wrong_rows_and_missing_files(recording):

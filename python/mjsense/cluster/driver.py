@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,29 +48,41 @@ class ClusterSummary(ClusterProgress):
 
 
 class _Results:
-    """Shards that are done."""
+    """Shards that are done. Totals are kept up to date, because a job may have 100,000 shards."""
 
-    def __init__(self, storage: Storage, fingerprint: str) -> None:
+    def __init__(self, results: Iterable[ShardResult] = ()) -> None:
         self.done: dict[int, ShardResult] = {}
-        for path in storage.find("shard_*/done.json"):
-            result = ShardResult.parse(storage.read(path) or b"")
-            if result.fingerprint == fingerprint:
-                self.done[result.shard.number] = result
-        self._old_steps = sum(result.steps for result in self.done.values())
+        self.kept = 0
+        """Episodes of the shards without a gap from the first one."""
+        self.succeeded = self.failed = self.steps = 0
+        self._next = 0
+        for result in results:
+            self.add(result)
+        self._old_steps = self.steps
+
+    @staticmethod
+    def read(storage: Storage, fingerprint: str) -> _Results:
+        """The shards in a directory that belong to a job with this fingerprint."""
+        texts = storage.read_all(storage.find("shard_*/done.json"))
+        results = (ShardResult.parse(text) for text in texts)
+        return _Results(result for result in results if result.fingerprint == fingerprint)
+
+    def add(self, result: ShardResult) -> None:
+        self.done[result.shard.number] = result
+        self.succeeded += result.succeeded
+        self.failed += result.failed
+        self.steps += result.steps
+        while self._next in self.done:
+            self.kept += len(self.done[self._next].episodes)
+            self._next += 1
 
     def without_gap(self) -> list[ShardResult]:
-        count = 0
-        while count in self.done:
-            count += 1
-        return [self.done[number] for number in range(count)]
+        return [self.done[number] for number in range(self._next)]
 
     def progress(self, wanted: int, workers: int, seconds: float) -> dict[str, Any]:
-        results = self.done.values()
-        steps = sum(result.steps for result in results) - self._old_steps
         return {
-            "kept": sum(len(result.episodes) for result in self.without_gap()), "wanted": wanted,
-            "succeeded": sum(result.succeeded for result in results), "failed": sum(result.failed for result in results),
-            "shards": len(results), "workers": workers, "steps_per_second": steps / seconds if seconds > 0 else 0.0, "seconds": seconds,
+            "kept": self.kept, "wanted": wanted, "succeeded": self.succeeded, "failed": self.failed, "shards": len(self.done), "workers": workers,
+            "steps_per_second": (self.steps - self._old_steps) / seconds if seconds > 0 else 0.0, "seconds": seconds,
         }  # fmt: skip
 
 
@@ -145,7 +157,7 @@ def run_job(
     """
     storage, fingerprint = Storage(job.out), job.fingerprint()
     _claim(storage, job, more, resume)
-    results = _Results(storage, fingerprint)
+    results = _Results.read(storage, fingerprint)
     began = time.perf_counter()
     workers = 0
 
@@ -162,8 +174,8 @@ def run_job(
             while report()["kept"] < episodes:
                 done = tasks.wait()
                 workers = tasks.count
-                for (_, shard, _), result in done:
-                    results.done[shard.number] = result
+                for _, result in done:
+                    results.add(result)
                 if not done and not workers:
                     break
         workers = 0
