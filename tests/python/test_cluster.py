@@ -159,15 +159,15 @@ def test_random_kills_of_workers_and_driver(tmp_path, capsys):
         driver = subprocess.Popen([sys.executable, "-m", "mjsense", *words, *more], stderr=subprocess.PIPE, text=True)
         while driver.poll() is None and sum(kills.values()) < wanted:
             time.sleep(generator.uniform(0.1, 1.0))
-            started = (tmp_path / "out/job.json").exists()
-            if started and generator.random() < 0.1:
+            found = workers_of(driver.pid)
+            if found and generator.random() < 0.15:
                 family = descendants(driver.pid)
                 driver.kill()
                 kills["driver"] += 1
                 driver.wait()
                 for pid in family:
                     kill(pid)
-            elif found := workers_of(driver.pid):
+            elif found:
                 kills["worker"] += kill(generator.choice(found))
         error = driver.communicate()[1]
         more = ["--resume"]

@@ -32,9 +32,11 @@ def frame_histograms(path: Path, length: int, frames: int | Literal["key"] = 0) 
         step = max(1, max(stream.width, stream.height) // _LONG_SIDE)
         width, height = max(1, stream.width // step), max(1, stream.height // step)
 
+        per_tick = float(stream.time_base * stream.average_rate)
+
         def used():
             for frame in video.decode(stream):
-                n = round(frame.pts * stream.time_base * stream.average_rate)
+                n = round(frame.pts * per_tick)
                 if n in wanted:
                     yield frame.reformat(width, height, "rgb24", interpolation="POINT", threads=1).to_ndarray()
                 if n >= length - 1:
