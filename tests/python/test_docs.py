@@ -106,6 +106,8 @@ def run(arguments, cwd):
             commands.parser_of(arguments[0]).parse_args(arguments[1:])  # a viewer would wait for a browser
             return
         program = [sys.executable, "-m", "mjsense"]
+    elif "--format" in arguments:
+        program = [sys.executable, "-m", "mjsense"]
     path = os.pathsep.join([str(Path(mjs.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
