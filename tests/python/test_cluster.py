@@ -77,6 +77,10 @@ def alone(tmp_path_factory):
 
 def test_episodes_are_those_of_one_process(alone, tmp_path):
     shown = []
+    direct = mjs.record(**ARGUMENTS, out=tmp_path / "direct", ray="local", episodes=EPISODES, progress=shown.append)
+    assert direct.enough and direct.kept == shown[-1].kept >= EPISODES and content(tmp_path / "direct") == alone
+    with pytest.raises(ValueError, match="append cannot be combined with ray"):
+        mjs.record(**ARGUMENTS, out=tmp_path / "direct", ray="local", append=True)
     summary = record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=EPISODES - 1, shard_attempts=ATTEMPTS, progress=shown.append)
     assert summary.enough and summary.kept >= EPISODES - 1 and shown[-1].kept == summary.kept
     found = content(tmp_path / "out")

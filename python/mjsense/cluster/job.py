@@ -24,7 +24,7 @@ from mjsense.dataset.episode import Store
 from mjsense.dataset.files import entries_of
 
 _FREE = {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite", "ffmpeg",
-         "batches", "out", "progress", "sensors", "format", "map", "keep_recording"}  # fmt: skip
+         "batches", "out", "progress", "sensors", "format", "map", "keep_recording", "ray"}  # fmt: skip
 """Arguments of ``record`` that do not change the episodes, or that the driver sets."""
 
 
