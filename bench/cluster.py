@@ -4,6 +4,7 @@
     ./dev python bench/cluster.py                     all but the study; needs ray, fsspec and pyarrow
     ./dev python bench/cluster.py --scaling 1 2       wall time with these numbers of workers, each with as many CPUs
     ./dev python bench/cluster.py --overhead          cost of a shard: 8 attempts as one shard and as eight
+    ./dev python bench/cluster.py --memory            of a worker
     ./dev python bench/cluster.py --index 1000 100000 write and read of an index of so many shards
     ./dev python bench/cluster.py --study             1,000,000 episodes on 1,000 workers, simulated with the figures measured here
 
@@ -59,14 +60,13 @@ def _peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
-def overhead() -> float:
-    """Seconds that a division into one more shard costs, in a warm worker."""
+def overhead() -> None:
+    """Prints what a division into one more shard costs in a warm worker."""
     words = ("pick", "--horizon", "80", "--keep-failures", "--size", "320x184", "--worlds", "1", "--seed", "2")
-    cost = 0.0
     for name, made in (("mjs.record", {"arguments": {**ARGUMENTS, "worlds": 1}}), ("command", {"words": words})):
         with tempfile.TemporaryDirectory() as out:
             job = Job(out, **made)
-            run_shard(job, Shard(99, 99, 1), "")  # imports, and caches of files
+            run_shard(job, Shard(99, 99, 1), "")  # imports and files
             times = []
             for shards in (1, 8):
                 begun, used = time.perf_counter(), cpu()
@@ -74,9 +74,14 @@ def overhead() -> float:
                     run_shard(job, Shard(100 * shards + n, 8 // shards * n, 8 // shards), "")
                 times.append((time.perf_counter() - begun, cpu() - used))
         (wall, used), (wall_8, used_8) = times
-        cost = (used_8 - used) / 7
-        print(f"overhead of a shard ({name}): {(wall_8 - wall) / 7:.2f} s, {cost:.2f} s of CPU time")
-    return cost
+        print(f"overhead of a shard ({name}): {(wall_8 - wall) / 7:.2f} s, {(used_8 - used) / 7:.2f} s of CPU time")
+
+
+def memory() -> None:
+    for worlds in (2, 4):
+        with tempfile.TemporaryDirectory() as out:
+            run_shard(Job(out, {**ARGUMENTS, "horizon": 20, "width": 640, "height": 368, "worlds": worlds}), Shard(0, 0, 4), "")
+        print(f"memory of a worker with {worlds} worlds, two cameras of 640x368, without Ray and encoders: {_peak():.0f} MB")
 
 
 def _result(number: int, episodes: int) -> ShardResult:
@@ -136,12 +141,15 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scaling", type=int, nargs="+", metavar="WORKERS")
     parser.add_argument("--overhead", action="store_true")
+    parser.add_argument("--memory", action="store_true")
     parser.add_argument("--index", type=int, nargs="+", metavar="SHARDS")
     parser.add_argument("--study", action="store_true")
     given = parser.parse_args()
     everything = len(sys.argv) == 1
     if everything or given.scaling:
         scaling(given.scaling or [1, 2])
+    if everything or given.memory:
+        memory()
     if everything or given.overhead:
         overhead()
     for shards in given.index or ([1000, 100_000] if everything else []):
