@@ -163,7 +163,9 @@ def _noise(
 class _Effect:
     """An effect on rows of ``size`` elements; the clock's arrays belong to the chain."""
 
-    def __init__(self, clock: Clock, cfg: Any, stream: int, size: int, dtype: Any, num_worlds: int, period: float, device: Any) -> None:
+    def __init__(
+        self, clock: Clock, cfg: Any, stream: int, size: int, dtype: Any, num_worlds: int, period: float, device: Any
+    ) -> None:
         self.clock, self.cfg, self.stream = clock, cfg, stream
         self.size, self.dtype, self.num_worlds, self.period, self.device = size, dtype, num_worlds, period, device
         self.initialize()
@@ -202,7 +204,9 @@ class _Noise(_Effect):
 
 
 @wp.func
-def _new_bias(clock: Clock, stream: wp.uint32, draw: Draw, operation: int, shared: bool, w: int, i: int, old: wp.float64) -> wp.float64:
+def _new_bias(
+    clock: Clock, stream: wp.uint32, draw: Draw, operation: int, shared: bool, w: int, i: int, old: wp.float64
+) -> wp.float64:
     component = i
     if shared:
         component = 0
@@ -426,7 +430,15 @@ class _Misalignment(_Effect):
     def initialize(self) -> None:
         cfg = self.cfg
         matrix, drawn = self.zeros(self.num_worlds, dtype=wp.mat33d), self.zeros(self.num_worlds, dtype=bool)
-        self.fixed = (self.stream, wp.vec3d(*cfg.scale_error), wp.vec3d(*cfg.angle), cfg.scale_error_std, cfg.angle_std, matrix, drawn)
+        self.fixed = (
+            self.stream,
+            wp.vec3d(*cfg.scale_error),
+            wp.vec3d(*cfg.angle),
+            cfg.scale_error_std,
+            cfg.angle_std,
+            matrix,
+            drawn,
+        )
 
     def reset(self, mask: wp.array) -> None:
         self.per_world(_draw_matrix, mask, *self.fixed)
@@ -549,7 +561,12 @@ def _delay(
 
 @wp.kernel
 def _take_between(
-    clock: Clock, ring: Ring, slots: wp.array2d(dtype=int), fraction: wp.array(dtype=wp.float64), rows: wp.array3d(dtype=float), row: wp.array2d(dtype=float)
+    clock: Clock,
+    ring: Ring,
+    slots: wp.array2d(dtype=int),
+    fraction: wp.array(dtype=wp.float64),
+    rows: wp.array3d(dtype=float),
+    row: wp.array2d(dtype=float),
 ):
     w, i = wp.tid()
     rows[w, ring.newest[w], i] = row[w, i]

@@ -1,0 +1,343 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ray-cast and terrain height sensors."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from mjsense import _mujoco
+from mjsense.warp.sensor import WarpSensor, Worlds, declared, implements, unsupported, vec3_view
+from mjsense.warp.shapes import NO_HIT
+from mjsense.warp.surfaces import Surfaces, nearest_hit, ray_scene
+
+if TYPE_CHECKING:
+    from mjsense.native_sensor import NativeSensor
+
+wp.set_module_options({"enable_backward": False})
+
+_BODY, _SITE, _GEOM, _CAMERA = wp.constant(0), wp.constant(1), wp.constant(2), wp.constant(3)
+_BASE, _YAW = wp.constant(0), wp.constant(1)
+
+
+@wp.struct
+class Frames:
+    """The frames that rays are attached to: their objects, and the poses of these in all worlds."""
+
+    kind: wp.array(dtype=int)  # [F]
+    id: wp.array(dtype=int)  # [F]
+    alignment: int
+    body_pos: wp.array2d(dtype=wp.vec3)
+    body_mat: wp.array2d(dtype=wp.mat33)
+    site_pos: wp.array2d(dtype=wp.vec3)
+    site_mat: wp.array2d(dtype=wp.mat33)
+    geom_pos: wp.array2d(dtype=wp.vec3)
+    geom_mat: wp.array2d(dtype=wp.mat33)
+    camera_pos: wp.array2d(dtype=wp.vec3)
+    camera_mat: wp.array2d(dtype=wp.mat33)
+    pos: wp.array2d(dtype=wp.vec3)  # [B, F] result
+    align: wp.array2d(dtype=wp.mat33)  # [B, F] result: rotation of offsets and directions
+
+
+@wp.func
+def aligned(alignment: int, m: wp.mat33) -> wp.mat33:
+    """The frame's rotation, its heading, or none. The heading is that of the x axis; if that is too short in the xy plane, it follows
+    from the y axis, so that the rays of a body on its back still point down."""
+    if alignment == _BASE:
+        return m
+    x = float(1.0)
+    y = float(0.0)
+    if alignment == _YAW:
+        x = m[0, 0]
+        y = m[1, 0]
+        if wp.sqrt(x * x + y * y) < 0.1:
+            x = m[1, 1]
+            y = -m[0, 1]
+        length = wp.max(wp.sqrt(x * x + y * y), 1.0e-6)
+        x /= length
+        y /= length
+    return wp.mat33(x, -y, 0.0, y, x, 0.0, 0.0, 0.0, 1.0)
+
+
+@wp.func
+def quaternion(m: wp.mat33) -> wp.vec4:
+    """wxyz; the largest component is positive."""
+    squares = wp.vec4(
+        1.0 + m[0, 0] + m[1, 1] + m[2, 2],
+        1.0 + m[0, 0] - m[1, 1] - m[2, 2],
+        1.0 - m[0, 0] + m[1, 1] - m[2, 2],
+        1.0 - m[0, 0] - m[1, 1] + m[2, 2],
+    )
+    largest = int(0)
+    for i in range(1, 4):
+        if squares[i] > squares[largest]:
+            largest = i
+    q = wp.vec4()
+    if largest == 0:
+        q = wp.vec4(squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1])
+    elif largest == 1:
+        q = wp.vec4(m[2, 1] - m[1, 2], squares[1], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0])
+    elif largest == 2:
+        q = wp.vec4(m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], squares[2], m[1, 2] + m[2, 1])
+    else:
+        q = wp.vec4(m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[3])
+    return wp.normalize(q)
+
+
+@wp.kernel
+def _place_frames(
+    frames: Frames,
+    frame_pos: wp.array2d(dtype=wp.vec3),
+    frame_quat: wp.array3d(dtype=float),
+    first_pos: wp.array(dtype=wp.vec3),
+    first_quat: wp.array2d(dtype=float),
+):
+    w, f = wp.tid()
+    kind = frames.kind[f]
+    i = frames.id[f]
+    pos = frames.body_pos[w, i]
+    mat = frames.body_mat[w, i]
+    if kind == _SITE:
+        pos = frames.site_pos[w, i]
+        mat = frames.site_mat[w, i]
+    elif kind == _GEOM:
+        pos = frames.geom_pos[w, i]
+        mat = frames.geom_mat[w, i]
+    elif kind == _CAMERA:
+        pos = frames.camera_pos[w, i]
+        mat = frames.camera_mat[w, i]
+    frames.pos[w, f] = pos
+    frames.align[w, f] = aligned(frames.alignment, mat)
+    q = quaternion(mat)
+    frame_pos[w, f] = pos
+    for k in range(4):
+        frame_quat[w, f, k] = q[k]
+    if f == 0:
+        first_pos[w] = pos
+        for k in range(4):
+            first_quat[w, k] = q[k]
+
+
+@wp.struct
+class Rays:
+    """The rays of one frame, and what they can hit."""
+
+    offset: wp.array(dtype=wp.vec3)  # [parts * n] m
+    direction: wp.array(dtype=wp.vec3)  # [parts * n]
+    count: int  # n
+    part: wp.array(dtype=int)  # [B] part of the pattern that is cast
+    candidates: wp.array(dtype=int)  # geom ids of all frames
+    begin: wp.array(dtype=int)  # [F + 1]
+    nearest: float
+    farthest: float
+
+
+@wp.struct
+class Hits:
+    distance: wp.array2d(dtype=float)
+    pos: wp.array2d(dtype=wp.vec3)
+    normal: wp.array2d(dtype=wp.vec3)
+    geom: wp.array2d(dtype=int)
+    body: wp.array2d(dtype=int)
+    material: wp.array2d(dtype=int)
+
+
+@wp.kernel
+def _cast(surfaces: Surfaces, frames: Frames, rays: Rays, hits: Hits, ids: bool):
+    w, r = wp.tid()
+    f = r // rays.count
+    i = rays.part[w] * rays.count + r % rays.count
+    align = frames.align[w, f]
+    origin = frames.pos[w, f] + align @ rays.offset[i]
+    direction = align @ rays.direction[i]
+    # The tolerance avoids that rounding turns a hit at the maximum distance into a miss.
+    reach = rays.farthest * (1.0 + 4.0e-7)
+    hit = nearest_hit(surfaces, rays.candidates, rays.begin[f], rays.begin[f + 1], w, origin, direction, reach)
+    geom = hit.geom
+    if hit.t < rays.nearest:
+        geom = -1
+    material = int(-1)
+    body = int(-1)
+    distance = float(-1.0)
+    normal = wp.vec3()
+    pos = origin
+    if geom >= 0:
+        distance = wp.min(hit.t, rays.farthest)
+        normal = hit.normal
+        pos = origin + distance * direction
+        body = surfaces.body[geom]
+        material = surfaces.material[w % surfaces.material.shape[0], geom]
+    hits.distance[w, r] = distance
+    hits.pos[w, r] = pos
+    hits.normal[w, r] = normal
+    if ids:
+        hits.geom[w, r] = geom
+        hits.body[w, r] = body
+        hits.material[w, r] = material
+
+
+def camera_rays(model: Any, camera: int) -> np.ndarray:
+    """Directions of a pinhole pattern with the resolution and angles of a camera of the model."""
+    width, height = (int(n) for n in model.cam_resolution[camera])
+    vertical = math.tan(0.5 * math.radians(model.cam_fovy[camera]))
+    horizontal = vertical * width / height
+    sensor, focal = model.cam_sensorsize[camera], model.cam_intrinsic[camera][:2]
+    if (sensor > 0).all() and (focal > 0).all():
+        horizontal, vertical = (float(s) / (2 * float(f)) for s, f in zip(sensor, focal, strict=True))
+    u, v = (np.linspace(-1, 1, n) if n > 1 else np.array([-1.0]) for n in (width, height))
+    x, y = np.meshgrid(u * horizontal, v * vertical)
+    directions = np.stack([x, y, np.full_like(x, -1.0)], axis=-1).reshape(-1, 3)
+    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
+@implements("raycast")
+class RayCast(WarpSensor):
+    exclude_world = True
+    """True if exclude_parent_body also applies to a frame on the world body."""
+
+    def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
+        super().__init__(worlds, sensor)
+        if worlds.compiled.model.nflex:
+            raise unsupported(self.name, "a model with flexes")
+        self.fields = declared(worlds, sensor)
+        self.scene = ray_scene(worlds)
+        frames = self.cfg.frame if isinstance(self.cfg.frame, (list, tuple)) else [self.cfg.frame]
+        self.num_frames = len(frames)
+        self._make_frames(frames)
+        offsets, directions, parts = self.pattern()
+        self._make_rays(offsets, directions, len(directions) // parts)
+        self._make_hits()
+
+    def pattern(self) -> tuple[np.ndarray, np.ndarray, int]:
+        """Offsets and directions of one frame's rays, and the number of equal parts that are cast one after the other."""
+        pattern = self.cfg.pattern
+        if len(getattr(pattern, "times", ())):
+            raise unsupported(self.name, "a pattern with times")
+        if camera := getattr(pattern, "camera_name", None):
+            model = self.worlds.compiled.model
+            directions = camera_rays(model, _mujoco.name2id(model, _mujoco.Obj.CAMERA, camera))
+            return np.zeros_like(directions), directions, 1
+        return *pattern.generate_rays(), 1
+
+    def _make_frames(self, refs: Any) -> None:
+        worlds, data, model = self.worlds, self.worlds.data, self.worlds.compiled.model
+        kinds = {"body": 0, "xbody": 0, "site": 1, "geom": 2, "camera": 3}
+        objects = [_mujoco.Obj.BODY, _mujoco.Obj.SITE, _mujoco.Obj.GEOM, _mujoco.Obj.CAMERA]
+        kind = [kinds[ref.type] for ref in refs]
+        ids = [_mujoco.name2id(model, objects[k], ref.full_name) for k, ref in zip(kind, refs, strict=True)]
+        owners = [np.arange(model.nbody), model.site_bodyid, model.geom_bodyid, model.cam_bodyid]
+        self.bodies = [int(owners[k][i]) for k, i in zip(kind, ids, strict=True)]
+        f = self.frames = Frames()
+        f.kind, f.id = worlds.array(kind, int), worlds.array(ids, int)
+        f.alignment = ["base", "yaw", "world"].index(self.cfg.ray_alignment)
+        f.body_pos, f.body_mat, f.site_pos, f.site_mat = data.xpos, data.xmat, data.site_xpos, data.site_xmat
+        f.geom_pos, f.geom_mat, f.camera_pos, f.camera_mat = data.geom_xpos, data.geom_xmat, data.cam_xpos, data.cam_xmat
+        f.pos = worlds.zeros((worlds.num_worlds, len(refs)), wp.vec3)
+        f.align = worlds.zeros((worlds.num_worlds, len(refs)), wp.mat33)
+
+    def _make_rays(self, offsets: np.ndarray, directions: np.ndarray, count: int) -> None:
+        worlds, cfg, model = self.worlds, self.cfg, self.worlds.compiled.model
+        groups = range(6) if cfg.include_geom_groups is None else cfg.include_geom_groups
+        seen = np.isin(np.clip(model.geom_group, 0, 5), list(groups))
+        lists = []
+        for body in self.bodies:
+            excluded = cfg.exclude_parent_body and (body > 0 or self.exclude_world)
+            lists.append(np.flatnonzero(seen & (model.geom_bodyid != body) if excluded else seen))
+        rays = self.rays = Rays()
+        rays.offset, rays.direction = worlds.array(offsets, wp.vec3), worlds.array(directions, wp.vec3)
+        rays.count, rays.part = count, worlds.zeros(worlds.num_worlds, int)
+        rays.candidates = worlds.array(np.concatenate([*lists, [0]]), int)
+        rays.begin = worlds.array(np.cumsum([0, *map(len, lists)]), int)
+        rays.nearest, rays.farthest = cfg.min_distance, min(cfg.max_distance, 1e29)
+
+    def _make_hits(self) -> None:
+        fields, hits = self.fields, Hits()
+        hits.distance = fields["distances"]
+        hits.pos, hits.normal = vec3_view(fields["hit_pos_w"]), vec3_view(fields["normals_w"])
+        if "geom_id" in fields:
+            hits.geom, hits.body, hits.material = fields["geom_id"], fields["body_id"], fields["material_id"]
+        self.hits = hits
+        first = [vec3_view(fields["frame_pos_w"]), fields["frame_quat_w"], vec3_view(fields["pos_w"]), fields["quat_w"]]
+        self._frame_inputs = [self.frames, *first]
+
+    def launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
+        wp.launch(kernel, dim=dim, inputs=inputs, device=self.worlds.device)
+
+    def update(self) -> None:
+        worlds = self.worlds.num_worlds
+        self.launch(_place_frames, (worlds, self.num_frames), *self._frame_inputs)
+        inputs = [self.scene.surfaces, self.frames, self.rays, self.hits, "geom_id" in self.fields]
+        self.launch(_cast, (worlds, self.num_frames * self.rays.count), *inputs)
+
+
+# ----------------------------------------------------------------------------------------------------------- terrain height
+
+
+_MIN, _MAX, _MEAN, _NONE = wp.constant(0), wp.constant(1), wp.constant(2), wp.constant(3)
+
+
+@wp.kernel
+def _measure_heights(
+    surfaces: Surfaces, frames: Frames, rays: Rays, hits: Hits, reduction: int, heights: wp.array2d(dtype=float)
+):
+    w, f = wp.tid()
+    n = rays.count
+    pos = frames.pos[w, f]
+    any_hit = bool(False)
+    for i in range(n):
+        any_hit = any_hit or hits.distance[w, f * n + i] >= 0.0
+    missing = rays.farthest
+    if not any_hit:
+        # To the ground straight below, at any distance; without one, to the ground above, which gives 0; else to z = 0.
+        down = wp.vec3(0.0, 0.0, -1.0)
+        ground = float(0.0)
+        below = nearest_hit(surfaces, rays.candidates, rays.begin[f], rays.begin[f + 1], w, pos, down, NO_HIT)
+        if below.geom >= 0:
+            ground = pos[2] - below.t
+        else:
+            start = pos + wp.vec3(0.0, 0.0, rays.farthest)
+            above = nearest_hit(surfaces, rays.candidates, rays.begin[f], rays.begin[f + 1], w, start, down, NO_HIT)
+            if above.geom >= 0:
+                ground = start[2] - above.t
+        missing = wp.clamp(pos[2] - ground, 0.0, rays.farthest)
+    low = float(0.0)
+    high = float(0.0)
+    total = wp.float64(0.0)
+    for i in range(n):
+        r = f * n + i
+        h = missing
+        if hits.distance[w, r] >= 0.0:
+            h = pos[2] - hits.pos[w, r][2]
+            if hits.normal[w, r][2] < 0.0:
+                h = 0.0
+        if reduction == _NONE:
+            heights[w, r] = h
+        if i == 0:
+            low = h
+            high = h
+        low = wp.min(low, h)
+        high = wp.max(high, h)
+        total += wp.float64(h)
+    if reduction == _MIN:
+        heights[w, f] = low
+    elif reduction == _MAX:
+        heights[w, f] = high
+    elif reduction == _MEAN:
+        heights[w, f] = float(total / wp.float64(n))
+
+
+@implements("terrain_height")
+class TerrainHeight(RayCast):
+    def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
+        super().__init__(worlds, sensor)
+        self.reduction = ["min", "max", "mean", "none"].index(self.cfg.reduction)
+        heights = self.fields["heights"]
+        self.heights = heights.reshape((worlds.num_worlds, heights.size // worlds.num_worlds))
+
+    def update(self) -> None:
+        super().update()
+        inputs = [self.scene.surfaces, self.frames, self.rays, self.hits, self.reduction, self.heights]
+        self.launch(_measure_heights, (self.worlds.num_worlds, self.num_frames), *inputs)

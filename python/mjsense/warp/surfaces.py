@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rays hit: the geoms of all worlds, with a tree of triangles for each mesh and height field, which the worlds share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco_warp as mjw
+import numpy as np
+import warp as wp
+
+from mjsense.warp.sensor import Worlds
+from mjsense.warp.shapes import (
+    NO_HIT,
+    hit_box,
+    hit_capsule,
+    hit_cylinder,
+    hit_ellipsoid,
+    hit_plane,
+    hit_sphere,
+    normal_box,
+    normal_capsule,
+    normal_cylinder,
+    normal_ellipsoid,
+    normal_sphere,
+    tied,
+)
+
+wp.set_module_options({"enable_backward": False})
+
+PLANE = wp.constant(int(mjw.GeomType.PLANE))
+HFIELD = wp.constant(int(mjw.GeomType.HFIELD))
+SPHERE = wp.constant(int(mjw.GeomType.SPHERE))
+CAPSULE = wp.constant(int(mjw.GeomType.CAPSULE))
+ELLIPSOID = wp.constant(int(mjw.GeomType.ELLIPSOID))
+CYLINDER = wp.constant(int(mjw.GeomType.CYLINDER))
+BOX = wp.constant(int(mjw.GeomType.BOX))
+
+
+@wp.struct
+class Surfaces:
+    """Arrays of mujoco_warp, whose leading dimension is 1 or B, and trees of triangles."""
+
+    type: wp.array(dtype=int)
+    data_id: wp.array2d(dtype=int)
+    material: wp.array2d(dtype=int)
+    size: wp.array2d(dtype=wp.vec3)
+    radius: wp.array2d(dtype=float)  # of the bounding sphere; 0: endless
+    rgba: wp.array2d(dtype=wp.vec4)
+    material_rgba: wp.array2d(dtype=wp.vec4)
+    body: wp.array(dtype=int)
+    pos: wp.array2d(dtype=wp.vec3)
+    mat: wp.array2d(dtype=wp.mat33)
+    meshes: wp.array(dtype=wp.uint64)
+    height_fields: wp.array(dtype=wp.uint64)
+
+
+@wp.struct
+class Hit:
+    t: float  # m; NO_HIT: nothing
+    geom: int
+    normal: wp.vec3  # outward, or by the winding of triangles; world
+
+
+@wp.func
+def colour(surfaces: Surfaces, w: int, geom: int) -> wp.vec4:
+    material = surfaces.material[w % surfaces.material.shape[0], geom]
+    if material >= 0:
+        return surfaces.material_rgba[w % surfaces.material_rgba.shape[0], material]
+    return surfaces.rgba[w % surfaces.rgba.shape[0], geom]
+
+
+@wp.func
+def _hit_triangles(tree: wp.uint64, o: wp.vec3, d: wp.vec3, start: float, limit: float) -> wp.vec4:
+    """Distance and normal; the query starts near the mesh, where numbers are small."""
+    query = wp.mesh_query_ray(tree, o + start * d, d, limit - start)
+    if not query.result:
+        return wp.vec4(NO_HIT, 0.0, 0.0, 0.0)
+    return wp.vec4(start + query.t, query.normal[0], query.normal[1], query.normal[2])
+
+
+@wp.func
+def nearest_hit(
+    surfaces: Surfaces,
+    candidates: wp.array(dtype=int),
+    begin: int,
+    end: int,
+    w: int,
+    origin: wp.vec3,
+    direction: wp.vec3,
+    reach: float,
+) -> Hit:
+    """The nearest hit within reach of the geoms candidates[begin:end], whose ids increase: of hits that are a tie, the first counts."""
+    hit = Hit()
+    hit.t = NO_HIT
+    hit.geom = -1
+    for c in range(begin, end):
+        geom = candidates[c]
+        pos = surfaces.pos[w, geom]
+        limit = wp.min(reach, hit.t)
+        # Distance along the ray to the bounding sphere, with a margin for rounding.
+        to_centre = pos - origin
+        middle = wp.dot(to_centre, direction)
+        aside = to_centre - middle * direction
+        radius = surfaces.radius[w % surfaces.radius.shape[0], geom]
+        start = float(0.0)
+        if radius > 0.0:
+            radius += 1.0e-4 + 1.0e-5 * (radius + wp.length(to_centre))
+            if wp.dot(aside, aside) > radius * radius or middle + radius < 0.0 or middle - radius > limit:
+                continue
+            start = wp.max(0.0, middle - radius)
+        if colour(surfaces, w, geom)[3] == 0.0:
+            continue
+        mat = surfaces.mat[w, geom]
+        o = wp.transpose(mat) @ (origin - pos)
+        d = wp.transpose(mat) @ direction
+        size = surfaces.size[w % surfaces.size.shape[0], geom]
+        kind = surfaces.type[geom]
+        t = float(NO_HIT)
+        found = wp.vec4()
+        if kind == PLANE:
+            t = hit_plane(size, o, d)
+        elif kind == SPHERE:
+            t = hit_sphere(size, o, d)
+        elif kind == CAPSULE:
+            t = hit_capsule(size, o, d)
+        elif kind == ELLIPSOID:
+            t = hit_ellipsoid(size, o, d)
+        elif kind == CYLINDER:
+            t = hit_cylinder(size, o, d)
+        elif kind == BOX:
+            t = hit_box(size, o, d)
+        else:
+            shape = surfaces.data_id[w % surfaces.data_id.shape[0], geom]
+            tree = wp.uint64(0)
+            if kind == HFIELD:
+                tree = surfaces.height_fields[shape]
+            else:
+                tree = surfaces.meshes[shape]
+            if tree != wp.uint64(0):
+                found = _hit_triangles(tree, o, d, start, tied(limit))
+                t = found[0]
+        if t > reach or t >= NO_HIT or tied(t) >= hit.t:
+            continue
+        p = o + t * d
+        n = wp.vec3(0.0, 0.0, 1.0)
+        if kind == SPHERE:
+            n = normal_sphere(p)
+        elif kind == CAPSULE:
+            n = normal_capsule(size, p)
+        elif kind == ELLIPSOID:
+            n = normal_ellipsoid(size, p)
+        elif kind == CYLINDER:
+            n = normal_cylinder(size, p)
+        elif kind == BOX:
+            n = normal_box(size, p)
+        elif kind != PLANE:
+            n = wp.normalize(wp.vec3(found[1], found[2], found[3]))
+        hit.t = t
+        hit.geom = geom
+        hit.normal = mat @ n
+    return hit
+
+
+def _tree(points: np.ndarray, faces: np.ndarray, device: Any) -> wp.Mesh:
+    return wp.Mesh(
+        points=wp.array(np.ascontiguousarray(points, np.float32), dtype=wp.vec3, device=device),
+        indices=wp.array(np.ascontiguousarray(faces, np.int32).reshape(-1), dtype=int, device=device),
+        bvh_leaf_size=1,
+    )
+
+
+def height_field_triangles(size: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points and triangles of a height field: the surface, the side walls down to its zero, and the base box.
+
+    Args:
+        size: Half extents in x and y, height of the value 1, and depth of the base, m.
+        heights: The values, ``[rows, columns]``, 0 to 1.
+    """
+    rows, columns = heights.shape
+    x, y = np.linspace(-size[0], size[0], columns), np.linspace(-size[1], size[1], rows)
+    grid = np.stack([*np.meshgrid(x, y), heights * size[2]], axis=-1).reshape(-1, 3)
+    at = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]
+    faces = [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))]
+    points = [grid]
+    count = len(grid)
+    for border in (at[0], at[:, -1], at[-1, ::-1], at[::-1, 0]):  # counter-clockwise from above: the outside is on the right
+        low = grid[border] * (1.0, 1.0, 0.0)
+        under = count + np.arange(len(border))
+        faces.append(np.stack([border[:-1], under[:-1], under[1:]], axis=-1))
+        faces.append(np.stack([border[:-1], under[1:], border[1:]], axis=-1))
+        points.append(low)
+        count += len(low)
+    corners = np.array([(sx * size[0], sy * size[1], z) for z in (-size[3], 0.0) for sy in (-1, 1) for sx in (-1, 1)])
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces += [count + np.array([q[:3], (q[0], q[2], q[3])]) for q in quads]
+    points.append(corners)
+    return np.concatenate(points), np.concatenate(faces)
+
+
+class RayScene:
+    """The surfaces of the worlds. One object serves all sensors of a simulation."""
+
+    def __init__(self, worlds: Worlds) -> None:
+        compiled, model, data, device = worlds.compiled.model, worlds.model, worlds.data, worlds.device
+        self.trees = []  # keeps them alive
+        meshes, fields = np.zeros(max(compiled.nmesh, 1), np.uint64), np.zeros(max(compiled.nhfield, 1), np.uint64)
+        for i in range(compiled.nmesh):
+            vertex, face = compiled.mesh_vertadr[i], compiled.mesh_faceadr[i]
+            faces = compiled.mesh_face[face : face + compiled.mesh_facenum[i]]
+            if len(faces):
+                meshes[i] = self._add(compiled.mesh_vert[vertex : vertex + compiled.mesh_vertnum[i]], faces, device)
+        for i in range(compiled.nhfield):
+            rows, columns, begin = compiled.hfield_nrow[i], compiled.hfield_ncol[i], compiled.hfield_adr[i]
+            heights = compiled.hfield_data[begin : begin + rows * columns].reshape(rows, columns)
+            fields[i] = self._add(*height_field_triangles(compiled.hfield_size[i], heights), device)
+        s = self.surfaces = Surfaces()
+        s.type, s.data_id, s.material, s.size = model.geom_type, model.geom_dataid, model.geom_matid, model.geom_size
+        s.radius, s.rgba, s.material_rgba, s.body = model.geom_rbound, model.geom_rgba, model.mat_rgba, model.geom_bodyid
+        s.pos, s.mat = data.geom_xpos, data.geom_xmat
+        s.meshes, s.height_fields = worlds.array(meshes, wp.uint64), worlds.array(fields, wp.uint64)
+
+    def _add(self, points: np.ndarray, faces: np.ndarray, device: Any) -> int:
+        self.trees.append(_tree(points, faces, device))
+        return self.trees[-1].id
+
+
+def ray_scene(worlds: Worlds) -> RayScene:
+    """The ray scene of these worlds."""
+    if "ray scene" not in worlds.shared:
+        worlds.shared["ray scene"] = RayScene(worlds)
+    return worlds.shared["ray scene"]
