@@ -764,13 +764,14 @@ def _remember(clock: Clock, rows: int, row: wp.array2d[Any], out: wp.array3d[Any
     out[w, rows - 1, i] = row[w, i]
 
 
-# Compiled with the module; a row of another dtype compiles its own when it is first used.
-_row, _rows = wp.array2d(dtype=float), wp.array3d(dtype=float)
-wp.overload(_take, {"rows": _rows, "row": _row})
-wp.overload(_hold, {"held": _row, "row": _row})
-wp.overload(_replace, {"row": _row})
-wp.overload(_copy, {"source": _row, "row": _row})
-wp.overload(_remember, {"row": _row, "out": _rows})
+# Compiled with the module, which would be compiled again at the first use of another type.
+for _dtype in (wp.float32, wp.int32, wp.uint8, wp.bool):
+    _row, _rows = wp.array2d(dtype=_dtype), wp.array3d(dtype=_dtype)
+    wp.overload(_take, {"rows": _rows, "row": _row})
+    wp.overload(_hold, {"held": _row, "row": _row})
+    wp.overload(_replace, {"row": _row})
+    wp.overload(_copy, {"source": _row, "row": _row})
+    wp.overload(_remember, {"row": _row, "out": _rows})
 
 
 def needs_every_step(effects: Sequence[Any], history_length: int = 0) -> bool:
