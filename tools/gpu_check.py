@@ -99,6 +99,10 @@ def plane() -> mjs.SceneCfg:
     return mjs.SceneCfg(entities={"robot": robot}, terrain=mjs.TerrainCfg(), sensors=quadruped_sensors())
 
 
+def feet_only() -> mjs.SceneCfg:
+    return mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")}, terrain=mjs.TerrainCfg(), sensors=quadruped_sensors()[:1])
+
+
 def rough() -> mjs.SceneCfg:
     rough = mjs.SubTerrainCfg("rough")
     terrain = mjs.TerrainCfg("generator", {"rough": rough}, levels=1, tile_size=(4.0, 4.0), border=0.0)

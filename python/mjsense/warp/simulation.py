@@ -189,6 +189,7 @@ class WarpSimulation(KnownAttributes):
         make = REGISTRY.get(sensor.kind)
         if make is None:
             raise unsupported(name, f"a sensor of kind {sensor.kind}")
+        sensor._bind(self._compiled._core)  # so that its values in the compiled world can be read
         made = self._sensors[name] = make(self._worlds, sensor)
         sensor._core = reader
         shared = {field: arrays.share(array) for field, array in made.fields.items()}
