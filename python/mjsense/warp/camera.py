@@ -103,7 +103,11 @@ def _copy_segmentation(
 
 @wp.kernel
 def _copy_pose(
-    due: wp.array(dtype=bool), camera: int, pos: wp.array2d(dtype=wp.vec3), mat: wp.array2d(dtype=wp.mat33), pose: wp.array3d(dtype=float)
+    due: wp.array(dtype=bool),
+    camera: int,
+    pos: wp.array2d(dtype=wp.vec3),
+    mat: wp.array2d(dtype=wp.mat33),
+    pose: wp.array3d(dtype=float),
 ):
     w = wp.tid()
     if not due[w]:
@@ -220,5 +224,9 @@ class Camera(WarpSensor):
             targets = self._pixels_of("depth"), self._pixels_of("point_cloud", 3)
             self.launch(_copy_depth, due, context.depth_data, context.ray, context.ray_offset, cfg.depth_kind == "ray", *targets)
         if any(name.endswith("segmentation") for name in self.fields):
-            targets = [self._pixels_of("segmentation", 2), self._pixels_of("body_segmentation"), self._pixels_of("entity_segmentation")]
+            targets = [
+                self._pixels_of("segmentation", 2),
+                self._pixels_of("body_segmentation"),
+                self._pixels_of("entity_segmentation"),
+            ]
             self.launch(_copy_segmentation, due, context.seg_data, worlds.model.geom_bodyid, self.geom_entity, *targets)

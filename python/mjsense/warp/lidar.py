@@ -142,7 +142,9 @@ class Lidar(RayCast):
                 self.parts = len(angles) // scan.rays_per_scan
                 angles = angles[: self.parts * scan.rays_per_scan]
         azimuth, elevation = angles.T
-        directions = np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1)
+        directions = np.stack(
+            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1
+        )
         return np.zeros_like(directions), directions, self.parts
 
     def update(self) -> None:

@@ -18,14 +18,14 @@ from mujoco_warp._src import types
 from mjsense import _core, _mujoco, data
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.sensor import Sensor
-from mjsense.warp import arrays, builtin, contact, kernels, limits, physics, user
+from mjsense.warp import arrays, builtin, camera, contact, effect_sensor, imu, kernels, lidar, limits, physics, rays, user
 from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, rows_view, scalar_view, unsupported
 
 if TYPE_CHECKING:
     from mjsense.scene import Scene
     from mjsense.simulation import Simulation
 
-__all__ = ["WarpSimulation", "builtin", "contact"]
+__all__ = ["WarpSimulation", "builtin", "camera", "contact", "effect_sensor", "imu", "lidar", "rays"]
 
 _STATE = ("qpos", "qvel", "act", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 """Components of the state, except ctrl, whose values for the next step are not those of the physics."""

@@ -133,7 +133,7 @@ def nearest_hit(
         else:
             shape = surfaces.data_id[w % surfaces.data_id.shape[0], geom]
             tree = wp.uint64(0)
-            if kind == HFIELD:
+            if kind == HFIELD:  # noqa: SIM108 (a conditional expression reads both arrays)
                 tree = surfaces.height_fields[shape]
             else:
                 tree = surfaces.meshes[shape]
