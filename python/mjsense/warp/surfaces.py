@@ -203,7 +203,7 @@ class RayScene:
     """The surfaces of the worlds. One object serves all sensors of a simulation."""
 
     def __init__(self, worlds: Worlds) -> None:
-        compiled, model, data, device = worlds.compiled.model, worlds.model, worlds.data, worlds.device
+        compiled, device = worlds.compiled.model, worlds.device
         self.trees = []  # keeps them alive
         meshes, fields = np.zeros(max(compiled.nmesh, 1), np.uint64), np.zeros(max(compiled.nhfield, 1), np.uint64)
         for i in range(compiled.nmesh):
@@ -215,11 +215,18 @@ class RayScene:
             rows, columns, begin = compiled.hfield_nrow[i], compiled.hfield_ncol[i], compiled.hfield_adr[i]
             heights = compiled.hfield_data[begin : begin + rows * columns].reshape(rows, columns)
             fields[i] = self._add(*height_field_triangles(compiled.hfield_size[i], heights), device)
-        s = self.surfaces = Surfaces()
+        self.worlds = worlds
+        self.meshes, self.height_fields = worlds.array(meshes, wp.uint64), worlds.array(fields, wp.uint64)
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """The current arrays; randomize() replaces those of the model."""
+        model, data, s = self.worlds.model, self.worlds.data, Surfaces()
         s.type, s.data_id, s.material, s.size = model.geom_type, model.geom_dataid, model.geom_matid, model.geom_size
         s.radius, s.rgba, s.material_rgba, s.body = model.geom_rbound, model.geom_rgba, model.mat_rgba, model.geom_bodyid
         s.pos, s.mat = data.geom_xpos, data.geom_xmat
-        s.meshes, s.height_fields = worlds.array(meshes, wp.uint64), worlds.array(fields, wp.uint64)
+        s.meshes, s.height_fields = self.meshes, self.height_fields
+        return s
 
     def _add(self, points: np.ndarray, faces: np.ndarray, device: Any) -> int:
         self.trees.append(_tree(points, faces, device))
