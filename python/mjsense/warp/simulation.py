@@ -25,7 +25,16 @@ if TYPE_CHECKING:
     from mjsense.scene import Scene
     from mjsense.simulation import Simulation
 
-__all__ = ["WarpSimulation", "builtin", "camera", "contact", "effect_sensor", "imu", "lidar", "rays"]
+__all__ = [
+    "WarpSimulation",
+    "builtin",
+    "camera",
+    "contact",
+    "effect_sensor",
+    "imu",
+    "lidar",
+    "rays",
+]  # each registers its sensors
 
 _STATE = ("qpos", "qvel", "act", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 """Components of the state, except ctrl, whose values for the next step are not those of the physics."""
@@ -157,28 +166,34 @@ class WarpSimulation(KnownAttributes):
         self._sensors: dict[str, WarpSensor] = self._worlds.sensors
         self._used: list[WarpSensor] = []  # computed with every step, inputs first
         self._moments: dict[str, int] = {}
-        for name, sensor in list(self.scene.sensors.items()):
-            if isinstance(sensor, Sensor):
-                self._sensors[name] = user.UserSensor(self._worlds, sensor, self, reader)
-                continue
-            if sensor.kind == "contact_field" and not contact.has_field(self._worlds, name):
-                del self.scene._sensors[name]
-                continue
-            make = REGISTRY.get(sensor.kind)
-            if make is None:
-                raise unsupported(name, f"a sensor of kind {sensor.kind}")
-            made = self._sensors[name] = make(self._worlds, sensor)
-            sensor._core = reader
-            shared = {field: arrays.share(array) for field, array in made.fields.items()}
-            sensor._fields = MappingProxyType(shared)
-            sensor._data = (
-                shared[""] if "" in shared else data.make_data(data.DATA_OF_KIND.get(sensor.kind, data.SensorData), shared)
-            )
+        for name in list(self.scene.sensors):
+            self._make_sensor(name, reader)
         for made in self._sensors.values():
             if made.every_step:
                 self._use(made)
         self._substepped = [made for made in self._sensors.values() if made.wants_substep]
         self._substep_stage = max((made.needs for made in self._substepped), default=Stage.NONE)
+
+    def _make_sensor(self, name: str, reader: _Reader) -> None:
+        if name in self._sensors:
+            return
+        sensor: Any = self.scene.sensors[name]
+        if isinstance(sensor, Sensor):
+            self._sensors[name] = user.UserSensor(self._worlds, sensor, self, reader)
+            return
+        if sensor.kind == "contact_field" and not contact.has_field(self._worlds, name):
+            del self.scene._sensors[name]
+            return
+        if sensor.kind == "effect":
+            self._make_sensor(sensor.cfg.sensor, reader)
+        make = REGISTRY.get(sensor.kind)
+        if make is None:
+            raise unsupported(name, f"a sensor of kind {sensor.kind}")
+        made = self._sensors[name] = make(self._worlds, sensor)
+        sensor._core = reader
+        shared = {field: arrays.share(array) for field, array in made.fields.items()}
+        sensor._fields = MappingProxyType(shared)
+        sensor._data = shared[""] if "" in shared else data.make_data(data.DATA_OF_KIND.get(sensor.kind, data.SensorData), shared)
 
     def _use(self, sensor: WarpSensor) -> None:
         """Computes this sensor with every step from now on."""

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares simulations with ``backend="warp"`` with those on the CPU, measures their speed, and writes the tables of docs/warp.md.
+
+    python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 50] [--long 1000] [--write]
+
+Before every step the worlds of both simulations have the same state and controls. Then both step, and every field of every sensor is
+compared. The exit code is 1 if a field differs by more than its bound.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mjsense as mjs
+from mjsense import effects
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "warp.md"
+STATE = ("qpos", "qvel", "act", "mocap_pos", "mocap_quat")
+
+ROBOT = """
+<mujoco>
+  <asset><texture name="grid" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".8 .8 .7" width="64" height="64"/>
+    <material name="grid" texture="grid" texrepeat="4 4"/></asset>
+  <worldbody>
+    <light pos="1 -1 3" dir="-.3 .3 -1"/>
+    <body name="trunk" pos="0 0 .25"><freejoint name="root"/>
+      <geom name="trunk" type="box" size=".2 .15 .1" mass="4" material="grid"/>
+      <site name="imu" pos=".1 0 .02" euler="5 10 15"/><site name="nose" pos=".25 0 0" size=".05"/>
+      <camera name="eye" pos=".2 0 .1" xyaxes="0 -1 0 .3 0 1"/>
+      <body name="left_wheel" pos="0 .2 -.1"><joint name="left" axis="0 1 0"/>
+        <geom name="left_wheel" type="cylinder" euler="90 0 0" size=".1 .02" mass=".3"/></body>
+      <body name="right_wheel" pos="0 -.2 -.1"><joint name="right" axis="0 1 0"/>
+        <geom name="right_wheel" type="cylinder" euler="90 0 0" size=".1 .02" mass=".3"/></body>
+      <body name="arm" pos=".2 0 .1"><joint name="arm" axis="0 1 0" damping=".2" range="-40 80" limited="true"/>
+        <geom name="arm" type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass=".4"/><site name="hand" pos=".3 0 0" size=".04"/></body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="difference"><joint joint="left" coef="1"/><joint joint="right" coef="-1"/></fixed></tendon>
+  <actuator><motor name="left" joint="left"/><motor name="right" joint="right"/><motor name="arm" joint="arm" gear="3"/></actuator>
+  <sensor>
+    <touch name="touch" site="hand"/><accelerometer name="accelerometer" site="imu"/><velocimeter name="velocimeter" site="imu"/>
+    <gyro name="gyro" site="imu"/><force name="force" site="hand"/><torque name="torque" site="hand"/>
+    <magnetometer name="magnetometer" site="imu"/><rangefinder name="rangefinder" site="nose"/>
+    <jointpos name="jointpos" joint="arm"/><jointvel name="jointvel" joint="arm"/>
+    <jointactuatorfrc name="jointactuatorfrc" joint="arm"/><jointlimitpos name="jointlimitpos" joint="arm"/>
+    <tendonpos name="tendonpos" tendon="difference"/><tendonvel name="tendonvel" tendon="difference"/>
+    <actuatorpos name="actuatorpos" actuator="arm"/><actuatorvel name="actuatorvel" actuator="arm"/>
+    <actuatorfrc name="actuatorfrc" actuator="arm"/>
+    <framepos name="framepos" objtype="site" objname="hand" reftype="body" refname="trunk"/>
+    <framequat name="framequat" objtype="site" objname="hand"/>
+    <framexaxis name="framexaxis" objtype="site" objname="hand"/><frameyaxis name="frameyaxis" objtype="site" objname="hand"/>
+    <framezaxis name="framezaxis" objtype="site" objname="hand"/><framelinvel name="framelinvel" objtype="site" objname="hand"/>
+    <frameangvel name="frameangvel" objtype="site" objname="hand"/><framelinacc name="framelinacc" objtype="site" objname="hand"/>
+    <frameangacc name="frameangacc" objtype="site" objname="hand"/><subtreecom name="subtreecom" body="trunk"/>
+    <subtreelinvel name="subtreelinvel" body="trunk"/><subtreeangmom name="subtreeangmom" body="trunk"/>
+    <e_potential name="e_potential"/><e_kinetic name="e_kinetic"/><clock name="clock"/>
+  </sensor>
+</mujoco>"""
+BOX = """
+<mujoco><worldbody><body name="box" pos=".8 .1 .1"><freejoint/>
+  <geom name="box" type="box" size=".1 .1 .1" mass=".2" rgba=".8 .3 .2 1"/></body></worldbody></mujoco>"""
+BALL = """
+<mujoco><worldbody><body name="ball" pos=".85 .1 .3"><freejoint/>
+  <geom name="ball" type="sphere" size=".1" mass=".2" rgba=".2 .7 .3 1"/></body></worldbody></mujoco>"""
+
+EVERY_FIELD = ("found", "force", "torque", "dist", "pos", "normal", "tangent")
+
+
+def quadruped_sensors() -> tuple[Any, ...]:
+    feet, ground = mjs.ContactMatch("geom", ".*_foot", "robot"), mjs.ContactMatch("body", "terrain")
+    base = mjs.ObjRef("site", "imu", "robot")
+    return (
+        mjs.ContactSensorCfg(
+            "feet", feet, ground, EVERY_FIELD, num_slots=2, track_air_time=True, history_length=3, track_events=True, latch=True,
+            friction_split=True, other_ids=True),
+        mjs.ContactSensorCfg("net", feet, ground, ("found", "force", "torque", "pos"), reduce="netforce", latch=True, other_ids=True),
+        mjs.ContactSensorCfg("deepest", feet, ground, ("found", "dist", "pos"), reduce="mindist", global_frame=False),
+        mjs.ContactSensorCfg("legs", mjs.ContactMatch("subtree", ".*_hip", "robot"), None, EVERY_FIELD, global_frame=True),
+        mjs.RayCastSensorCfg("scan", base, mjs.GridPatternCfg(size=(1.0, 0.6), resolution=0.1), ray_alignment="yaw"),
+        mjs.TerrainHeightSensorCfg("height", base, mjs.GridPatternCfg(size=(0.2, 0.2), resolution=0.1)),
+        mjs.LidarSensorCfg("lidar", base, scan=mjs.SpinningScanCfg(channels=4, samples=24), range_noise_std=0.01, dropout=0.05),
+        mjs.ImuSensorCfg("imu", base, "mpu6050", orientation=True),
+        mjs.EffectSensorCfg("noisy", "imu", effects=(effects.EpisodeBias(effects.Gaussian(0.05)), effects.Noise(effects.Gaussian(0.1)), effects.Delay(0.02))),
+    )  # fmt: skip
+
+
+def plane() -> mjs.SceneCfg:
+    robot = mjs.EntityCfg(model="embedded:robots/quadruped.xml")
+    return mjs.SceneCfg(entities={"robot": robot}, terrain=mjs.TerrainCfg(), sensors=quadruped_sensors())
+
+
+def rough() -> mjs.SceneCfg:
+    rough = mjs.SubTerrainCfg("rough")
+    terrain = mjs.TerrainCfg("generator", {"rough": rough}, levels=1, tile_size=(4.0, 4.0), border=0.0)
+    robot = mjs.EntityCfg(model="embedded:robots/quadruped.xml")
+    return mjs.SceneCfg(entities={"robot": robot}, terrain=terrain, sensors=quadruped_sensors())
+
+
+def objects() -> mjs.SceneCfg:
+    """Objects that touch each other, every type of built-in sensor, and cameras."""
+    things = {name: mjs.EntityCfg(model=xml) for name, xml in {"robot": ROBOT, "box": BOX, "ball": BALL}.items()}
+    every = mjs.ContactMatch("body", ("box/box", "ball/ball", "robot/trunk", "robot/left_wheel", "robot/arm"))
+    return mjs.SceneCfg(
+        entities=things, terrain=mjs.TerrainCfg(), sensors=(
+            mjs.ContactSensorCfg("contacts", every, None, EVERY_FIELD, num_slots=6, other_ids=True),
+            mjs.ContactSensorCfg("pairs", every, every, ("found",), secondary_policy="each"),
+            mjs.ContactSensorCfg("any", mjs.ContactMatch("subtree", "trunk", "robot"), None, ("found", "dist"), reduce="none", num_slots=8),
+            mjs.CameraSensorCfg(
+                "eye", camera_name="robot/eye", width=32, height=24, data_types=("rgb", "depth", "segmentation")),
+        ))  # fmt: skip
+
+
+SCENES: dict[str, Callable[[], mjs.SceneCfg]] = {"quadruped on a plane": plane, "quadruped on rough terrain": rough, "objects": objects}
+
+BOUNDS: dict[str, tuple[float, float]] = {}
+"""By sensor kind and field: the bound of the difference relative to the largest value, and the share of rows that may differ in it."""
+
+
+@dataclass
+class Field:
+    """Differences of one field over all scenes, sensors of its kind, worlds and steps."""
+
+    unit: str = ""
+    exact: bool = False
+    values: int = 0
+    other: int = 0
+    """Number of values that are not equal (integers, bools, counts), or beyond the bound."""
+    largest: float = 0.0
+    difference: float = 0.0
+    differences: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, ours: np.ndarray, theirs: np.ndarray, rows: np.ndarray) -> None:
+        """``rows``: the worlds whose contacts, hits and so on are the same on both sides."""
+        self.values += ours.size
+        if self.exact:
+            self.other += int((ours != theirs).sum())
+            return
+        ours, theirs = ours[rows].astype(float), theirs[rows].astype(float)
+        both = np.isfinite(ours) & np.isfinite(theirs)
+        self.other += int((np.isfinite(ours) != np.isfinite(theirs)).sum())
+        if both.any():
+            difference = np.abs(ours - theirs)[both]
+            self.largest = max(self.largest, float(np.abs(theirs[both]).max()))
+            self.difference = max(self.difference, float(difference.max()))
+            self.differences.append(np.sort(difference.ravel())[-max(1, difference.size // 500) :])
+
+    def tail(self) -> float:
+        """The difference that one value in a thousand exceeds."""
+        found = np.sort(np.concatenate(self.differences)) if self.differences else np.zeros(1)
+        return float(found[-min(len(found), max(1, self.values // 1000))])
+
+
+EXACT = ("found", "found_history", "pair_found", "other_geom", "other_body", "geom_id", "body_id", "material_id", "segmentation")
+"""Fields that are compared for equality although some are floats."""
+
+
+def on_host(values: Any) -> np.ndarray:
+    return values.cpu().numpy() if hasattr(values, "cpu") else values.numpy() if hasattr(values, "device") else np.asarray(values)
+
+
+def pair(scene: Callable[[], mjs.SceneCfg], worlds: int, device: str, decimation: int = 2) -> tuple[Any, Any]:
+    """A simulation on the CPU and one on the device."""
+    ours = mjs.Simulation(mjs.Scene(scene()), worlds, decimation=decimation, backend="warp", device=device, nconmax=100, njmax=400)
+    return mjs.Simulation(mjs.Scene(scene()), worlds, decimation=decimation), ours
+
+
+def steps(reference: Any, ours: Any, count: int, seed: int = 0) -> Iterator[int]:
+    """Steps both from the same states under random controls."""
+    rng = np.random.default_rng(seed)
+    key = "init_state" if reference.model.nkey else None
+    reference.reset(key=key)
+    ours.reset(key=key)
+    start = reference.ctrl.copy()
+    velocity = 0.3 * rng.normal(size=reference.qvel.shape)
+    reference.set_state(qvel=velocity)
+    for step in range(count):
+        if step % 5 == 0:
+            push = rng.normal(size=reference.ctrl.shape) * 0.5
+        ours.set_state(**{name: getattr(reference, name) for name in STATE})
+        reference.ctrl[:] = start + push
+        ours.ctrl = reference.ctrl
+        reference.step()
+        ours.step()
+        yield step
+
+
+def compare(found: dict[tuple[str, str], Field], reference: Any, ours: Any) -> None:
+    """Adds the differences of all sensors at the current state."""
+    for name, sensor in reference.scene.sensors.items():
+        if name not in ours.scene.sensors or sensor.kind == "contact_field":
+            continue
+        theirs, mine = sensor.fields, ours.scene[name].fields
+        assert set(theirs) == set(mine), name
+        rows = np.ones(reference.num_worlds, bool)
+        for key in theirs:
+            ids = on_host(mine[key]) if key in EXACT or theirs[key].dtype.kind in "bi" else None
+            if ids is not None:
+                rows &= (ids == theirs[key]).reshape(len(rows), -1).all(1)
+        for key, spec in sensor.specs.items():
+            label = sensor.cfg.sensor_type if sensor.kind == "builtin" and sensor.cfg else name.split("/")[-1] if sensor.kind == "builtin" else key
+            entry = found[sensor.kind, label]
+            entry.unit, entry.exact = spec.unit, key in EXACT or theirs[key].dtype.kind in "bi"
+            assert on_host(mine[key]).shape == theirs[key].shape and on_host(mine[key]).dtype == theirs[key].dtype, (name, key)
+            entry.add(on_host(mine[key]), theirs[key], rows)
+
+
+def run(device: str, worlds: int, count: int, scenes: dict[str, Callable[[], mjs.SceneCfg]]) -> dict[tuple[str, str], Field]:
+    found: dict[tuple[str, str], Field] = defaultdict(Field)
+    for name, scene in scenes.items():
+        began = time.perf_counter()
+        reference, ours = pair(scene, worlds, device)
+        for _ in steps(reference, ours, count):
+            compare(found, reference, ours)
+        print(f"{name}: {time.perf_counter() - began:.0f} s", file=sys.stderr)
+    return found
+
+
+def table(found: dict[tuple[str, str], Field]) -> list[str]:
+    lines = ["| sensor | field | unit | largest value | largest difference | exceeded by 1 in 1,000 | not equal |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    for (kind, name), entry in sorted(found.items()):
+        share = f"{entry.other:,} of {entry.values:,}" if entry.exact or entry.other else "0"
+        numbers = ["", "", ""] if entry.exact else [f"{x:.2g}" for x in (entry.largest, entry.difference, entry.tail())]
+        lines.append(f"| {' | '.join([kind, name, entry.unit, *numbers, share])} |")
+    return lines
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device", help="cpu, cuda:0 and so on; by default the first CUDA device, or the CPU without one.")
+    parser.add_argument("--worlds", type=int, default=64, help="Number of worlds.")
+    parser.add_argument("--steps", type=int, default=50, help="Number of control steps for each scene.")
+    parser.add_argument("--only", help="Name of the only scene to compare.")
+    parser.add_argument("--write", action="store_true", help="Write the table into docs/warp.md.")
+    arguments = parser.parse_args()
+    import warp as wp
+
+    device = arguments.device or ("cuda:0" if wp.is_cuda_available() else "cpu")
+    scenes = {name: scene for name, scene in SCENES.items() if arguments.only in (None, name)}
+    found = run(device, arguments.worlds, arguments.steps, scenes)
+    print("\n".join(table(found)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
