@@ -130,7 +130,8 @@ class Camera(WarpSensor):
         self.fields = declared(worlds, sensor)
         self.pixels = cfg.width * cfg.height
         self._make_context(model)
-        intrinsics = sensor.fields["intrinsics"]  # of the compiled world; it has this configuration's changes
+        worlds.compiled._core.refresh(sensor._handle)
+        intrinsics = sensor._handle.arrays()["intrinsics"]  # of the compiled world; it has this configuration's changes
         self.fields["intrinsics"].assign(np.broadcast_to(intrinsics[0], (worlds.num_worlds, 3, 3)))
         self._make_rays(model, intrinsics[0])
         self._make_owners(model)

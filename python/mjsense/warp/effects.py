@@ -634,9 +634,7 @@ def _step_delay(
             if per_world_phase and update_period > 0:
                 phase[w] = int(below(_episode_rng(clock, w, stream), wp.uint32(update_period), 0)[0])
         elif not hold:
-            if update_period == 0:
-                lag[w] = new_lag
-            elif (rows[w] + phase[w]) % update_period == 0:
+            if update_period == 0 or (rows[w] + phase[w]) % update_period == 0:
                 lag[w] = new_lag
         rows[w] = rows[w] + 1
         _push(ring, w, clock.first[w], _ZERO)

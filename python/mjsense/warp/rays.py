@@ -12,7 +12,7 @@ import warp as wp
 from mjsense import _mujoco
 from mjsense.warp.sensor import WarpSensor, Worlds, declared, implements, unsupported, vec3_view
 from mjsense.warp.shapes import NO_HIT
-from mjsense.warp.surfaces import Surfaces, nearest_hit, ray_scene
+from mjsense.warp.surfaces import Filter, Surfaces, nearest_hit, ray_scene
 
 if TYPE_CHECKING:
     from mjsense.native_sensor import NativeSensor
@@ -129,8 +129,7 @@ class Rays:
     direction: wp.array(dtype=wp.vec3)  # [parts * n]
     count: int  # n
     part: wp.array(dtype=int)  # [B] part of the pattern that is cast
-    candidates: wp.array(dtype=int)  # geom ids of all frames
-    begin: wp.array(dtype=int)  # [F + 1]
+    filter: Filter
     nearest: float
     farthest: float
 
@@ -155,7 +154,7 @@ def _cast(surfaces: Surfaces, frames: Frames, rays: Rays, hits: Hits, ids: bool)
     direction = align @ rays.direction[i]
     # The tolerance avoids that rounding turns a hit at the maximum distance into a miss.
     reach = rays.farthest * (1.0 + 4.0e-7)
-    hit = nearest_hit(surfaces, rays.candidates, rays.begin[f], rays.begin[f + 1], w, origin, direction, reach)
+    hit = nearest_hit(surfaces, rays.filter, f, w, origin, direction, reach)
     geom = hit.geom
     if hit.t < rays.nearest:
         geom = -1
@@ -239,18 +238,13 @@ class RayCast(WarpSensor):
         f.align = worlds.zeros((worlds.num_worlds, len(refs)), wp.mat33)
 
     def _make_rays(self, offsets: np.ndarray, directions: np.ndarray, count: int) -> None:
-        worlds, cfg, model = self.worlds, self.cfg, self.worlds.compiled.model
+        worlds, cfg = self.worlds, self.cfg
         groups = range(6) if cfg.include_geom_groups is None else cfg.include_geom_groups
-        seen = np.isin(np.clip(model.geom_group, 0, 5), list(groups))
-        lists = []
-        for body in self.bodies:
-            excluded = cfg.exclude_parent_body and (body > 0 or self.exclude_world)
-            lists.append(np.flatnonzero(seen & (model.geom_bodyid != body) if excluded else seen))
+        own = [body if cfg.exclude_parent_body and (body > 0 or self.exclude_world) else -1 for body in self.bodies]
         rays = self.rays = Rays()
         rays.offset, rays.direction = worlds.array(offsets, wp.vec3), worlds.array(directions, wp.vec3)
         rays.count, rays.part = count, worlds.zeros(worlds.num_worlds, int)
-        rays.candidates = worlds.array(np.concatenate([*lists, [0]]), int)
-        rays.begin = worlds.array(np.cumsum([0, *map(len, lists)]), int)
+        rays.filter = self.scene.filter(groups, own)
         rays.nearest, rays.farthest = cfg.min_distance, min(cfg.max_distance, 1e29)
 
     def _make_hits(self) -> None:
@@ -294,12 +288,12 @@ def _measure_heights(
         # To the ground straight below, at any distance; without one, to the ground above, which gives 0; else to z = 0.
         down = wp.vec3(0.0, 0.0, -1.0)
         ground = float(0.0)
-        below = nearest_hit(surfaces, rays.candidates, rays.begin[f], rays.begin[f + 1], w, pos, down, NO_HIT)
+        below = nearest_hit(surfaces, rays.filter, f, w, pos, down, NO_HIT)
         if below.geom >= 0:
             ground = pos[2] - below.t
         else:
             start = pos + wp.vec3(0.0, 0.0, rays.farthest)
-            above = nearest_hit(surfaces, rays.candidates, rays.begin[f], rays.begin[f + 1], w, start, down, NO_HIT)
+            above = nearest_hit(surfaces, rays.filter, f, w, start, down, NO_HIT)
             if above.geom >= 0:
                 ground = start[2] - above.t
         missing = wp.clamp(pos[2] - ground, 0.0, rays.farthest)

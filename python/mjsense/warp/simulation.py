@@ -208,8 +208,12 @@ class WarpSimulation(KnownAttributes):
     def _refresh(self, sensor: WarpSensor, again: bool = False) -> None:
         """Computes the sensor for the current state if it is not up to date, or ``again``."""
         self._check_open()
-        if self._moments.get(sensor.name) == self._moment and not again:
-            return
+        if self._moments.get(sensor.name) != self._moment or again:
+            self._compute(sensor)
+        if (check := getattr(sensor, "check", None)) is not None:
+            check()
+
+    def _compute(self, sensor: WarpSensor) -> None:
         for source in sensor.inputs:
             self._refresh(source)
         with wp.ScopedDevice(self._device):
@@ -219,8 +223,6 @@ class WarpSimulation(KnownAttributes):
             sensor.update()
         self._moments[sensor.name] = self._moment
         self._use(sensor)
-        if (check := getattr(sensor, "check", None)) is not None:
-            check()
 
     def add(self, sensor: Any) -> Any:
         """Sensors are parts of the scene with this backend."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco_warp as mjw
@@ -53,6 +54,19 @@ class Surfaces:
     mat: wp.array2d(dtype=wp.mat33)
     meshes: wp.array(dtype=wp.uint64)
     height_fields: wp.array(dtype=wp.uint64)
+    use_tree: bool
+    tree: wp.uint64  # boxes of the fixed geoms
+    tree_geoms: wp.array(dtype=int)
+
+
+@wp.struct
+class Filter:
+    """The geoms that the rays of each frame can hit: first those that move, then the fixed ones."""
+
+    seen: wp.array2d(dtype=bool)  # [F, ngeom]
+    geoms: wp.array(dtype=int)  # of all frames
+    begin: wp.array(dtype=int)  # [F + 1]
+    fixed: wp.array(dtype=int)  # [F]
 
 
 @wp.struct
@@ -80,85 +94,96 @@ def _hit_triangles(tree: wp.uint64, o: wp.vec3, d: wp.vec3, start: float, limit:
 
 
 @wp.func
-def nearest_hit(
-    surfaces: Surfaces,
-    candidates: wp.array(dtype=int),
-    begin: int,
-    end: int,
-    w: int,
-    origin: wp.vec3,
-    direction: wp.vec3,
-    reach: float,
-) -> Hit:
-    """The nearest hit within reach of the geoms candidates[begin:end], whose ids increase: of hits that are a tie, the first counts."""
+def _nearer(surfaces: Surfaces, hit: Hit, w: int, geom: int, origin: wp.vec3, direction: wp.vec3, reach: float) -> Hit:
+    """The nearer one of a hit and that of a geom, within reach. Distances within rounding are a tie: the lower geom id wins."""
+    pos = surfaces.pos[w, geom]
+    limit = wp.min(reach, tied(hit.t))
+    # Distance along the ray to the bounding sphere, with a margin for rounding.
+    to_centre = pos - origin
+    middle = wp.dot(to_centre, direction)
+    aside = to_centre - middle * direction
+    radius = surfaces.radius[w % surfaces.radius.shape[0], geom]
+    start = float(0.0)
+    if radius > 0.0:
+        radius += 1.0e-4 + 1.0e-5 * (radius + wp.length(to_centre))
+        if wp.dot(aside, aside) > radius * radius or middle + radius < 0.0 or middle - radius > limit:
+            return hit
+        start = wp.max(0.0, middle - radius)
+    if colour(surfaces, w, geom)[3] == 0.0:
+        return hit
+    mat = surfaces.mat[w, geom]
+    o = wp.transpose(mat) @ (origin - pos)
+    d = wp.transpose(mat) @ direction
+    size = surfaces.size[w % surfaces.size.shape[0], geom]
+    kind = surfaces.type[geom]
+    t = float(NO_HIT)
+    found = wp.vec4()
+    if kind == PLANE:
+        t = hit_plane(size, o, d)
+    elif kind == SPHERE:
+        t = hit_sphere(size, o, d)
+    elif kind == CAPSULE:
+        t = hit_capsule(size, o, d)
+    elif kind == ELLIPSOID:
+        t = hit_ellipsoid(size, o, d)
+    elif kind == CYLINDER:
+        t = hit_cylinder(size, o, d)
+    elif kind == BOX:
+        t = hit_box(size, o, d)
+    else:
+        shape = surfaces.data_id[w % surfaces.data_id.shape[0], geom]
+        tree = wp.uint64(0)
+        if kind == HFIELD:
+            tree = surfaces.height_fields[shape]
+        else:
+            tree = surfaces.meshes[shape]
+        if tree != wp.uint64(0):
+            found = _hit_triangles(tree, o, d, start, tied(limit))
+            t = found[0]
+    if t > reach or t >= NO_HIT:
+        return hit
+    is_nearer = tied(t) < hit.t or (t <= hit.t + (tied(t) - t) and geom < hit.geom)
+    if not is_nearer:
+        return hit
+    p = o + t * d
+    n = wp.vec3(0.0, 0.0, 1.0)
+    if kind == SPHERE:
+        n = normal_sphere(p)
+    elif kind == CAPSULE:
+        n = normal_capsule(size, p)
+    elif kind == ELLIPSOID:
+        n = normal_ellipsoid(size, p)
+    elif kind == CYLINDER:
+        n = normal_cylinder(size, p)
+    elif kind == BOX:
+        n = normal_box(size, p)
+    elif kind != PLANE:
+        n = wp.normalize(wp.vec3(found[1], found[2], found[3]))
+    best = Hit()
+    best.t = t
+    best.geom = geom
+    best.normal = mat @ n
+    return best
+
+
+@wp.func
+def nearest_hit(surfaces: Surfaces, filter: Filter, f: int, w: int, origin: wp.vec3, direction: wp.vec3, reach: float) -> Hit:
+    """The nearest hit, within reach, of a ray of frame ``f``."""
     hit = Hit()
     hit.t = NO_HIT
     hit.geom = -1
-    for c in range(begin, end):
-        geom = candidates[c]
-        pos = surfaces.pos[w, geom]
-        limit = wp.min(reach, hit.t)
-        # Distance along the ray to the bounding sphere, with a margin for rounding.
-        to_centre = pos - origin
-        middle = wp.dot(to_centre, direction)
-        aside = to_centre - middle * direction
-        radius = surfaces.radius[w % surfaces.radius.shape[0], geom]
-        start = float(0.0)
-        if radius > 0.0:
-            radius += 1.0e-4 + 1.0e-5 * (radius + wp.length(to_centre))
-            if wp.dot(aside, aside) > radius * radius or middle + radius < 0.0 or middle - radius > limit:
-                continue
-            start = wp.max(0.0, middle - radius)
-        if colour(surfaces, w, geom)[3] == 0.0:
-            continue
-        mat = surfaces.mat[w, geom]
-        o = wp.transpose(mat) @ (origin - pos)
-        d = wp.transpose(mat) @ direction
-        size = surfaces.size[w % surfaces.size.shape[0], geom]
-        kind = surfaces.type[geom]
-        t = float(NO_HIT)
-        found = wp.vec4()
-        if kind == PLANE:
-            t = hit_plane(size, o, d)
-        elif kind == SPHERE:
-            t = hit_sphere(size, o, d)
-        elif kind == CAPSULE:
-            t = hit_capsule(size, o, d)
-        elif kind == ELLIPSOID:
-            t = hit_ellipsoid(size, o, d)
-        elif kind == CYLINDER:
-            t = hit_cylinder(size, o, d)
-        elif kind == BOX:
-            t = hit_box(size, o, d)
-        else:
-            shape = surfaces.data_id[w % surfaces.data_id.shape[0], geom]
-            tree = wp.uint64(0)
-            if kind == HFIELD:
-                tree = surfaces.height_fields[shape]
-            else:
-                tree = surfaces.meshes[shape]
-            if tree != wp.uint64(0):
-                found = _hit_triangles(tree, o, d, start, tied(limit))
-                t = found[0]
-        if t > reach or t >= NO_HIT or tied(t) >= hit.t:
-            continue
-        p = o + t * d
-        n = wp.vec3(0.0, 0.0, 1.0)
-        if kind == SPHERE:
-            n = normal_sphere(p)
-        elif kind == CAPSULE:
-            n = normal_capsule(size, p)
-        elif kind == ELLIPSOID:
-            n = normal_ellipsoid(size, p)
-        elif kind == CYLINDER:
-            n = normal_cylinder(size, p)
-        elif kind == BOX:
-            n = normal_box(size, p)
-        elif kind != PLANE:
-            n = wp.normalize(wp.vec3(found[1], found[2], found[3]))
-        hit.t = t
-        hit.geom = geom
-        hit.normal = mat @ n
+    end = filter.begin[f + 1]
+    if surfaces.use_tree:
+        end = filter.fixed[f]
+    for c in range(filter.begin[f], end):
+        hit = _nearer(surfaces, hit, w, filter.geoms[c], origin, direction, reach)
+    if surfaces.use_tree:
+        query = wp.bvh_query_ray(surfaces.tree, origin, direction)
+        item = int(0)
+        while wp.bvh_query_next(query, item, wp.min(reach, tied(hit.t))):
+            geom = surfaces.tree_geoms[item]
+            if filter.seen[f, geom]:
+                hit = _nearer(surfaces, hit, w, geom, origin, direction, reach)
     return hit
 
 
@@ -199,31 +224,75 @@ def height_field_triangles(size: np.ndarray, heights: np.ndarray) -> tuple[np.nd
     return np.concatenate(points), np.concatenate(faces)
 
 
+_MIN_FIXED = 24
+"""Number of fixed geoms from which on a tree is used."""
+_FIXED_POSES = ("body_pos", "body_quat", "geom_pos", "geom_quat", "geom_size", "geom_dataid")
+"""Fields of the model that move or resize fixed geoms. The tree is used while they are the same in all worlds."""
+
+
 class RayScene:
     """The surfaces of the worlds. One object serves all sensors of a simulation."""
 
     def __init__(self, worlds: Worlds) -> None:
-        compiled, model, data, device = worlds.compiled.model, worlds.model, worlds.data, worlds.device
+        model, device = worlds.compiled.model, worlds.device
         self.trees = []  # keeps them alive
-        meshes, fields = np.zeros(max(compiled.nmesh, 1), np.uint64), np.zeros(max(compiled.nhfield, 1), np.uint64)
-        for i in range(compiled.nmesh):
-            vertex, face = compiled.mesh_vertadr[i], compiled.mesh_faceadr[i]
-            faces = compiled.mesh_face[face : face + compiled.mesh_facenum[i]]
+        meshes, fields = np.zeros(max(model.nmesh, 1), np.uint64), np.zeros(max(model.nhfield, 1), np.uint64)
+        for i in range(model.nmesh):
+            vertex, face = model.mesh_vertadr[i], model.mesh_faceadr[i]
+            faces = model.mesh_face[face : face + model.mesh_facenum[i]]
             if len(faces):
-                meshes[i] = self._add(compiled.mesh_vert[vertex : vertex + compiled.mesh_vertnum[i]], faces, device)
-        for i in range(compiled.nhfield):
-            rows, columns, begin = compiled.hfield_nrow[i], compiled.hfield_ncol[i], compiled.hfield_adr[i]
-            heights = compiled.hfield_data[begin : begin + rows * columns].reshape(rows, columns)
-            fields[i] = self._add(*height_field_triangles(compiled.hfield_size[i], heights), device)
-        s = self.surfaces = Surfaces()
-        s.type, s.data_id, s.material, s.size = model.geom_type, model.geom_dataid, model.geom_matid, model.geom_size
-        s.radius, s.rgba, s.material_rgba, s.body = model.geom_rbound, model.geom_rgba, model.mat_rgba, model.geom_bodyid
-        s.pos, s.mat = data.geom_xpos, data.geom_xmat
-        s.meshes, s.height_fields = worlds.array(meshes, wp.uint64), worlds.array(fields, wp.uint64)
+                meshes[i] = self._add(model.mesh_vert[vertex : vertex + model.mesh_vertnum[i]], faces, device)
+        for i in range(model.nhfield):
+            rows, columns, begin = model.hfield_nrow[i], model.hfield_ncol[i], model.hfield_adr[i]
+            heights = model.hfield_data[begin : begin + rows * columns].reshape(rows, columns)
+            fields[i] = self._add(*height_field_triangles(model.hfield_size[i], heights), device)
+        self.worlds = worlds
+        self.meshes, self.height_fields = worlds.array(meshes, wp.uint64), worlds.array(fields, wp.uint64)
+        # Geoms of bodies without joints, except endless planes and mocap bodies.
+        body = model.geom_bodyid
+        self.fixed = (model.body_weldid[body] == 0) & (model.body_mocapid[model.body_rootid[body]] < 0) & (model.geom_rbound > 0)
+        ids = np.flatnonzero(self.fixed)
+        self.tree_geoms = worlds.array(ids, int)
+        self.tree = self._tree_of_fixed(ids, model) if len(ids) >= _MIN_FIXED and worlds.num_worlds > 1 else None
 
     def _add(self, points: np.ndarray, faces: np.ndarray, device: Any) -> int:
         self.trees.append(_tree(points, faces, device))
         return self.trees[-1].id
+
+    def _tree_of_fixed(self, ids: np.ndarray, model: Any) -> wp.Bvh:
+        data = self.worlds.compiled.data
+        pos, mat = data.geom_xpos[0][ids], data.geom_xmat[0][ids].reshape(-1, 3, 3)
+        centre = pos + np.einsum("nij,nj->ni", mat, model.geom_aabb[ids].reshape(-1, 6)[:, :3])
+        half = np.einsum("nij,nj->ni", np.abs(mat), model.geom_aabb[ids].reshape(-1, 6)[:, 3:])
+        half += 1e-5 + 1e-6 * (np.abs(centre) + half)
+        return wp.Bvh(self.worlds.array(centre - half, wp.vec3), self.worlds.array(centre + half, wp.vec3))
+
+    def filter(self, groups: Any, excluded: Sequence[int]) -> Filter:
+        """Geoms of these groups, except those of the body that is excluded for each frame; -1: none."""
+        model, worlds = self.worlds.compiled.model, self.worlds
+        visible = np.isin(np.clip(model.geom_group, 0, 5), list(groups))
+        seen = np.array([visible & (model.geom_bodyid != body) for body in excluded])
+        lists = [np.flatnonzero(row & ~self.fixed) for row in seen], [np.flatnonzero(row & self.fixed) for row in seen]
+        moving = [len(ids) for ids in lists[0]]
+        begin = np.cumsum([0, *(len(a) + len(b) for a, b in zip(*lists, strict=True))])
+        f = Filter()
+        f.seen = worlds.array(seen, bool)
+        f.geoms = worlds.array(np.concatenate([*(np.concatenate(pair) for pair in zip(*lists, strict=True)), [0]]), int)
+        f.begin, f.fixed = worlds.array(begin, int), worlds.array(begin[:-1] + moving, int)
+        return f
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """The current arrays; randomize() replaces those of the model."""
+        model, data, s = self.worlds.model, self.worlds.data, Surfaces()
+        s.type, s.data_id, s.material, s.size = model.geom_type, model.geom_dataid, model.geom_matid, model.geom_size
+        s.radius, s.rgba, s.material_rgba, s.body = model.geom_rbound, model.geom_rgba, model.mat_rgba, model.geom_bodyid
+        s.pos, s.mat = data.geom_xpos, data.geom_xmat
+        s.meshes, s.height_fields = self.meshes, self.height_fields
+        s.tree_geoms = self.tree_geoms
+        if self.tree is not None and all(getattr(model, name).shape[0] == 1 for name in _FIXED_POSES):
+            s.use_tree, s.tree = True, self.tree.id
+        return s
 
 
 def ray_scene(worlds: Worlds) -> RayScene:
