@@ -212,7 +212,8 @@ class Height(mjs.Sensor):
         self.steps[slice(None) if world_ids is None else world_ids] = 0
 
     def compute(self, sim):
-        return sim.qpos[:, 2:3]
+        height = sim.qpos[:, 2:3]
+        return height.astype(np.float32) if isinstance(height, np.ndarray) else height
 
 
 @needs_warp
@@ -243,3 +244,31 @@ def test_what_is_missing_is_a_clear_error():
     sim.close()
     with pytest.raises(RuntimeError, match="closed"):
         sim.step()
+
+
+@needs_warp
+def test_a_recording_has_the_rows_of_the_device(tmp_path):
+    eye = mjs.CameraSensorCfg("eye", pos=(0, -2, 0.5), quat=(0.7071, 0.7071, 0, 0), width=32, height=24, data_types=("rgb", "depth"))
+    sims = [simulation(touch(), Height(), eye, backend=backend) for backend in ("warp", "cpu")]
+    rows = []
+    for sim, out in zip(sims, ("warp", "cpu")):
+        sensors = [sim.scene[name] for name in ("touch", "gyro", "height", "eye")]
+        with mjs.Recorder(tmp_path / out, sim, sensors) as recorder:
+            recorder.begin_episode(1, 0)
+            for _ in range(4):
+                recorder.append()
+                sim.step()
+            if out == "warp":
+                last = host(sim.qpos)[1, 2]
+            recorder.finish_episode(1)
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(next((tmp_path / out).rglob("*.h5"))) as file:
+            found = {}
+            file.visititems(lambda name, item, found=found: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+        rows.append(found)
+    assert rows[0].keys() == {name for name in rows[1] if name in rows[0]} and len(rows[0]) > 8
+    heights = next(values for name, values in rows[0].items() if name.endswith("height"))
+    assert heights.shape[0] == 4 and 0 < last < heights[0]
+    for name, values in rows[0].items():
+        if getattr(values, "dtype", np.dtype(bool)).kind == "f":
+            np.testing.assert_allclose(values, rows[1][name], atol=1e-2, err_msg=name)

@@ -18,7 +18,21 @@ from mujoco_warp._src import types
 from mjsense import _core, _mujoco, data
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.sensor import Sensor
-from mjsense.warp import arrays, builtin, camera, contact, effect_sensor, imu, kernels, lidar, limits, physics, rays, user
+from mjsense.warp import (
+    arrays,
+    builtin,
+    camera,
+    contact,
+    effect_sensor,
+    host_rows,
+    imu,
+    kernels,
+    lidar,
+    limits,
+    physics,
+    rays,
+    user,
+)
 from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, rows_view, scalar_view, unsupported
 
 if TYPE_CHECKING:
@@ -233,6 +247,12 @@ class WarpSimulation(KnownAttributes):
         for sensor in sensors:
             self._refresh(self._sensors[sensor.name])
 
+    def _host_rows(self, sensors: Sequence[Any]) -> host_rows.HostRows:
+        """The rows of these sensors for a recorder."""
+        return host_rows.HostRows(
+            sensors, [self._sensors[sensor.name].fields for sensor in sensors], self.num_worlds, self._device
+        )
+
     # ---------------------------------------------------------------------------------------------------------- physics
 
     def step(self, control_steps: int = 1) -> None:
@@ -275,7 +295,9 @@ class WarpSimulation(KnownAttributes):
             physics.compute_velocities(self._model, self._data)
         physics.compute_forces(self._model, self._data)
         physics.integrate(self._model, self._data)
-        wp.launch(kernels.advance_clocks, self.num_worlds, [self.physics_dt, clocks.substep, clocks.tick, clocks.first, self._data.time])
+        wp.launch(
+            kernels.advance_clocks, self.num_worlds, [self.physics_dt, clocks.substep, clocks.tick, clocks.first, self._data.time]
+        )
         self._restore_failed(begin=True)
         for sensor in self._sensors.values():
             if not sensor.on_host:
@@ -285,7 +307,9 @@ class WarpSimulation(KnownAttributes):
         """Updates the sensors' per-substep state (air time, history) once, after ``step_raw(1)``. ``dt`` is in s, the timestep or
         0."""
         if dt not in (0.0, self.physics_dt):
-            raise ValueError(f"update_sensors(): dt is {dt} s, and the timestep is {self.physics_dt} s; others are not available with backend='warp'")
+            raise ValueError(
+                f"update_sensors(): dt is {dt} s, and the timestep is {self.physics_dt} s; others are not available with backend='warp'"
+            )
         with wp.ScopedDevice(self._device):
             for sensor in [*self._substepped, *(sensor for sensor in self._sensors.values() if sensor.on_host)]:
                 sensor.substep()
