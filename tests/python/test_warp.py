@@ -2,6 +2,7 @@
 """Simulation(backend="warp") on Warp's CPU device. tools/gpu_check.py compares more scenes, worlds and steps, on any device."""
 
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -175,7 +176,9 @@ def test_worlds_can_differ_in_the_model():
     sims = simulation(touch()), simulation(touch(), backend="cpu")
     for sim in sims:
         for field, value in values.items():
-            sim.randomize(field, np.broadcast_to(value[:, : len(getattr(sim.model, field))], (3, *getattr(sim.model, field).shape)))
+            sim.randomize(
+                field, np.broadcast_to(value[:, : len(getattr(sim.model, field))], (3, *getattr(sim.model, field).shape))
+            )
         for _ in range(20):
             sim.step()
     np.testing.assert_allclose(host(sims[0].qpos), sims[1].qpos, atol=1e-5)
@@ -194,6 +197,26 @@ def test_arrays_share_the_device_memory():
     sim.step()
     assert sim.scene["touch"].data.force is array
     assert found.ctypes.data == (array.data_ptr() if hasattr(array, "data_ptr") else array.ptr)
+
+
+@needs_warp
+def test_code_of_the_pages():
+    """The page itself, and mjlab's page on either backend, changed by one argument."""
+    docs = Path(__file__).parents[2] / "docs"
+
+    def blocks(page):
+        return "\n".join(re.findall(r"^```python\n(.*?)^```$", (docs / page).read_text(), re.MULTILINE | re.DOTALL))
+
+    page = {}
+    exec(blocks("warp.md"), page)
+    assert host(page["scene"]["feet"].data.force).shape == (16, 4, 3)
+    pytest.importorskip("torch")
+    feet = []
+    for backend in ("cpu", "warp"):
+        names = {}
+        exec(blocks("mjlab.md").replace("model=scene.compile()", f"model=scene.compile(), backend='{backend}'"), names)
+        feet.append(host(names["scene"]["height"].data))
+    np.testing.assert_allclose(feet[1], feet[0], atol=1e-5)
 
 
 class Height(mjs.Sensor):
@@ -248,7 +271,9 @@ def test_what_is_missing_is_a_clear_error():
 
 @needs_warp
 def test_a_recording_has_the_rows_of_the_device(tmp_path):
-    eye = mjs.CameraSensorCfg("eye", pos=(0, -2, 0.5), quat=(0.7071, 0.7071, 0, 0), width=32, height=24, data_types=("rgb", "depth"))
+    eye = mjs.CameraSensorCfg(
+        "eye", pos=(0, -2, 0.5), quat=(0.7071, 0.7071, 0, 0), width=32, height=24, data_types=("rgb", "depth")
+    )
     sims = [simulation(touch(), Height(), eye, backend=backend) for backend in ("warp", "cpu")]
     rows = []
     for sim, out in zip(sims, ("warp", "cpu")):
@@ -264,7 +289,9 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
         h5py = pytest.importorskip("h5py")
         with h5py.File(next((tmp_path / out).rglob("*.h5"))) as file:
             found = {}
-            file.visititems(lambda name, item, found=found: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+            file.visititems(
+                lambda name, item, found=found: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None
+            )
         rows.append(found)
     assert rows[0].keys() == {name for name in rows[1] if name in rows[0]} and len(rows[0]) > 8
     heights = next(values for name, values in rows[0].items() if name.endswith("height"))
