@@ -260,8 +260,8 @@ def test_what_is_missing_is_a_clear_error():
     with pytest.raises(ValueError, match=r"sensor 'late': nsample = 2 is not available with backend='warp'"):
         simulation(xml=plugin)
     sim = simulation()
-    with pytest.raises(NotImplementedError, match=r"Simulation.step_raw is not available with backend='warp'"):
-        sim.step_raw()
+    with pytest.raises(NotImplementedError, match=r"Simulation.draw is not available with backend='warp'"):
+        sim.draw(None)
     with pytest.raises(AttributeError, match="did you mean 'qpos'"):
         sim.qposs = 3
     sim.close()
