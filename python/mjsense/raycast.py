@@ -62,4 +62,6 @@ class CameraSensor(NativeSensor):
         data = super().data
         if self.cfg is None or not self.cfg.clone_data:
             return data
-        return replace(data, **{name: array.copy() for name, array in self._fields.items()})
+        return replace(
+            data, **{name: array.clone() if hasattr(array, "clone") else array.copy() for name, array in self._fields.items()}
+        )

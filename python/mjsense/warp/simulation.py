@@ -18,7 +18,21 @@ from mujoco_warp._src import types
 from mjsense import _core, _mujoco, data
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.sensor import Sensor
-from mjsense.warp import arrays, builtin, camera, contact, effect_sensor, imu, kernels, lidar, limits, physics, rays, user
+from mjsense.warp import (
+    arrays,
+    builtin,
+    camera,
+    contact,
+    effect_sensor,
+    host_rows,
+    imu,
+    kernels,
+    lidar,
+    limits,
+    physics,
+    rays,
+    user,
+)
 from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, rows_view, scalar_view, unsupported
 
 if TYPE_CHECKING:
@@ -121,6 +135,7 @@ class WarpSimulation(KnownAttributes):
         self._views: dict[str, Any] = {}
         self._moment = 1  # changes with every change of the state
         self._forces_at = 0  # the moment of the current forces
+        self._behind = False  # True after step_raw(): derived quantities belong to the state before the step
         model: Any = compiled.model
         with wp.ScopedDevice(self._device):
             _check_sensor_types(model)
@@ -189,6 +204,7 @@ class WarpSimulation(KnownAttributes):
         make = REGISTRY.get(sensor.kind)
         if make is None:
             raise unsupported(name, f"a sensor of kind {sensor.kind}")
+        sensor._bind(self._compiled._core)  # so that its values in the compiled world can be read
         made = self._sensors[name] = make(self._worlds, sensor)
         sensor._core = reader
         shared = {field: arrays.share(array) for field, array in made.fields.items()}
@@ -203,10 +219,10 @@ class WarpSimulation(KnownAttributes):
             self._used.append(sensor)
             self._graphs.clear()
 
-    def _refresh(self, sensor: WarpSensor) -> None:
-        """Computes the sensor for the current state if it is not up to date."""
+    def _refresh(self, sensor: WarpSensor, again: bool = False) -> None:
+        """Computes the sensor for the current state if it is not up to date, or ``again``."""
         self._check_open()
-        if self._moments.get(sensor.name) != self._moment:
+        if self._moments.get(sensor.name) != self._moment or again:
             self._compute(sensor)
         if (check := getattr(sensor, "check", None)) is not None:
             check()
@@ -231,6 +247,12 @@ class WarpSimulation(KnownAttributes):
         for sensor in sensors:
             self._refresh(self._sensors[sensor.name])
 
+    def _host_rows(self, sensors: Sequence[Any]) -> host_rows.HostRows:
+        """The rows of these sensors for a recorder."""
+        return host_rows.HostRows(
+            sensors, [self._sensors[sensor.name].fields for sensor in sensors], self.num_worlds, self._device
+        )
+
     # ---------------------------------------------------------------------------------------------------------- physics
 
     def step(self, control_steps: int = 1) -> None:
@@ -239,6 +261,8 @@ class WarpSimulation(KnownAttributes):
         if control_steps < 1:
             raise ValueError(f"control_steps must be at least 1, not {control_steps}")
         failures: list[tuple[int, str]] = []
+        if self._behind:
+            self.forward()
         for _ in range(control_steps):
             self._moment += 1
             self._run("step", self._control_step)
@@ -251,6 +275,54 @@ class WarpSimulation(KnownAttributes):
                 if sensor.on_host:
                     sensor.substep()
         self._failures = failures
+
+    def step_raw(self, substeps: int = 1) -> None:
+        """Steps all worlds as mujoco_warp does: derived quantities stay one substep behind the state, as in MuJoCo and mjlab."""
+        self._check_open()
+        for _ in range(substeps):
+            self._run("step_raw behind" if self._behind else "step_raw", self._raw_step)
+            self._behind = True
+        self._moment += 1
+        self._forces_at = self._moment
+        self._report()
+
+    def _raw_step(self) -> None:
+        clocks = self._worlds
+        self._status.zero_()
+        self._data.overflow.zero_()
+        wp.copy(self._data.ctrl, self._ctrl)
+        if self._behind:
+            physics.compute_velocities(self._model, self._data)
+        physics.compute_forces(self._model, self._data)
+        physics.integrate(self._model, self._data)
+        wp.launch(
+            kernels.advance_clocks, self.num_worlds, [self.physics_dt, clocks.substep, clocks.tick, clocks.first, self._data.time]
+        )
+        self._restore_failed(begin=True)
+        for sensor in self._sensors.values():
+            if not sensor.on_host:
+                sensor.reset(self._failed)
+
+    def update_sensors(self, dt: float = 0.0) -> None:
+        """Updates the sensors' per-substep state (air time, history) once, after ``step_raw(1)``. ``dt`` is in s, the timestep or
+        0."""
+        if dt not in (0.0, self.physics_dt):
+            raise ValueError(
+                f"update_sensors(): dt is {dt} s, and the timestep is {self.physics_dt} s; others are not available with backend='warp'"
+            )
+        with wp.ScopedDevice(self._device):
+            for sensor in [*self._substepped, *(sensor for sensor in self._sensors.values() if sensor.on_host)]:
+                sensor.substep()
+
+    def reset_sensors(self, world_ids: Any = None) -> None:
+        """Resets the sensors' episode state in these worlds without resetting the physics."""
+        mask = self._mask(world_ids)
+        self._moment += 1
+        if self._behind:
+            self._forces_at = self._moment
+        with wp.ScopedDevice(self._device):
+            for sensor in self._sensors.values():
+                sensor.reset(mask)
 
     def _run(self, name: str, function: Callable[[], None]) -> None:
         """Calls the function, on CUDA devices as a graph from the second call on."""
@@ -370,6 +442,7 @@ class WarpSimulation(KnownAttributes):
     def _settle(self) -> None:
         """Makes derived quantities those of the state, after resetting the worlds in which it contains invalid numbers."""
         self._moment += 1
+        self._behind = False
         self._status.zero_()
         self._data.overflow.zero_()
         self._data.qacc.zero_()  # may contain invalid numbers of an earlier state
@@ -604,8 +677,8 @@ class _Reader:
     def closed(self) -> bool:
         return self._sim.closed
 
-    def refresh(self, handle: Any) -> None:
-        self._sim._refresh(self._sim._sensors[handle.name])
+    def refresh(self, handle: Any, again: bool = False) -> None:
+        self._sim._refresh(self._sim._sensors[handle.name], again)
 
     def draw(self, *_: Any) -> Any:
         raise NotImplementedError("debug drawing is not available with backend='warp'; use backend='cpu'")
