@@ -370,7 +370,7 @@ class WarpSimulation(KnownAttributes):
         if not has_forces and any(sensor.needs == Stage.ACC for sensor in self._used):
             physics.compute_forces(self._model, self._data)
         for sensor in self._used:
-            if not sensor.wants_substep:  # substep() has filled its rows
+            if not (sensor.wants_substep and sensor.substep_fills_rows):
                 sensor.update()
 
     def _launch_rows(self, kernel: Any, name: str, inputs: list[Any]) -> None:
