@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times sensors on mujoco_warp's worlds, beside mjlab's sensors of the same configuration where mjlab is installed.
+"""Times sensors on mujoco_warp's worlds, compared with those of mjlab in the same configuration if it is installed.
 
     python bench/warp_sensors.py [--device cuda:0] [--worlds 64]
 
@@ -64,7 +64,7 @@ def ours(make_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable
         ),
     )  # fmt: skip
     entities = {"ground": mjs.EntityCfg(model=make_ground()), "robot": mjs.EntityCfg(model=robot())}
-    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities=entities, sensors=sensors)), worlds, backend="warp", device=device)
+    sim: Any = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities=entities, sensors=sensors)), worlds, backend="warp", device=device)
     calls = {cfg.name: sim._sensors[cfg.name].update for cfg in sensors}
     return calls, lambda qpos: sim.set_state(qpos=qpos), lambda name: sim.scene[name].fields
 
@@ -104,7 +104,12 @@ def mjlab(make_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callabl
 
         calls[name], readers[name] = call, scene[cfg.name]
         writers.append(write)
-    return calls, lambda qpos: [write(qpos) for write in writers], lambda name: vars(readers[name].data)
+
+    def write_all(qpos: Any) -> None:
+        for write in writers:
+            write(qpos)
+
+    return calls, write_all, lambda name: vars(readers[name].data)
 
 
 def measure(call: Callable[[], None], device: str) -> float:

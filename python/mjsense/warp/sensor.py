@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import mujoco_warp as mjw
 import numpy as np
@@ -114,10 +114,13 @@ class WarpSensor:
 REGISTRY: dict[str, type[WarpSensor]] = {}
 
 
-def implements(*kinds: str) -> Callable[[type[WarpSensor]], type[WarpSensor]]:
+S = TypeVar("S", bound=WarpSensor)
+
+
+def implements(*kinds: str) -> Callable[[type[S]], type[S]]:
     """Registers a class as the implementation of sensors of these kinds (:attr:`NativeSensor.kind`)."""
 
-    def register(cls: type[WarpSensor]) -> type[WarpSensor]:
+    def register(cls: type[S]) -> type[S]:
         REGISTRY.update(dict.fromkeys(kinds, cls))
         return cls
 
