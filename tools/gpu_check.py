@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares simulations with ``backend="warp"`` with those on the CPU, measures their speed, and writes the tables of docs/warp.md.
 
-    python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 50] [--long 1000] [--write]
+    python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 30] [--long 1000] [--write]
 
 Both simulations step from the same states with the same controls. Then the states of the CPU are copied, so that they are the same again,
 and every field of every sensor is compared. Forces and accelerations are compared in worlds in which mujoco_warp finds the same contacts
@@ -26,6 +26,7 @@ import mjsense as mjs
 from mjsense import effects
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "warp.md"
+BEGIN, END = "<!-- table of tools/gpu_check.py -->", "<!-- end -->"
 STATE = ("qpos", "qvel", "act", "mocap_pos", "mocap_quat")
 
 ROBOT = """
@@ -37,7 +38,7 @@ ROBOT = """
     <body name="trunk" pos="0 0 .25"><freejoint name="root"/>
       <geom name="trunk" type="box" size=".2 .15 .1" mass="4" material="grid"/>
       <site name="imu" pos=".1 0 .02" euler="5 10 15"/><site name="nose" pos=".25 0 0" size=".05"/>
-      <camera name="eye" pos=".2 0 .1" xyaxes="0 -1 0 .3 0 1"/>
+      <camera name="eye" pos=".24 0 .14" xyaxes="0 -1 0 .3 0 1"/>
       <body name="left_wheel" pos="0 .2 -.1"><joint name="left" axis="0 1 0"/>
         <geom name="left_wheel" type="sphere" size=".1" mass=".3"/></body>
       <body name="right_wheel" pos="0 -.2 -.1"><joint name="right" axis="0 1 0"/>
@@ -101,7 +102,11 @@ def plane() -> mjs.SceneCfg:
 
 
 def feet_only() -> mjs.SceneCfg:
-    return mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")}, terrain=mjs.TerrainCfg(), sensors=quadruped_sensors()[:1])
+    return mjs.SceneCfg(
+        entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")},
+        terrain=mjs.TerrainCfg(),
+        sensors=quadruped_sensors()[:1],
+    )
 
 
 def rough() -> mjs.SceneCfg:
@@ -125,10 +130,17 @@ def objects() -> mjs.SceneCfg:
         ))  # fmt: skip
 
 
-SCENES: dict[str, Callable[[], mjs.SceneCfg]] = {"quadruped on a plane": plane, "quadruped on rough terrain": rough, "objects": objects}
+SCENES: dict[str, Callable[[], mjs.SceneCfg]] = {
+    "quadruped on a plane": plane,
+    "quadruped on rough terrain": rough,
+    "objects": objects,
+}
 
-BOUNDS: dict[str, tuple[float, float]] = {}
-"""By sensor kind and field: the bound of the difference relative to the largest value, and the share of rows that may differ in it."""
+FORCES = ("N", "N m", "m/s^2", "rad/s^2")
+"""Units of quantities that depend on the constraint solver, whose tolerance is larger than the rounding of float32."""
+EXACT = ("found", "found_history", "pair_found", "other_geom", "other_body", "geom_id", "body_id", "material_id", "segmentation")
+"""Fields that are compared for equality although some are floats."""
+OTHER_CONTACTS = ("contact", "(worlds with other contacts)")
 
 
 @dataclass
@@ -159,14 +171,17 @@ class Field:
             self.difference = max(self.difference, float(difference.max()))
             self.differences.append(np.sort(difference.ravel())[-max(1, difference.size // 500) :])
 
+    @property
+    def bound(self) -> float:
+        """Of the difference that one value in a thousand may exceed: 0.5 % of the largest value for quantities that depend on forces,
+        10 % of the range of colours, because textures are filtered in another way, and 0.005 % of the largest value for all others."""
+        share = 5e-3 if self.unit in FORCES else 0.1 if self.largest == 255 else 5e-5
+        return share * max(self.largest, 1.0)
+
     def tail(self) -> float:
         """The difference that one value in a thousand exceeds."""
         found = np.sort(np.concatenate(self.differences)) if self.differences else np.zeros(1)
         return float(found[-min(len(found), max(1, self.values // 1000))])
-
-
-EXACT = ("found", "found_history", "pair_found", "other_geom", "other_body", "geom_id", "body_id", "material_id", "segmentation")
-"""Fields that are compared for equality although some are floats."""
 
 
 def on_host(values: Any) -> np.ndarray:
@@ -175,7 +190,9 @@ def on_host(values: Any) -> np.ndarray:
 
 def pair(scene: Callable[[], mjs.SceneCfg], worlds: int, device: str, decimation: int = 2) -> tuple[Any, Any]:
     """A simulation on the CPU and one on the device."""
-    ours = mjs.Simulation(mjs.Scene(scene()), worlds, decimation=decimation, backend="warp", device=device, nconmax=100, njmax=400)
+    ours = mjs.Simulation(
+        mjs.Scene(scene()), worlds, decimation=decimation, backend="warp", device=device, nconmax=100, njmax=400
+    )
     return mjs.Simulation(mjs.Scene(scene()), worlds, decimation=decimation), ours
 
 
@@ -206,7 +223,13 @@ def same_contacts(reference: Any, ours: Any) -> np.ndarray:
     for name, sensor in reference.scene.sensors.items():
         if sensor.kind == "contact":
             theirs, mine = sensor.fields, ours.scene[name].fields
-            for key, tolerance in {"found": 0.0, "found_history": 0.0, "dist": 1e-5, "dist_history": 1e-5, "normal": 1e-3}.items():
+            for key, tolerance in {
+                "found": 0.0,
+                "found_history": 0.0,
+                "dist": 1e-5,
+                "dist_history": 1e-5,
+                "normal": 1e-3,
+            }.items():
                 if key in theirs:
                     difference = np.abs(on_host(mine[key]) - theirs[key]).reshape(len(same), -1)
                     same &= (difference <= tolerance).all(1)
@@ -216,7 +239,7 @@ def same_contacts(reference: Any, ours: Any) -> np.ndarray:
 def compare(found: dict[tuple[str, str], Field], reference: Any, ours: Any) -> None:
     """Adds the differences of all sensors at the current state."""
     same = same_contacts(reference, ours)
-    contacts = found["contact", "(worlds with other contacts)"]
+    contacts = found[OTHER_CONTACTS]
     contacts.exact, contacts.values, contacts.other = True, contacts.values + len(same), contacts.other + int((~same).sum())
     forces = {reference.model.sensor(i).name for i in np.flatnonzero(reference.model.sensor_needstage == 3)}
     for name, sensor in reference.scene.sensors.items():
@@ -230,7 +253,13 @@ def compare(found: dict[tuple[str, str], Field], reference: Any, ours: Any) -> N
             if ids is not None:
                 rows &= (ids == theirs[key]).reshape(len(rows), -1).all(1)
         for key, spec in sensor.specs.items():
-            label = sensor.cfg.sensor_type if sensor.kind == "builtin" and sensor.cfg else name.split("/")[-1] if sensor.kind == "builtin" else key
+            label = (
+                sensor.cfg.sensor_type
+                if sensor.kind == "builtin" and sensor.cfg
+                else name.split("/")[-1]
+                if sensor.kind == "builtin"
+                else key
+            )
             entry = found[sensor.kind, label]
             entry.unit, entry.exact = spec.unit, key in EXACT or theirs[key].dtype.kind in "bi"
             assert on_host(mine[key]).shape == theirs[key].shape and on_host(mine[key]).dtype == theirs[key].dtype, (name, key)
@@ -248,30 +277,136 @@ def run(device: str, worlds: int, count: int, scenes: dict[str, Callable[[], mjs
     return found
 
 
+def beyond(found: dict[tuple[str, str], Field]) -> list[str]:
+    """Fields that differ by more than their bound, or, if they are compared for equality, in more than 1 % of the values."""
+    wrong = []
+    for (kind, name), entry in found.items():
+        if (kind, name) != OTHER_CONTACTS and entry.other > 0.01 * entry.values:
+            wrong.append(f"{kind} {name}: {entry.other} of {entry.values} are not equal")
+        if not entry.exact and entry.tail() > entry.bound:
+            wrong.append(f"{kind} {name}: {entry.tail():.2g} {entry.unit} in one of 1,000, the bound is {entry.bound:.2g}")
+    return wrong
+
+
 def table(found: dict[tuple[str, str], Field]) -> list[str]:
-    lines = ["| sensor | field | unit | largest value | largest difference | exceeded by 1 in 1,000 | not equal |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    lines = [
+        "| sensor | field | unit | largest value | largest difference | exceeded by 1 in 1,000 | its bound | not equal |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for (kind, name), entry in sorted(found.items()):
-        share = f"{entry.other:,} of {entry.values:,}" if entry.exact or entry.other else "0"
-        numbers = ["", "", ""] if entry.exact else [f"{x:.2g}" for x in (entry.largest, entry.difference, entry.tail())]
+        share = f"{entry.other:,} of {entry.values:,}" if entry.exact or entry.other else ""
+        numbers = [""] * 4 if entry.exact else [f"{x:.2g}" for x in (entry.largest, entry.difference, entry.tail(), entry.bound)]
         lines.append(f"| {' | '.join([kind, name, entry.unit, *numbers, share])} |")
     return lines
+
+
+def long_run(device: str, worlds: int, count: int) -> list[str]:
+    """Differences of what a contact sensor remembers, over many steps without a reset."""
+    found: dict[tuple[str, str], Field] = defaultdict(Field)
+    reference, ours = pair(feet_only, worlds, device)
+    landings = 0
+    for _ in steps(reference, ours, count):
+        compare(found, reference, ours)
+        landings += int(reference.scene["feet"].data.touchdown.sum())
+    remembered = {
+        key: entry for key, entry in found.items() if key[1].endswith(("_time", "_history", "touchdown", "liftoff", "_peak"))
+    }
+    print("\n".join(beyond(remembered)), file=sys.stderr)
+    return [*table(remembered), "", f"{landings:,} touchdowns in {count:,} control steps of {worlds} worlds."]
+
+
+def speed(device: str, worlds: int, count: int = 20) -> list[str]:
+    """Control steps of the quadruped with all sensors, which are read after each step."""
+    lines = [
+        "| backend | device | worlds | control steps of a world per second | memory of a world |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    reference, ours = pair(plane, worlds, device)
+    for name, sim in {"cpu": reference, "warp": ours}.items():
+        sim.reset(key="init_state")
+        sensors = [sensor for sensor in sim.scene.sensors.values() if sensor.cfg is not None]
+        for step in range(count + 3):
+            if step == 3:
+                began = time.perf_counter()
+            sim.step()
+            for sensor in sensors:
+                sensor.data
+            if step in (2, count + 2) and name == "warp":
+                wait(device)
+        rate = count * worlds / (time.perf_counter() - began)
+        memory = f"{bytes_of(sim) / worlds / 1024:,.0f} KiB" if name == "warp" else ""
+        lines.append(
+            f"| {name} | {device if name == 'warp' else f'{sim.threads} threads'} | {worlds:,} | {rate:,.0f} | {memory} |"
+        )
+    return lines
+
+
+def wait(device: str) -> None:
+    import warp as wp
+
+    wp.synchronize_device(device)
+
+
+def bytes_of(sim: Any) -> int:
+    """Memory of mujoco_warp's Data and of the fields of all sensors."""
+    import warp as wp
+
+    def arrays(thing: Any) -> Iterator[Any]:
+        for value in vars(thing).values():
+            if isinstance(value, wp.array):
+                yield value
+            elif hasattr(value, "__dataclass_fields__"):
+                yield from arrays(value)
+
+    fields = [array for sensor in sim._sensors.values() for array in sensor.fields.values()]
+    return sum(array.capacity for array in [*arrays(sim.warp_data), *fields])
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--device", help="cpu, cuda:0 and so on; by default the first CUDA device, or the CPU without one.")
     parser.add_argument("--worlds", type=int, default=64, help="Number of worlds.")
-    parser.add_argument("--steps", type=int, default=50, help="Number of control steps for each scene.")
+    parser.add_argument("--steps", type=int, default=30, help="Number of control steps for each scene.")
+    parser.add_argument(
+        "--long", type=int, default=1000, help="Number of control steps of the comparison of air times and history; 0: none."
+    )
+    parser.add_argument(
+        "--speed-worlds", type=int, help="Number of worlds for the speed; by default 64 on the CPU and 4096 on CUDA devices."
+    )
     parser.add_argument("--only", help="Name of the only scene to compare.")
-    parser.add_argument("--write", action="store_true", help="Write the table into docs/warp.md.")
+    parser.add_argument("--write", action="store_true", help="Write the tables into docs/warp.md.")
     arguments = parser.parse_args()
+    import mujoco
+    import mujoco_warp as mjw
     import warp as wp
 
+    wp.config.quiet = True
     device = arguments.device or ("cuda:0" if wp.is_cuda_available() else "cpu")
     scenes = {name: scene for name, scene in SCENES.items() if arguments.only in (None, name)}
     found = run(device, arguments.worlds, arguments.steps, scenes)
-    print("\n".join(table(found)))
-    return 0
+    name = platform.processor() or platform.machine() if device == "cpu" else wp.get_device(device).name
+    versions = f"mujoco_warp {mjw.__version__}, Warp {wp.__version__}, MuJoCo {mujoco.__version__}"
+    lines = [
+        f"Device `{device}` ({name}), {versions}: {arguments.worlds} worlds, {arguments.steps} control steps in each of {len(scenes)} scenes.",
+        "",
+    ]
+    lines += table(found)
+    if arguments.long:
+        lines += [
+            "",
+            "What contact sensors remember over many steps:",
+            "",
+            *long_run(device, min(arguments.worlds, 16), arguments.long),
+        ]
+    lines += ["", "Speed:", "", *speed(device, arguments.speed_worlds or (64 if device == "cpu" else 4096))]
+    print("\n".join(lines))
+    if arguments.write:
+        page = PAGE.read_text()
+        before, after = page.split(BEGIN)[0], page.split(END)[1]
+        PAGE.write_text(before + BEGIN + "\n" + "\n".join(lines) + "\n" + END + after)
+    wrong = beyond(found)
+    print("\n".join(wrong), file=sys.stderr)
+    return bool(wrong)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import warp as wp
 def torch() -> Any:
     """The module torch, or None if it is not installed."""
     try:
-        import torch
+        import torch  # pyright: ignore[reportMissingImports]
     except ImportError:
         return None
     return torch

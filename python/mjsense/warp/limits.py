@@ -25,11 +25,11 @@ def sizes(model: Any, nconmax: int | None, njmax: int | None) -> Limits:
     start = mujoco.MjData(model)
     mujoco.mj_forward(model, start)
     if nconmax is None:
-        nconmax = max(48, 2 * start.ncon)
+        nconmax = max(48, 2 * int(start.ncon))
         if model.nhfield or model.nflex:
             nconmax = max(nconmax, 256)
     if njmax is None:
-        fixed = (
+        fixed: int = (
             6 * model.neq
             + int((model.dof_frictionloss > 0).sum())
             + 2 * int(model.jnt_limited.sum())
@@ -38,8 +38,8 @@ def sizes(model: Any, nconmax: int | None, njmax: int | None) -> Limits:
         rows = 4 if model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL else 3
         if model.ngeom and int(model.geom_condim.max()) > 3:
             rows = 2 * (int(model.geom_condim.max()) - 1) if rows == 4 else int(model.geom_condim.max())
-        njmax = max(fixed + rows * nconmax, 2 * start.nefc)
-    return Limits(nconmax, njmax)
+        njmax = max(fixed + rows * nconmax, 2 * int(start.nefc))
+    return Limits(int(nconmax), int(njmax))
 
 
 _TOO_MANY = {

@@ -485,8 +485,8 @@ class WarpSimulation(KnownAttributes):
         Values are on the device or not, with the shape ``[n]`` (the same for every world) or ``[worlds, n]``.
         """
         self._check_open()
-        rows = slice(None) if world_ids is None else _ids(world_ids, self.num_worlds)
-        count = self.num_worlds if world_ids is None else len(rows)
+        ids = None if world_ids is None else _ids(world_ids, self.num_worlds)
+        rows, count = (slice(None), self.num_worlds) if ids is None else (ids, len(ids))
         for name, value in components.items():
             array = self._component(name)
             shape = tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
@@ -580,6 +580,7 @@ class WarpSimulation(KnownAttributes):
             host = array.numpy()
             host[rows] = values.reshape(host[rows].shape)
             array.assign(host)
+            physics.place_fixed_geoms(field, self._model, self._data)
             if field in _core.setconst_inputs():
                 for name in _SET_CONST:
                     if hasattr(self._model, name):

@@ -39,9 +39,12 @@ class UserSensor(WarpSensor):
         sensor._mjs_shown = sensor._mjs_value = nested(self._rows, shared) if self._rows else None
         self._started = False
 
+    def _simulation(self) -> Any:
+        return self._sim()
+
     def initialize(self) -> None:
         """Called when the simulation is complete."""
-        initialize, sim = self.sensor.initialize, self._sim()
+        initialize, sim = self.sensor.initialize, self._simulation()
         with named(self.name, "initialize"):
             if len(required(initialize)) == 4:
                 initialize(sim.model, sim.warp_model, sim.data, sim.device)  # type: ignore[call-arg]
@@ -51,7 +54,7 @@ class UserSensor(WarpSensor):
 
     def update(self) -> None:
         sensor: Any = self.sensor
-        sim = self._sim()
+        sim = self._simulation()
         with named(self.name, "compute"):
             every = range(sim.num_worlds)
             value = sensor.compute(sim, list(every)) if takes(sensor.compute, 2) else sensor.compute(sim)

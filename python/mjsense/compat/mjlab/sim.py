@@ -66,12 +66,12 @@ class Simulation:
         self.scene._cfg.num_envs = num_envs
         self.scene.native._set_options(cfg.mujoco.native())
         backend = backend or ("cpu" if self.device == "cpu" else "warp")
-        options: dict[str, Any] = {"threads": threads}
+        options: dict[str, Any] = {"threads": threads, "backend": backend}
         if backend == "warp":
             options |= {"device": self.device, "nconmax": cfg.nconmax, "njmax": cfg.njmax}
         elif self.device != "cpu":
             raise ValueError(f"Simulation: device is '{device}': backend='cpu' is on the 'cpu'")
-        self.native = mjsense.Simulation(self.scene.native, num_envs, backend=backend, **options)
+        self.native = mjsense.Simulation(self.scene.native, num_envs, **options)
         self.scene._simulation = self.native
         self._data = Data(self.native)
 
