@@ -348,6 +348,22 @@ def test_cameras(scene):
     assert np.abs(all_cpu["rgb"].astype(int) - all_warp["rgb"])[near].mean() < 2
 
 
+def test_rays_follow_models_that_differ_by_world():
+    """Fixed geoms are in a tree that all worlds share, until they differ."""
+    scan = mjs.RayCastSensorCfg("scan", frame=ref("body", "trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0)), ray_alignment="world")
+    cpu, warp = simulations("primitives", scan)
+    assert cpu.model.ngeom > 24
+    qpos, positions = states(), cpu.model.geom_pos + rng.uniform(-0.5, 0.5, (WORLDS, cpu.model.ngeom, 3))
+    sizes = cpu.model.geom_size * rng.uniform(0.5, 1.5, (WORLDS, cpu.model.ngeom, 1))
+    for sim in (cpu, warp):
+        sim.set_state(qpos=qpos)
+    same(arrays(cpu, "scan"), arrays(warp, "scan"), RAY_BOUNDS)
+    for sim in (cpu, warp):
+        sim.randomize("geom_pos", positions)
+        sim.randomize("geom_size", sizes)
+    same(arrays(cpu, "scan"), arrays(warp, "scan"), RAY_BOUNDS)
+
+
 def test_options_that_the_backend_lacks_are_errors():
     camera = {"parent_body": "robot/trunk", "width": 8, "height": 8}
     for cfg, what in [
