@@ -48,6 +48,7 @@ def model(scene):
     asset, geoms = SCENES[scene]
     return f"""
     <mujoco>
+      <default><geom contype="0" conaffinity="0"/></default>
       <asset>{asset}<material name="floor" rgba=".3 .4 .5 1"/></asset>
       <worldbody>
         <light pos="0 0 5"/>
@@ -169,6 +170,37 @@ def test_a_lidar_has_the_same_noise():
             sim.set_state(qpos=qpos)
         for cfg in lidars:
             same(arrays(cpu, cfg.name), arrays(warp, cfg.name), RAY_BOUNDS)
+
+
+def test_rays_with_times():
+    """Rays start from the poses that the frames had at their times, also shortly after a reset."""
+    device, scan = ref("site", "device"), mjs.SpinningScanCfg(channels=8, samples=45, rate_hz=20)
+    directions = rng.normal(size=(60, 3)).tolist()
+    times = np.round(rng.uniform(-0.03, 0, 60), 3).tolist()
+    rays = [
+        mjs.LidarSensorCfg("sweep", frame=device, scan=scan, motion_distortion=True, max_distance=20),
+        mjs.LidarSensorCfg("noisy", frame=device, scan=scan, motion_distortion=True, max_distance=20, range_noise_std=0.02),
+        mjs.RayCastSensorCfg(
+            "timed", frame=device, pattern=mjs.UserPatternCfg(directions=directions, times=times), ray_alignment="yaw"
+        ),
+    ]
+    cpu, warp = simulations("primitives", *rays, decimation=4, seed=5)
+    qpos, qvel = states(), rng.normal(size=(WORLDS, 7)).astype(np.float32) * 3
+    for sim in (cpu, warp):
+        sim.set_state(qpos=qpos, qvel=qvel)
+    for step in range(8):
+        for sim in (cpu, warp):
+            sim.step()
+            if step == 4:
+                sim.reset([2, 5])
+        for cfg in rays:
+            expected = arrays(cpu, cfg.name)
+            same(
+                expected,
+                arrays(warp, cfg.name),
+                dict.fromkeys(RAY_BOUNDS, 2e-3) | {"intensity": 1e-2, "normals_w": 1e-2},
+                allowed=3,
+            )
 
 
 CHAINS = {
@@ -316,16 +348,28 @@ def test_cameras(scene):
     assert np.abs(all_cpu["rgb"].astype(int) - all_warp["rgb"])[near].mean() < 2
 
 
+def test_rays_follow_models_that_differ_by_world():
+    """Fixed geoms are in a tree that all worlds share, until they differ."""
+    scan = mjs.RayCastSensorCfg("scan", frame=ref("body", "trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0)), ray_alignment="world")
+    cpu, warp = simulations("primitives", scan)
+    assert cpu.model.ngeom > 24
+    qpos, positions = states(), cpu.model.geom_pos + rng.uniform(-0.5, 0.5, (WORLDS, cpu.model.ngeom, 3))
+    sizes = cpu.model.geom_size * rng.uniform(0.5, 1.5, (WORLDS, cpu.model.ngeom, 1))
+    for sim in (cpu, warp):
+        sim.set_state(qpos=qpos)
+    same(arrays(cpu, "scan"), arrays(warp, "scan"), RAY_BOUNDS)
+    for sim in (cpu, warp):
+        sim.randomize("geom_pos", positions)
+        sim.randomize("geom_size", sizes)
+    same(arrays(cpu, "scan"), arrays(warp, "scan"), RAY_BOUNDS)
+
+
 def test_options_that_the_backend_lacks_are_errors():
-    body = ref("body", "trunk")
-    timed = mjs.UserPatternCfg(times=[-0.01])
     camera = {"parent_body": "robot/trunk", "width": 8, "height": 8}
     for cfg, what in [
         (mjs.CameraSensorCfg("x", data_types=("flow",), **camera), "data type 'flow'"),
         (mjs.CameraSensorCfg("x", samples=4, **camera), "samples > 1"),
         (mjs.CameraSensorCfg("x", data_types=("depth",), depth_noise="d435", **camera), "depth_noise"),
-        (mjs.LidarSensorCfg("x", frame=body, motion_distortion=True), "motion_distortion"),
-        (mjs.RayCastSensorCfg("x", frame=body, pattern=timed), "a pattern with times"),
     ]:
         with pytest.raises(ValueError, match=f"sensor 'x': {what}.* is not available with backend='warp'"):
             simulations("primitives", cfg)

@@ -135,6 +135,12 @@ class Camera(WarpSensor):
         self.fields["intrinsics"].assign(np.broadcast_to(intrinsics[0], (worlds.num_worlds, 3, 3)))
         self._make_rays(model, intrinsics[0])
         self._make_owners(model)
+        self.depth_targets = self._pixels_of("depth"), self._pixels_of("point_cloud", 3)
+        self.id_targets = (
+            self._pixels_of("segmentation", 2),
+            self._pixels_of("body_segmentation"),
+            self._pixels_of("entity_segmentation"),
+        )
         self.every_step = cfg.update_period > 0
         self.due = wp.full(worlds.num_worlds, True, dtype=bool, device=worlds.device)
         self.number = wp.full(worlds.num_worlds, -1, dtype=wp.int64, device=worlds.device)
@@ -222,12 +228,7 @@ class Camera(WarpSensor):
         if "rgb" in self.fields:
             self.launch(_copy_rgb, due, context.rgb_data, self._pixels_of("rgb", 3))
         if "depth" in self.fields or "point_cloud" in self.fields:
-            targets = self._pixels_of("depth"), self._pixels_of("point_cloud", 3)
-            self.launch(_copy_depth, due, context.depth_data, context.ray, context.ray_offset, cfg.depth_kind == "ray", *targets)
+            inputs = [context.depth_data, context.ray, context.ray_offset, cfg.depth_kind == "ray", *self.depth_targets]
+            self.launch(_copy_depth, due, *inputs)
         if any(name.endswith("segmentation") for name in self.fields):
-            targets = [
-                self._pixels_of("segmentation", 2),
-                self._pixels_of("body_segmentation"),
-                self._pixels_of("entity_segmentation"),
-            ]
-            self.launch(_copy_segmentation, due, context.seg_data, worlds.model.geom_bodyid, self.geom_entity, *targets)
+            self.launch(_copy_segmentation, due, context.seg_data, worlds.model.geom_bodyid, self.geom_entity, *self.id_targets)

@@ -265,6 +265,8 @@ def _read_pairs(
 
 @implements("contact")
 class Contact(WarpSensor):
+    substep_fills_rows = True
+
     def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
         super().__init__(worlds, sensor)
         cfg, model = sensor.cfg, worlds.compiled.model

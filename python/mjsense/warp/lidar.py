@@ -10,8 +10,8 @@ import warp as wp
 
 from mjsense.configs import SpinningScanCfg
 from mjsense.warp.random import make_rng, normal, normal_at, stream_of, uniform
-from mjsense.warp.rays import Frames, Hits, RayCast, Rays
-from mjsense.warp.sensor import Worlds, implements, unsupported, vec3_view
+from mjsense.warp.rays import Frames, Hits, RayCast, Rays, world_ray
+from mjsense.warp.sensor import Worlds, implements, vec3_view
 from mjsense.warp.surfaces import Surfaces, colour
 
 if TYPE_CHECKING:
@@ -58,7 +58,6 @@ def _report(
 ):
     w, r = wp.tid()
     zero = wp.float64(0.0)
-    f = r // rays.count
     i = rays.part[w] * rays.count + r % rays.count
     points[w, r] = wp.vec3()
     intensity[w, r] = 0.0
@@ -66,9 +65,9 @@ def _report(
         return
     geom = hits.geom[w, r]
     t = hits.distance[w, r]
-    direction = frames.align[w, f] @ rays.direction[i]
+    ray = world_ray(frames, rays, w, r)
     rgba = colour(surfaces, w, geom)
-    cosine = wp.abs(wp.dot(direction, hits.normal[w, r]))
+    cosine = wp.abs(wp.dot(ray.direction, hits.normal[w, r]))
 
     # Every ray has numbers of its own, whether it hits or not. With dropout and noise, two rays use four uniform numbers.
     rng = make_rng(device.seed[0], device.key[w], device.stream, device.tick[w])
@@ -90,7 +89,7 @@ def _report(
         measured = wp.round(measured / device.resolution) * device.resolution
     if lost or ((noisy or device.resolution > zero) and (measured < device.nearest or measured > device.farthest)):
         hits.distance[w, r] = -1.0
-        hits.pos[w, r] = frames.pos[w, f]
+        hits.pos[w, r] = ray.origin
         hits.normal[w, r] = wp.vec3()
         hits.geom[w, r] = -1
         hits.body[w, r] = -1
@@ -98,7 +97,7 @@ def _report(
         return
     distance = float(measured)
     hits.distance[w, r] = distance
-    hits.pos[w, r] = frames.pos[w, f] + distance * direction
+    hits.pos[w, r] = ray.origin + distance * ray.direction
     points[w, r] = distance * rays.direction[i]
     intensity[w, r] = wp.clamp((rgba[0] + rgba[1] + rgba[2]) / 3.0 * cosine, 0.0, 1.0)
 
@@ -129,23 +128,26 @@ class Lidar(RayCast):
         self.device = d
         self.points = vec3_view(self.fields["points"])
 
-    def pattern(self) -> tuple[np.ndarray, np.ndarray, int]:
+    def pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
         scan = self.cfg.scan
-        if self.cfg.motion_distortion:
-            raise unsupported(self.name, "motion_distortion=True")
         self.parts = 1
         if isinstance(scan, SpinningScanCfg):
             angles = spinning_angles(scan)
+            # A full turn takes 1 / rate, and a part of a turn takes that part of the time.
+            times = (np.arange(scan.samples) - (scan.samples - 1)) * scan.azimuth_span_deg / (360 * scan.samples * scan.rate_hz)
+            times = np.tile(times, scan.channels)
         else:
             angles = np.asarray(np.load(scan.file) if scan.file else scan.angles, float)
             if scan.rays_per_scan:
                 self.parts = len(angles) // scan.rays_per_scan
                 angles = angles[: self.parts * scan.rays_per_scan]
+            count = len(angles) // self.parts
+            times = (np.arange(len(angles)) % count - (count - 1)) / (count * scan.rate_hz)
         azimuth, elevation = angles.T
         directions = np.stack(
             [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1
         )
-        return np.zeros_like(directions), directions, self.parts
+        return np.zeros_like(directions), directions, times if self.cfg.motion_distortion else np.zeros(0), self.parts
 
     def update(self) -> None:
         worlds = self.worlds

@@ -7,6 +7,8 @@ The parts are those of ``mujoco_warp.step``. A step begins with the positions an
 from __future__ import annotations
 
 import mujoco_warp as mjw
+import warp as wp
+from mujoco_warp._src import smooth
 
 _INTEGRATE = {
     mjw.IntegratorType.EULER: mjw.euler,
@@ -24,6 +26,20 @@ def check_options(model: mjw.Model) -> None:
         )
     if model.opt.enableflags & mjw.EnableBit.SLEEP:
         raise ValueError("the option sleep is not available with backend='warp'; use backend='cpu'")
+
+
+_FIXED_POSES = ("body_pos", "body_quat", "geom_pos", "geom_quat")
+
+
+def place_fixed_geoms(field: str, model: mjw.Model, data: mjw.Data) -> None:
+    """Computes the poses of geoms that cannot move, if a change of this field changes them; mujoco_warp computes them only once."""
+    if field not in _FIXED_POSES:
+        return
+    mjw.kinematics(model, data)
+    every = wp.ones_like(model.body_weldid)
+    poses = [model.geom_pos, model.geom_quat, data.xpos, data.xquat]
+    inputs = [model.body_rootid, every, model.body_mocapid, model.geom_bodyid, *poses]
+    wp.launch(smooth._geom_local_to_global, (data.nworld, model.ngeom), inputs, [data.geom_xpos, data.geom_xmat])
 
 
 def compute_velocities(model: mjw.Model, data: mjw.Data) -> None:

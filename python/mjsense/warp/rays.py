@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from mjsense import _mujoco
+from mjsense.warp.pose_history import Pose, PoseHistory, clear, make_history, pose_at, push
 from mjsense.warp.sensor import WarpSensor, Worlds, declared, implements, unsupported, vec3_view
 from mjsense.warp.shapes import NO_HIT
 from mjsense.warp.surfaces import Filter, Surfaces, nearest_hit, ray_scene
@@ -87,6 +88,33 @@ def quaternion(m: wp.mat33) -> wp.vec4:
     return wp.normalize(q)
 
 
+@wp.func
+def _frame_pose(frames: Frames, w: int, f: int) -> Pose:
+    kind = frames.kind[f]
+    i = frames.id[f]
+    pose = Pose()
+    if kind == _SITE:
+        pose.pos = frames.site_pos[w, i]
+        pose.mat = frames.site_mat[w, i]
+    elif kind == _GEOM:
+        pose.pos = frames.geom_pos[w, i]
+        pose.mat = frames.geom_mat[w, i]
+    elif kind == _CAMERA:
+        pose.pos = frames.camera_pos[w, i]
+        pose.mat = frames.camera_mat[w, i]
+    else:
+        pose.pos = frames.body_pos[w, i]
+        pose.mat = frames.body_mat[w, i]
+    return pose
+
+
+@wp.kernel
+def _remember_poses(frames: Frames, history: PoseHistory, substep: wp.array(dtype=wp.int64), physics_dt: wp.float64):
+    w, f = wp.tid()
+    pose = _frame_pose(frames, w, f)
+    push(history, w, f, wp.float64(substep[w]) * physics_dt, pose.pos, pose.mat)
+
+
 @wp.kernel
 def _place_frames(
     frames: Frames,
@@ -96,19 +124,9 @@ def _place_frames(
     first_quat: wp.array2d(dtype=float),
 ):
     w, f = wp.tid()
-    kind = frames.kind[f]
-    i = frames.id[f]
-    pos = frames.body_pos[w, i]
-    mat = frames.body_mat[w, i]
-    if kind == _SITE:
-        pos = frames.site_pos[w, i]
-        mat = frames.site_mat[w, i]
-    elif kind == _GEOM:
-        pos = frames.geom_pos[w, i]
-        mat = frames.geom_mat[w, i]
-    elif kind == _CAMERA:
-        pos = frames.camera_pos[w, i]
-        mat = frames.camera_mat[w, i]
+    pose = _frame_pose(frames, w, f)
+    pos = pose.pos
+    mat = pose.mat
     frames.pos[w, f] = pos
     frames.align[w, f] = aligned(frames.alignment, mat)
     q = quaternion(mat)
@@ -132,6 +150,33 @@ class Rays:
     filter: Filter
     nearest: float
     farthest: float
+    times: wp.array(dtype=wp.float64)  # [parts * n] s, 0 now, < 0 before; empty: all now
+    history: PoseHistory  # if there are times
+    substep: wp.array(dtype=wp.int64)  # [B]
+    physics_dt: wp.float64
+
+
+@wp.struct
+class WorldRay:
+    origin: wp.vec3  # m, world
+    direction: wp.vec3
+
+
+@wp.func
+def world_ray(frames: Frames, rays: Rays, w: int, r: int) -> WorldRay:
+    """Ray ``r`` of a world, with the frame's pose at the ray's own time."""
+    f = r // rays.count
+    i = rays.part[w] * rays.count + r % rays.count
+    pos = frames.pos[w, f]
+    align = frames.align[w, f]
+    if rays.history.capacity > 0:
+        pose = pose_at(rays.history, w, f, wp.float64(rays.substep[w]) * rays.physics_dt + rays.times[i])
+        pos = pose.pos
+        align = aligned(frames.alignment, pose.mat)
+    ray = WorldRay()
+    ray.origin = pos + align @ rays.offset[i]
+    ray.direction = align @ rays.direction[i]
+    return ray
 
 
 @wp.struct
@@ -148,10 +193,9 @@ class Hits:
 def _cast(surfaces: Surfaces, frames: Frames, rays: Rays, hits: Hits, ids: bool):
     w, r = wp.tid()
     f = r // rays.count
-    i = rays.part[w] * rays.count + r % rays.count
-    align = frames.align[w, f]
-    origin = frames.pos[w, f] + align @ rays.offset[i]
-    direction = align @ rays.direction[i]
+    ray = world_ray(frames, rays, w, r)
+    origin = ray.origin
+    direction = ray.direction
     # The tolerance avoids that rounding turns a hit at the maximum distance into a miss.
     reach = rays.farthest * (1.0 + 4.0e-7)
     hit = nearest_hit(surfaces, rays.filter, f, w, origin, direction, reach)
@@ -206,20 +250,19 @@ class RayCast(WarpSensor):
         frames = self.cfg.frame if isinstance(self.cfg.frame, (list, tuple)) else [self.cfg.frame]
         self.num_frames = len(frames)
         self._make_frames(frames)
-        offsets, directions, parts = self.pattern()
-        self._make_rays(offsets, directions, len(directions) // parts)
+        offsets, directions, times, parts = self.pattern()
+        self._make_rays(offsets, directions, times, len(directions) // parts)
         self._make_hits()
 
-    def pattern(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """Offsets and directions of one frame's rays, and the number of equal parts that are cast one after the other."""
+    def pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """Offsets, directions and times of one frame's rays, and the number of equal parts that are cast one after the other."""
         pattern = self.cfg.pattern
-        if len(getattr(pattern, "times", ())):
-            raise unsupported(self.name, "a pattern with times")
+        times = np.asarray(getattr(pattern, "times", ()), float)
         if camera := getattr(pattern, "camera_name", None):
             model = self.worlds.compiled.model
             directions = camera_rays(model, _mujoco.name2id(model, _mujoco.Obj.CAMERA, camera))
-            return np.zeros_like(directions), directions, 1
-        return *pattern.generate_rays(), 1
+            return np.zeros_like(directions), directions, times, 1
+        return *pattern.generate_rays(), times, 1
 
     def _make_frames(self, refs: Any) -> None:
         worlds, data, model = self.worlds, self.worlds.data, self.worlds.compiled.model
@@ -237,7 +280,7 @@ class RayCast(WarpSensor):
         f.pos = worlds.zeros((worlds.num_worlds, len(refs)), wp.vec3)
         f.align = worlds.zeros((worlds.num_worlds, len(refs)), wp.mat33)
 
-    def _make_rays(self, offsets: np.ndarray, directions: np.ndarray, count: int) -> None:
+    def _make_rays(self, offsets: np.ndarray, directions: np.ndarray, times: np.ndarray, count: int) -> None:
         worlds, cfg = self.worlds, self.cfg
         groups = range(6) if cfg.include_geom_groups is None else cfg.include_geom_groups
         own = [body if cfg.exclude_parent_body and (body > 0 or self.exclude_world) else -1 for body in self.bodies]
@@ -246,6 +289,10 @@ class RayCast(WarpSensor):
         rays.count, rays.part = count, worlds.zeros(worlds.num_worlds, int)
         rays.filter = self.scene.filter(groups, own)
         rays.nearest, rays.farthest = cfg.min_distance, min(cfg.max_distance, 1e29)
+
+        rays.times, rays.substep, rays.physics_dt = worlds.array(times, wp.float64), worlds.substep, worlds.physics_dt
+        self.wants_substep = len(times) > 0
+        rays.history = make_history(worlds, self.num_frames, int(-times.min() / worlds.physics_dt + 3) if len(times) else 0)
 
     def _make_hits(self) -> None:
         fields, hits = self.fields, Hits()
@@ -260,8 +307,18 @@ class RayCast(WarpSensor):
     def launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         wp.launch(kernel, dim=dim, inputs=inputs, device=self.worlds.device)
 
+    def substep(self) -> None:
+        inputs = [self.frames, self.rays.history, self.worlds.substep, self.worlds.physics_dt]
+        self.launch(_remember_poses, (self.worlds.num_worlds, self.num_frames), *inputs)
+
+    def reset(self, mask: wp.array) -> None:
+        if self.wants_substep:
+            clear(self.rays.history, mask)
+
     def update(self) -> None:
         worlds = self.worlds.num_worlds
+        if self.wants_substep:
+            self.substep()
         self.launch(_place_frames, (worlds, self.num_frames), *self._frame_inputs)
         inputs = [self.scene.surfaces, self.frames, self.rays, self.hits, "geom_id" in self.fields]
         self.launch(_cast, (worlds, self.num_frames * self.rays.count), *inputs)

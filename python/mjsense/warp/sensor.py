@@ -87,6 +87,8 @@ class WarpSensor:
     """True if update() must run once in each control step, even if the sensor is not read."""
     wants_substep = False
     """True if substep() must run after every physics step."""
+    substep_fills_rows = False
+    """True if the rows are complete after the last substep(), without update()."""
     on_host = False
     """True if its methods run Python code of the user. They are called outside of CUDA graphs."""
     inputs: tuple[WarpSensor, ...] = ()

@@ -370,7 +370,7 @@ class WarpSimulation(KnownAttributes):
         if not has_forces and any(sensor.needs == Stage.ACC for sensor in self._used):
             physics.compute_forces(self._model, self._data)
         for sensor in self._used:
-            if not sensor.wants_substep:  # substep() has filled its rows
+            if not (sensor.wants_substep and sensor.substep_fills_rows):
                 sensor.update()
 
     def _launch_rows(self, kernel: Any, name: str, inputs: list[Any]) -> None:
@@ -580,6 +580,7 @@ class WarpSimulation(KnownAttributes):
             host = array.numpy()
             host[rows] = values.reshape(host[rows].shape)
             array.assign(host)
+            physics.place_fixed_geoms(field, self._model, self._data)
             if field in _core.setconst_inputs():
                 for name in _SET_CONST:
                     if hasattr(self._model, name):
