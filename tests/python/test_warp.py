@@ -160,10 +160,11 @@ def test_too_many_contacts_are_an_error_that_names_the_limit():
 @needs_warp
 def test_a_step_after_an_unannounced_write_is_an_error():
     sim = simulation()
-    sim.qpos[1, 2] += 0.5
+    lifted = host(sim.qpos) + [[0], [0.5], [0]] * np.eye(1, sim.model.nq, 2)
+    sim.qpos = lifted
     with pytest.raises(RuntimeError, match=r"world 1 were written without a forward\(\)"):
         sim.step()
-    sim.qpos[1, 2] += 0.5
+    sim.qpos = lifted
     sim.forward()
     sim.step()
     with pytest.raises(ValueError, match="qpos: shape"):
@@ -299,3 +300,34 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
     for name, values in rows[0].items():
         if getattr(values, "dtype", np.dtype(bool)).kind == "f":
             np.testing.assert_allclose(values, rows[1][name], atol=1e-2, err_msg=name)
+
+
+@needs_warp
+def test_noise_is_that_of_the_cpu_through_resets_and_failures():
+    noisy = mjs.EffectSensorCfg(
+        "noisy",
+        "gyro",
+        effects=(mjs.effects.EpisodeBias(mjs.effects.Gaussian(1.0)), mjs.effects.Noise(mjs.effects.Gaussian(1.0))),
+    )
+    sims = simulation(noisy, seed=7), simulation(noisy, seed=7, backend="cpu")
+
+    def read():
+        values = [host(sim.scene["noisy"].data) - host(sim.scene["gyro"].data) for sim in sims]
+        np.testing.assert_allclose(values[0], values[1], atol=1e-5)
+        return values[0]
+
+    before = read()
+    for sim in sims:
+        sim.step(2)
+    assert not np.allclose(read(), before)
+    for action in (
+        lambda sim: sim.reset([1]),
+        lambda sim: sim.set_state([2], qpos=np.full(sim.model.nq, np.nan)),
+        lambda sim: sim.step(),
+    ):
+        for sim in sims:
+            action(sim)
+        read()
+    for sim in sims:
+        sim.reset(seed=9)
+    read()
