@@ -75,6 +75,8 @@ def test_python(page, tmp_path, monkeypatch):
         if re.search(rf"^\s*(import|from) {name}\b", page.read_text(), re.MULTILINE):
             for module in (name, *OTHERS[name]):
                 monkeypatch.setitem(sys.modules, module, MagicMock())
+    if page.stem == "warp":
+        pytest.importorskip("mujoco_warp")
     for name, library in EXPORT_LIBRARIES.items():
         if f"export_{name}(" in page.read_text():
             pytest.importorskip(library)

@@ -2,6 +2,7 @@
 """Simulation(backend="warp") on Warp's CPU device. tools/gpu_check.py compares more scenes, worlds and steps, on any device."""
 
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -84,7 +85,7 @@ def test_air_time_and_history_over_many_steps():
     reference, ours = gpu_check.pair(gpu_check.feet_only, 2, "cpu")
     for _ in gpu_check.steps(reference, ours, 150):
         for name, field in reference.scene["feet"].fields.items():
-            if "force" not in name:
+            if not name.startswith(("force", "torque", "friction", "normal_force")):
                 np.testing.assert_allclose(host(ours.scene["feet"].fields[name]), field, atol=1e-5, err_msg=name)
     assert reference.scene["feet"].data.last_air_time.max() > 0
 
@@ -159,10 +160,11 @@ def test_too_many_contacts_are_an_error_that_names_the_limit():
 @needs_warp
 def test_a_step_after_an_unannounced_write_is_an_error():
     sim = simulation()
-    sim.qpos[1, 2] += 0.5
+    lifted = host(sim.qpos) + [[0], [0.5], [0]] * np.eye(1, sim.model.nq, 2)
+    sim.qpos = lifted
     with pytest.raises(RuntimeError, match=r"world 1 were written without a forward\(\)"):
         sim.step()
-    sim.qpos[1, 2] += 0.5
+    sim.qpos = lifted
     sim.forward()
     sim.step()
     with pytest.raises(ValueError, match="qpos: shape"):
@@ -175,7 +177,9 @@ def test_worlds_can_differ_in_the_model():
     sims = simulation(touch()), simulation(touch(), backend="cpu")
     for sim in sims:
         for field, value in values.items():
-            sim.randomize(field, np.broadcast_to(value[:, : len(getattr(sim.model, field))], (3, *getattr(sim.model, field).shape)))
+            sim.randomize(
+                field, np.broadcast_to(value[:, : len(getattr(sim.model, field))], (3, *getattr(sim.model, field).shape))
+            )
         for _ in range(20):
             sim.step()
     np.testing.assert_allclose(host(sims[0].qpos), sims[1].qpos, atol=1e-5)
@@ -194,6 +198,26 @@ def test_arrays_share_the_device_memory():
     sim.step()
     assert sim.scene["touch"].data.force is array
     assert found.ctypes.data == (array.data_ptr() if hasattr(array, "data_ptr") else array.ptr)
+
+
+@needs_warp
+def test_code_of_the_pages():
+    """The page itself, and mjlab's page on either backend, changed by one argument."""
+    docs = Path(__file__).parents[2] / "docs"
+
+    def blocks(page):
+        return "\n".join(re.findall(r"^```python\n(.*?)^```$", (docs / page).read_text(), re.MULTILINE | re.DOTALL))
+
+    page = {}
+    exec(blocks("warp.md"), page)
+    assert host(page["scene"]["feet"].data.force).shape == (16, 4, 3)
+    pytest.importorskip("torch")
+    feet = []
+    for backend in ("cpu", "warp"):
+        names = {}
+        exec(blocks("mjlab.md").replace("model=scene.compile()", f"model=scene.compile(), backend='{backend}'"), names)
+        feet.append(host(names["scene"]["height"].data))
+    np.testing.assert_allclose(feet[1], feet[0], atol=1e-5)
 
 
 class Height(mjs.Sensor):
@@ -237,8 +261,8 @@ def test_what_is_missing_is_a_clear_error():
     with pytest.raises(ValueError, match=r"sensor 'late': nsample = 2 is not available with backend='warp'"):
         simulation(xml=plugin)
     sim = simulation()
-    with pytest.raises(NotImplementedError, match=r"Simulation.step_raw is not available with backend='warp'"):
-        sim.step_raw()
+    with pytest.raises(NotImplementedError, match=r"Simulation.draw is not available with backend='warp'"):
+        sim.draw(None)
     with pytest.raises(AttributeError, match="did you mean 'qpos'"):
         sim.qposs = 3
     sim.close()
@@ -248,7 +272,9 @@ def test_what_is_missing_is_a_clear_error():
 
 @needs_warp
 def test_a_recording_has_the_rows_of_the_device(tmp_path):
-    eye = mjs.CameraSensorCfg("eye", pos=(0, -2, 0.5), quat=(0.7071, 0.7071, 0, 0), width=32, height=24, data_types=("rgb", "depth"))
+    eye = mjs.CameraSensorCfg(
+        "eye", pos=(0, -2, 0.5), quat=(0.7071, 0.7071, 0, 0), width=32, height=24, data_types=("rgb", "depth")
+    )
     sims = [simulation(touch(), Height(), eye, backend=backend) for backend in ("warp", "cpu")]
     rows = []
     for sim, out in zip(sims, ("warp", "cpu")):
@@ -264,7 +290,9 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
         h5py = pytest.importorskip("h5py")
         with h5py.File(next((tmp_path / out).rglob("*.h5"))) as file:
             found = {}
-            file.visititems(lambda name, item, found=found: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+            file.visititems(
+                lambda name, item, found=found: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None
+            )
         rows.append(found)
     assert rows[0].keys() == {name for name in rows[1] if name in rows[0]} and len(rows[0]) > 8
     heights = next(values for name, values in rows[0].items() if name.endswith("height"))
@@ -272,3 +300,34 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
     for name, values in rows[0].items():
         if getattr(values, "dtype", np.dtype(bool)).kind == "f":
             np.testing.assert_allclose(values, rows[1][name], atol=1e-2, err_msg=name)
+
+
+@needs_warp
+def test_noise_is_that_of_the_cpu_through_resets_and_failures():
+    noisy = mjs.EffectSensorCfg(
+        "noisy",
+        "gyro",
+        effects=(mjs.effects.EpisodeBias(mjs.effects.Gaussian(1.0)), mjs.effects.Noise(mjs.effects.Gaussian(1.0))),
+    )
+    sims = simulation(noisy, seed=7), simulation(noisy, seed=7, backend="cpu")
+
+    def read():
+        values = [host(sim.scene["noisy"].data) - host(sim.scene["gyro"].data) for sim in sims]
+        np.testing.assert_allclose(values[0], values[1], atol=1e-5)
+        return values[0]
+
+    before = read()
+    for sim in sims:
+        sim.step(2)
+    assert not np.allclose(read(), before)
+    for action in (
+        lambda sim: sim.reset([1]),
+        lambda sim: sim.set_state([2], qpos=np.full(sim.model.nq, np.nan)),
+        lambda sim: sim.step(),
+    ):
+        for sim in sims:
+            action(sim)
+        read()
+    for sim in sims:
+        sim.reset(seed=9)
+    read()

@@ -13,6 +13,25 @@ STALE = 1 << 30
 """Bit of the status: the state was written, and derived quantities were not computed again."""
 
 
+OVERFLOW = 1 << 29
+"""Bit of the status: contacts or constraints were left out."""
+
+
+@wp.kernel
+def flag_overflow(
+    njmax: int,
+    naconmax: int,
+    rows: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    contacts: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    pairs: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    overflow: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    status: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+):
+    world = wp.tid()
+    if rows[world] > njmax or contacts[0] > naconmax or pairs[0] > naconmax or overflow[world] != 0:
+        status[world] = status[world] | wp.static(OVERFLOW)
+
+
 @wp.kernel
 def flag_invalid(values: wp.array2d(dtype=wp.float32), bit: int, status: wp.array(dtype=wp.int32)):  # type: ignore[valid-type]
     """Sets the bit of worlds with NaN, infinity or a number beyond MuJoCo's limit of 1e10."""
@@ -33,7 +52,7 @@ def flag_changed(values: wp.array2d(dtype=wp.float32), known: wp.array2d(dtype=w
 def failed_worlds(status: wp.array(dtype=wp.int32), mask: wp.array(dtype=wp.bool)):  # type: ignore[valid-type]
     """The worlds whose state contains invalid numbers."""
     world = wp.tid()
-    mask[world] = (status[world] & wp.static(STALE - 1)) != 0
+    mask[world] = (status[world] & wp.static(OVERFLOW - 1)) != 0
 
 
 @wp.kernel

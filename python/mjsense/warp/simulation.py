@@ -459,9 +459,15 @@ class WarpSimulation(KnownAttributes):
 
     def _report(self) -> None:
         """Collects the failures of the last call and raises RuntimeError if contacts or constraints did not fit."""
-        status = self._status.numpy()
+        data = self._data
+        counts = [data.nefc, data.nacon, data.ncollision, data.overflow]
+        with wp.ScopedDevice(self._device):
+            wp.launch(kernels.flag_overflow, self.num_worlds, [data.njmax, data.naconmax, *counts, self._status])
+        status = self._status.numpy()  # waits for the device
         self._failures = []
-        for world in np.flatnonzero(status & (kernels.STALE - 1)).tolist():
+        if not status.any():
+            return
+        for world in np.flatnonzero(status & (kernels.OVERFLOW - 1)).tolist():
             names = [name for bit, name in enumerate(_FINITE) if status[world] & (1 << bit)]
             self._failures.append((world, f"{', '.join(names)}: NaN, infinity or a number beyond 1e10; the world was reset"))
         if self._failures:
@@ -469,7 +475,8 @@ class WarpSimulation(KnownAttributes):
             for sensor in self._sensors.values():
                 if sensor.on_host:
                     sensor.reset(failed)
-        limits.check_overflow(self._data, self._limits)
+        if (status & kernels.OVERFLOW).any():
+            limits.check_overflow(data, self._limits)
         stale = np.flatnonzero(status & kernels.STALE)
         if len(stale):
             raise RuntimeError(
