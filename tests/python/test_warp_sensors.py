@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sensors on mujoco_warp's worlds (CPU device) give the values of the C++ sensors in the same states."""
 
+import importlib
+
 import numpy as np
 import pytest
 
@@ -350,7 +352,9 @@ def test_cameras(scene):
 
 def test_rays_follow_models_that_differ_by_world():
     """Fixed geoms are in a tree that all worlds share, until they differ."""
-    scan = mjs.RayCastSensorCfg("scan", frame=ref("body", "trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0)), ray_alignment="world")
+    scan = mjs.RayCastSensorCfg(
+        "scan", frame=ref("body", "trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0)), ray_alignment="world"
+    )
     cpu, warp = simulations("primitives", scan)
     assert cpu.model.ngeom > 24
     qpos, positions = states(), cpu.model.geom_pos + rng.uniform(-0.5, 0.5, (WORLDS, cpu.model.ngeom, 3))
@@ -382,3 +386,14 @@ def test_a_nan_policy_raises():
     warp.step()
     with pytest.raises(RuntimeError, match=r"sensor 'x', effect 1 \(nan_policy\): 3 of 3 values are not finite in world 0"):
         warp.scene["x"].data
+
+
+@pytest.mark.parametrize(
+    "module", ["camera", "contact", "contact_lists", "contact_memory", "effects", "kernels", "lidar", "pose_history", "rays"]
+)
+def test_kernels_compile_for_cuda_devices(module, tmp_path):
+    """Warp contains the compiler for CUDA devices, which needs no such device."""
+    import warp
+
+    warp.compile_aot_module(importlib.import_module(f"mjsense.warp.{module}"), arch=80, module_dir=tmp_path, use_ptx=True)
+    assert list(tmp_path.glob("*.ptx"))
