@@ -350,6 +350,34 @@ def test_cameras(scene):
     assert np.abs(all_cpu["rgb"].astype(int) - all_warp["rgb"])[near].mean() < 2
 
 
+def test_cameras_with_a_period_and_a_delay():
+    camera = mjs.CameraSensorCfg(
+        "slow", parent_body="robot/trunk", pos=(0, 0, 0.3), width=16, height=12, data_types=("rgb", "depth", "segmentation"),
+        update_period=0.012, phase=0.004,
+    )  # fmt: skip
+    late = mjs.EffectSensorCfg("late", sensor="slow", effects=(effects.StepDelay(1, 2), effects.Dropout(0.3)))
+    cpu, warp = simulations("meshes", camera, late, decimation=2)
+    qpos, qvel = states(), rng.normal(size=(WORLDS, 7)).astype(np.float32)
+    for sim in (cpu, warp):
+        sim.set_state(qpos=qpos + np.eye(1, 8, 2, dtype=np.float32) * 2, qvel=qvel)
+    images = set()
+    for step in range(12):
+        for sim in (cpu, warp):
+            if step == 7:
+                sim.reset([3])
+            sim.step()
+        for name in ("slow", "late"):
+            expected, found = arrays(cpu, name), arrays(warp, name)
+            near = expected["depth"][..., 0] < 100
+            other = near & (expected["segmentation"] != found["segmentation"]).any(-1)
+            assert other.sum() <= 3
+            near &= ~other
+            assert np.abs(expected["depth"] - found["depth"])[near].max() < 5e-3
+            assert np.abs(expected["rgb"].astype(int) - found["rgb"])[near].mean() < 2
+        images.add(arrays(cpu, "slow")["rgb"][0].tobytes())
+    assert 2 < len(images) < 12
+
+
 def test_rays_follow_models_that_differ_by_world():
     """Fixed geoms are in a tree that all worlds share, until they differ."""
     scan = mjs.RayCastSensorCfg(
