@@ -303,6 +303,21 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
 
 
 @needs_warp
+def test_suites_and_one_world():
+    sim = simulation(touch(track_air_time=True))
+    suite = mjs.SensorSuite([sim.scene["touch"], sim.scene["gyro"]])
+    sim.step(30)
+    assert suite.get_observations(sim)["gyro"].shape == (3, 3)
+    one = suite.get_observations(sim, batch_index=1)["touch"]["force"]
+    np.testing.assert_array_equal(host(one), host(sim.scene["touch"].data.force)[1])
+    if hasattr(one, "clone"):
+        found = sim.scene["touch"].data.current_contact_time
+        np.testing.assert_array_equal(host(sim.scene["touch"].compute_first_contact(1.0)), host(found) > 0)
+    with pytest.raises(NotImplementedError, match="view is not available"):
+        mjs.view(sim)
+
+
+@needs_warp
 def test_noise_is_that_of_the_cpu_through_resets_and_failures():
     noisy = mjs.EffectSensorCfg(
         "noisy",

@@ -47,6 +47,8 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
         return thing
     if isinstance(thing, Simulation):
         return LiveSource(thing)
+    if hasattr(thing, "warp_model"):
+        raise NotImplementedError("mjs.view is not available with backend='warp'; use backend='cpu'")
     if isinstance(thing, TaskEnv):
         thing = thing.worlds
     if isinstance(thing, TaskVectorEnv):
@@ -68,7 +70,9 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
     try:
         return TaskSource(make_vec(options.pop("task", "pick"), scene=thing, **options), title)
     except UnknownNameError as error:
-        raise UnknownNameError(f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}") from None
+        raise UnknownNameError(
+            f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}"
+        ) from None
 
 
 def _model(path: Path, worlds: int, seed: int) -> LiveSource:
