@@ -407,6 +407,14 @@ def test_options_that_the_backend_lacks_are_errors():
             simulations("primitives", cfg)
 
 
+def test_a_camera_refuses_other_fields_of_view():
+    _, warp = simulations(
+        "primitives", mjs.CameraSensorCfg("x", parent_body="robot/trunk", width=8, height=8, data_types=("depth",))
+    )
+    with pytest.raises(ValueError, match=r"sensor 'x': randomize\('cam_fovy'\) is not available with backend='warp'"):
+        warp.randomize("cam_fovy", 60)
+
+
 def test_a_nan_policy_raises():
     refuse = mjs.EffectSensorCfg("x", sensor="robot/gyro", effects=(effects.Dropout(1.0, mode="nan"), effects.NanPolicy("error")))
     _, warp = simulations("primitives", refuse)
