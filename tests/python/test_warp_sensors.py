@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sensors on mujoco_warp's worlds (CPU device) give the values of the C++ sensors in the same states."""
 
+import importlib
+
 import numpy as np
 import pytest
 
@@ -348,9 +350,39 @@ def test_cameras(scene):
     assert np.abs(all_cpu["rgb"].astype(int) - all_warp["rgb"])[near].mean() < 2
 
 
+def test_cameras_with_a_period_and_a_delay():
+    camera = mjs.CameraSensorCfg(
+        "slow", parent_body="robot/trunk", pos=(0, 0, 0.3), width=16, height=12, data_types=("rgb", "depth", "segmentation"),
+        update_period=0.012, phase=0.004,
+    )  # fmt: skip
+    late = mjs.EffectSensorCfg("late", sensor="slow", effects=(effects.StepDelay(1, 2), effects.Dropout(0.3)))
+    cpu, warp = simulations("meshes", camera, late, decimation=2)
+    qpos, qvel = states(), rng.normal(size=(WORLDS, 7)).astype(np.float32)
+    for sim in (cpu, warp):
+        sim.set_state(qpos=qpos + np.eye(1, 8, 2, dtype=np.float32) * 2, qvel=qvel)
+    images = set()
+    for step in range(12):
+        for sim in (cpu, warp):
+            if step == 7:
+                sim.reset([3])
+            sim.step()
+        for name in ("slow", "late"):
+            expected, found = arrays(cpu, name), arrays(warp, name)
+            near = expected["depth"][..., 0] < 100
+            other = near & (expected["segmentation"] != found["segmentation"]).any(-1)
+            assert other.sum() <= 3
+            near &= ~other
+            assert np.abs(expected["depth"] - found["depth"])[near].max() < 5e-3
+            assert np.abs(expected["rgb"].astype(int) - found["rgb"])[near].mean() < 2
+        images.add(arrays(cpu, "slow")["rgb"][0].tobytes())
+    assert 2 < len(images) < 12
+
+
 def test_rays_follow_models_that_differ_by_world():
     """Fixed geoms are in a tree that all worlds share, until they differ."""
-    scan = mjs.RayCastSensorCfg("scan", frame=ref("body", "trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0)), ray_alignment="world")
+    scan = mjs.RayCastSensorCfg(
+        "scan", frame=ref("body", "trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0)), ray_alignment="world"
+    )
     cpu, warp = simulations("primitives", scan)
     assert cpu.model.ngeom > 24
     qpos, positions = states(), cpu.model.geom_pos + rng.uniform(-0.5, 0.5, (WORLDS, cpu.model.ngeom, 3))
@@ -375,6 +407,14 @@ def test_options_that_the_backend_lacks_are_errors():
             simulations("primitives", cfg)
 
 
+def test_a_camera_refuses_other_fields_of_view():
+    _, warp = simulations(
+        "primitives", mjs.CameraSensorCfg("x", parent_body="robot/trunk", width=8, height=8, data_types=("depth",))
+    )
+    with pytest.raises(ValueError, match=r"sensor 'x': randomize\('cam_fovy'\) is not available with backend='warp'"):
+        warp.randomize("cam_fovy", 60)
+
+
 def test_a_nan_policy_raises():
     refuse = mjs.EffectSensorCfg("x", sensor="robot/gyro", effects=(effects.Dropout(1.0, mode="nan"), effects.NanPolicy("error")))
     _, warp = simulations("primitives", refuse)
@@ -382,3 +422,14 @@ def test_a_nan_policy_raises():
     warp.step()
     with pytest.raises(RuntimeError, match=r"sensor 'x', effect 1 \(nan_policy\): 3 of 3 values are not finite in world 0"):
         warp.scene["x"].data
+
+
+@pytest.mark.parametrize(
+    "module", ["camera", "contact", "contact_lists", "contact_memory", "effects", "kernels", "lidar", "pose_history", "rays"]
+)
+def test_kernels_compile_for_cuda_devices(module, tmp_path):
+    """Warp contains the compiler for CUDA devices, which needs no such device."""
+    import warp
+
+    warp.compile_aot_module(importlib.import_module(f"mjsense.warp.{module}"), arch=80, module_dir=tmp_path, use_ptx=True)
+    assert list(tmp_path.glob("*.ptx"))

@@ -126,6 +126,8 @@ class Camera(WarpSensor):
         super().__init__(worlds, sensor)
         cfg, model = self.cfg, worlds.compiled.model
         self.check_options()
+        if cfg.intrinsics is None and not (cfg.camera_name and cfg.fovy):
+            self.fixed_fields = ("cam_fovy", "cam_intrinsic", "cam_sensorsize")
         self.camera = _mujoco.name2id(model, _mujoco.Obj.CAMERA, cfg.camera_name or self.name)
         self.fields = declared(worlds, sensor)
         self.pixels = cfg.width * cfg.height

@@ -91,6 +91,8 @@ class WarpSensor:
     """True if the rows are complete after the last substep(), without update()."""
     on_host = False
     """True if its methods run Python code of the user. They are called outside of CUDA graphs."""
+    fixed_fields: tuple[str, ...] = ()
+    """Fields of the model that the sensor reads only when it is made; randomize() refuses them."""
     inputs: tuple[WarpSensor, ...] = ()
     """Sensors whose fields update() reads; they are updated first."""
 

@@ -579,6 +579,9 @@ class WarpSimulation(KnownAttributes):
         self._check_open()
         self._compiled._check_randomizable(field)
         self._model_array(field)
+        for sensor in self._sensors.values():
+            if field in sensor.fixed_fields:
+                raise unsupported(sensor.name, f"randomize('{field}')")
         rows = np.arange(self.num_worlds) if world_ids is None else _ids(world_ids, self.num_worlds)
         like = np.zeros((len(rows), *getattr(self.model, field).shape), np.float32)
         values = self._compiled._valid_values(field, arrays.on_host(values), like, rows)

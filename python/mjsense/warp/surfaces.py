@@ -24,7 +24,6 @@ from mjsense.warp.shapes import (
     normal_cylinder,
     normal_ellipsoid,
     normal_sphere,
-    tied,
 )
 
 wp.set_module_options({"enable_backward": False})
@@ -97,9 +96,9 @@ def _hit_triangles(tree: wp.uint64, o: wp.vec3, d: wp.vec3, start: float, limit:
 def _nearer(surfaces: Surfaces, hit: Hit, w: int, geom: int, origin: wp.vec3, direction: wp.vec3, reach: float) -> Hit:
     """The nearer one of a hit and that of a geom, within reach. Distances within rounding are a tie: the lower geom id wins."""
     pos = surfaces.pos[w, geom]
-    limit = wp.min(reach, tied(hit.t))
-    # Distance along the ray to the bounding sphere, with a margin for rounding.
     to_centre = pos - origin
+    limit = wp.min(reach, hit.t + 1.0e-6 * (1.0 + wp.length(to_centre) + wp.length(origin)))
+    # Distance along the ray to the bounding sphere, with a margin for rounding.
     middle = wp.dot(to_centre, direction)
     aside = to_centre - middle * direction
     radius = surfaces.radius[w % surfaces.radius.shape[0], geom]
@@ -138,11 +137,13 @@ def _nearer(surfaces: Surfaces, hit: Hit, w: int, geom: int, origin: wp.vec3, di
         else:
             tree = surfaces.meshes[shape]
         if tree != wp.uint64(0):
-            found = _hit_triangles(tree, o, d, start, tied(limit))
+            found = _hit_triangles(tree, o, d, start, limit)
             t = found[0]
     if t > reach or t >= NO_HIT:
         return hit
-    is_nearer = tied(t) < hit.t or (t <= hit.t + (tied(t) - t) and geom < hit.geom)
+    # The origin is float32, so the error of t grows with its coordinates.
+    tie = 5.0e-7 + 4.0e-7 * (wp.abs(t) + wp.length(origin))
+    is_nearer = t < hit.t - tie or (t <= hit.t + tie and geom < hit.geom)
     if not is_nearer:
         return hit
     p = o + t * d
@@ -180,7 +181,7 @@ def nearest_hit(surfaces: Surfaces, filter: Filter, f: int, w: int, origin: wp.v
     if surfaces.use_tree:
         query = wp.bvh_query_ray(surfaces.tree, origin, direction)
         item = int(0)
-        while wp.bvh_query_next(query, item, wp.min(reach, tied(hit.t))):
+        while wp.bvh_query_next(query, item, wp.min(reach, hit.t + 1.0e-6 * (1.0 + hit.t + wp.length(origin)))):
             geom = surfaces.tree_geoms[item]
             if filter.seen[f, geom]:
                 hit = _nearer(surfaces, hit, w, geom, origin, direction, reach)
