@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -540,6 +541,10 @@ class Simulation(KnownAttributes):
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:
         """Resets the sensors' episode state in these worlds without resetting the physics."""
         self._core.reset_sensors(_ids(world_ids))
+
+
+# Otherwise help() would show the arguments of __new__.
+Simulation.__signature__ = inspect.Signature([*inspect.signature(Simulation.__init__).parameters.values()][1:])  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @checked

@@ -2,6 +2,7 @@
 """Simulation(backend="warp") on Warp's CPU device. tools/gpu_check.py compares more scenes, worlds and steps, on any device."""
 
 import importlib.util
+import inspect
 import re
 import subprocess
 import sys
@@ -61,6 +62,7 @@ def test_options_of_warp_are_refused_on_the_cpu():
         simulation(backend="gpu")
     with pytest.raises(ValueError, match="njmax is for backend='warp'"):
         simulation(backend="cpu", njmax=3)
+    assert [*inspect.signature(mjs.Simulation).parameters][:3] == ["scene", "num_worlds", "decimation"]
 
 
 @needs_warp
