@@ -39,20 +39,20 @@ def robot() -> mujoco.MjSpec:
     )
 
 
-def ground(boxes: int) -> Callable[[], mujoco.MjSpec]:
-    def make() -> mujoco.MjSpec:
-        spec, rng = mujoco.MjSpec(), np.random.default_rng(1)
-        body = spec.worldbody.add_body(name="ground")
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
+def ground(boxes: int) -> Callable[[mujoco.MjSpec], None]:
+    """Adds a plane and flat boxes to the world."""
+
+    def add(spec: mujoco.MjSpec) -> None:
+        rng = np.random.default_rng(1)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
         for _ in range(boxes):
             pos, size = (*rng.uniform(-5, 5, 2), 0.0), rng.uniform(0.05, 0.4, 3) * (1, 1, 0.2)
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, contype=0, conaffinity=0)
-        return spec
+            spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, contype=0, conaffinity=0)
 
-    return make
+    return add
 
 
-def ours(make_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
+def ours(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
     trunk = mjs.ObjRef(type="body", name="trunk", entity="robot")
     sensors = (
         mjs.RayCastSensorCfg(
@@ -63,13 +63,13 @@ def ours(make_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable
             data_types=("depth",),
         ),
     )  # fmt: skip
-    entities = {"ground": mjs.EntityCfg(model=make_ground()), "robot": mjs.EntityCfg(model=robot())}
-    sim: Any = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities=entities, sensors=sensors)), worlds, backend="warp", device=device)
+    cfg = mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=robot())}, sensors=sensors, spec_fn=add_ground)
+    sim: Any = mjs.Simulation(mjs.Scene(cfg), worlds, backend="warp", device=device)
     calls = {cfg.name: sim._sensors[cfg.name].update for cfg in sensors}
     return calls, lambda qpos: sim.set_state(qpos=qpos), lambda name: sim.scene[name].fields
 
 
-def mjlab(make_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
+def mjlab(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
     import torch
     from mjlab.entity import EntityCfg
     from mjlab.scene import Scene, SceneCfg
@@ -88,8 +88,8 @@ def mjlab(make_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callabl
     }  # fmt: skip
     calls, writers, readers = {}, [], {}
     for name, cfg in configs.items():
-        entities = {"ground": EntityCfg(spec_fn=make_ground), "robot": EntityCfg(spec_fn=robot)}
-        scene = Scene(SceneCfg(num_envs=worlds, entities=entities, sensors=(cfg,)), device=device)
+        entities = {"robot": EntityCfg(spec_fn=robot)}
+        scene = Scene(SceneCfg(num_envs=worlds, entities=entities, sensors=(cfg,), spec_fn=add_ground), device=device)
         sim = Simulation(num_envs=worlds, cfg=SimulationCfg(), model=scene.compile(), device=device)
         scene.initialize(sim.mj_model, sim.model, sim.data)
         sim.set_sensor_context(scene.sensor_context)

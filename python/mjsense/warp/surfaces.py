@@ -192,7 +192,7 @@ def _tree(points: np.ndarray, faces: np.ndarray, device: Any) -> wp.Mesh:
     return wp.Mesh(
         points=wp.array(np.ascontiguousarray(points, np.float32), dtype=wp.vec3, device=device),
         indices=wp.array(np.ascontiguousarray(faces, np.int32).reshape(-1), dtype=int, device=device),
-        bvh_leaf_size=1,
+        bvh_constructor="sah",  # built once, on the host; queries are faster than with the default of CUDA devices
     )
 
 
@@ -266,7 +266,7 @@ class RayScene:
         centre = pos + np.einsum("nij,nj->ni", mat, model.geom_aabb[ids].reshape(-1, 6)[:, :3])
         half = np.einsum("nij,nj->ni", np.abs(mat), model.geom_aabb[ids].reshape(-1, 6)[:, 3:])
         half += 1e-5 + 1e-6 * (np.abs(centre) + half)
-        return wp.Bvh(self.worlds.array(centre - half, wp.vec3), self.worlds.array(centre + half, wp.vec3))
+        return wp.Bvh(self.worlds.array(centre - half, wp.vec3), self.worlds.array(centre + half, wp.vec3), constructor="sah")
 
     def filter(self, groups: Any, excluded: Sequence[int]) -> Filter:
         """Geoms of these groups, except those of the body that is excluded for each frame; -1: none."""
