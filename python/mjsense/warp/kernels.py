@@ -19,6 +19,7 @@ OVERFLOW = 1 << 29
 
 @wp.kernel
 def flag_overflow(
+    errors: int,
     njmax: int,
     naconmax: int,
     rows: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
@@ -28,7 +29,7 @@ def flag_overflow(
     status: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
 ):
     world = wp.tid()
-    if rows[world] > njmax or contacts[0] > naconmax or pairs[0] > naconmax or overflow[world] != 0:
+    if rows[world] > njmax or contacts[0] > naconmax or pairs[0] > naconmax or (overflow[world] & errors) != 0:
         status[world] = status[world] | wp.static(OVERFLOW)
 
 

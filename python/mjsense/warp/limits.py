@@ -50,6 +50,11 @@ _TOO_MANY = {
     mjw.OverflowType.TACTILE: "too many collision pairs of a tactile sensor",
 }
 
+ERRORS = int(mjw.OverflowType.NEFC | mjw.OverflowType.BROADPHASE | mjw.OverflowType.NARROWPHASE) | sum(
+    int(kind) for kind in _TOO_MANY
+)
+"""Bits of Data.overflow that are errors. Others, such as the limit of the solver's iterations, are not."""
+
 
 def check_overflow(data: mjw.Data, limits: Limits) -> None:
     """Raises RuntimeError, with the world and the limit to raise, if contacts or constraints of the last step were left out."""
@@ -67,7 +72,7 @@ def check_overflow(data: mjw.Data, limits: Limits) -> None:
             f"({data.naconmax} in all worlds)",
             f"nconmax={2 * -(-max(contacts, found) // data.nworld)}",
         )
-    overflow = data.overflow.numpy()
+    overflow = data.overflow.numpy() & ERRORS
     # Within a step more rows may have been needed than at its end.
     for world in np.flatnonzero(overflow).tolist():
         bits = int(overflow[world])

@@ -462,7 +462,7 @@ class WarpSimulation(KnownAttributes):
         data = self._data
         counts = [data.nefc, data.nacon, data.ncollision, data.overflow]
         with wp.ScopedDevice(self._device):
-            wp.launch(kernels.flag_overflow, self.num_worlds, [data.njmax, data.naconmax, *counts, self._status])
+            wp.launch(kernels.flag_overflow, self.num_worlds, [limits.ERRORS, data.njmax, data.naconmax, *counts, self._status])
         status = self._status.numpy()  # waits for the device
         self._failures = []
         if not status.any():
