@@ -124,13 +124,14 @@ _show.help_of_objects(NativeSensor)
 
 
 def copied(array: Any) -> Any:
-    """A copy of an array, or of a tensor on its device."""
-    return array.clone() if hasattr(array, "clone") else array.copy()
+    """A copy of an array, or of a tensor on its device; a ``wp.array`` becomes a NumPy array."""
+    return array.clone() if hasattr(array, "clone") else np.array(on_host(array))
 
 
 def on_host(array: Any) -> np.ndarray:
-    """An array or a tensor as a NumPy array."""
-    return array.cpu().numpy() if hasattr(array, "cpu") else np.asarray(array)
+    """An array, a tensor or a ``wp.array`` as a NumPy array."""
+    array = array.cpu() if hasattr(array, "cpu") else array
+    return array.numpy() if hasattr(array, "numpy") else np.asarray(array)
 
 
 def box_of(spec: _core.SensorSpec) -> gymnasium.spaces.Box:
