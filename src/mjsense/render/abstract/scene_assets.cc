@@ -86,7 +86,7 @@ const DrawnMesh* SceneAssets::mesh(int id) {
                                      3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
                                     {m->mesh_face + 3 * m->mesh_faceadr[mesh],
                                      3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
-                                    true);
+                                    true, BuildQuality::kFast);
       made.tables = mesh_tables(m, mesh);
     }
     if (made.tables) made.surface = made.tables->surface();
@@ -105,8 +105,8 @@ DrawnMesh SceneAssets::hull(int mesh) const {
                                    3 * static_cast<std::size_t>(num_faces));
   const float* vert = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
   DrawnMesh made;
-  made.geometry =
-      mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])}, faces, true);
+  made.geometry = mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])}, faces,
+                                true, BuildQuality::kFast);
   auto tables = std::make_shared<MeshTables>();
   for (int f = 0; f < num_faces; ++f) {
     const float *a = vert + 3 * faces[3 * f], *b = vert + 3 * faces[3 * f + 1],

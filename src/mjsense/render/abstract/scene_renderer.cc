@@ -266,7 +266,8 @@ void SceneRenderer::add_triangles(DrawnGeom drawn, ShapeTriangles triangles) {
   if (triangles.faces.empty()) return;
   Decoration& d = *decorations_.emplace_back(std::make_unique<Decoration>());
   d.triangles = std::move(triangles);
-  d.scene = build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces);
+  d.scene =
+      build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces, BuildQuality::kFast);
   d.surface.normals = d.triangles.normals.data();
   box_around(d.triangles.vertices, d.box);
   std::copy_n(d.box, 3, drawn.shape.center);

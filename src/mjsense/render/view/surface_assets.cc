@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "mjsense/core/content_cache.h"
 #include "mjsense/rays/flex_surface.h"
@@ -56,23 +57,36 @@ struct Image {
   std::uint32_t* row(int y) const { return texels + static_cast<std::size_t>(y) * (width + 1); }
 };
 
+// Functions that go over all texels are compiled for wide vectors too. Without fused operations, so
+// that the results are the same.
+#ifdef __x86_64__
+#define MJSENSE_VECTORS [[gnu::target_clones("avx2", "default")]]
+#else
+#define MJSENSE_VECTORS
+#endif
+
 // Computes the next mip level of one image by interpolation at its texels' centres, as OpenGL
 // drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts the
 // image nor drops its border.
-void halve(const Image& src, const Image& dst) {
+MJSENSE_VECTORS void halve(const Image& src, const Image& dst) {
   using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
-  using Sums [[gnu::vector_size(8)]] = std::uint16_t;
   using Channels [[gnu::vector_size(16)]] = float;
   if (src.width == 2 * dst.width && src.height == 2 * dst.height) {
-    const auto sums = [](std::uint32_t texel) {
-      return __builtin_convertvector(std::bit_cast<Bytes>(texel), Sums);
-    };
+    // Two neighbours at once, as four sums of 16 bits: red and blue, then green and alpha.
+    constexpr std::uint64_t kChannels = 0x00ff00ff00ff00ff;
+    constexpr std::uint32_t kHalf = 0x00020002;  // rounds the division by four
     for (int y = 0; y < dst.height; ++y) {
       const std::uint32_t *above = src.row(2 * y), *below = src.row(2 * y + 1);
       std::uint32_t* out = dst.row(y);
       for (int x = 0; x < dst.width; ++x, above += 2, below += 2) {
-        const Sums sum = sums(above[0]) + sums(above[1]) + sums(below[0]) + sums(below[1]) + 2;
-        out[x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(sum >> 2, Bytes));
+        std::uint64_t upper, lower;
+        std::memcpy(&upper, above, sizeof upper);
+        std::memcpy(&lower, below, sizeof lower);
+        const auto mean = [&](int shift) {
+          const std::uint64_t sums = (upper >> shift & kChannels) + (lower >> shift & kChannels);
+          return static_cast<std::uint32_t>(((sums + (sums >> 32) + kHalf) >> 2 & kChannels));
+        };
+        out[x] = mean(0) | mean(8) << 8;
       }
     }
     return;
@@ -154,7 +168,16 @@ void fill_texture(const mjModel* model, int id, StoredTexture& out) {
         data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
     for (int y = 0; y < height; ++y) {
       std::uint32_t* row = first.row(y);
-      for (int x = 0; x < width; ++x, from += channels) {
+      int x = 0;
+      if (!srgb && channels == 3) {
+        // Whole words, which read one byte of the next texel.
+        for (; x + 1 < width; ++x, from += 3) {
+          std::uint32_t texel;
+          std::memcpy(&texel, from, sizeof texel);
+          row[x] = texel | 0xff000000;
+        }
+      }
+      for (; x < width; ++x, from += channels) {
         const std::uint32_t alpha = channels == 4 ? from[3] : 255;
         row[x] = srgb ? linear[from[0]] | linear[from[1]] << 8 | linear[from[2]] << 16 | alpha << 24
                       : from[0] | from[1] << 8 | from[2] << 16 | alpha << 24;
