@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -69,8 +68,6 @@ struct Image {
 // drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts the
 // image nor drops its border.
 MJSENSE_VECTORS void halve(const Image& src, const Image& dst) {
-  using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
-  using Channels [[gnu::vector_size(16)]] = float;
   if (src.width == 2 * dst.width && src.height == 2 * dst.height) {
     // Two neighbours at once, as four sums of 16 bits: red and blue, then green and alpha.
     constexpr std::uint64_t kChannels = 0x00ff00ff00ff00ff;
@@ -91,8 +88,13 @@ MJSENSE_VECTORS void halve(const Image& src, const Image& dst) {
     }
     return;
   }
-  const auto unpacked = [](std::uint32_t texel) {
-    return __builtin_convertvector(std::bit_cast<Bytes>(texel), Channels);
+  using Channels [[gnu::vector_size(16)]] = float;
+  using Words [[gnu::vector_size(16)]] = std::int32_t;
+  constexpr Words kShifts = {0, 8, 16, 24};
+  const auto unpacked = [&](std::uint32_t texel) {
+    const auto word = static_cast<std::int32_t>(texel);
+    const Words words = Words{word, word, word, word} >> kShifts & 255;
+    return __builtin_convertvector(words, Channels);
   };
   std::vector<Between> columns(dst.width);
   for (int x = 0; x < dst.width; ++x) columns[x] = between(x, src.width, dst.width);
@@ -108,7 +110,8 @@ MJSENSE_VECTORS void halve(const Image& src, const Image& dst) {
       };
       const Channels upper = mix(above);
       const Channels value = upper + v.weight * (mix(below) - upper) + 0.5f;
-      out[x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(value, Bytes));
+      const Words words = __builtin_convertvector(value, Words) << kShifts;
+      out[x] = static_cast<std::uint32_t>(words[0] | words[1] | words[2] | words[3]);
     }
   }
 }
