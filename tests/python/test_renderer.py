@@ -161,6 +161,18 @@ def test_errors():
             call()
 
 
+def test_data_of_a_model_that_was_compiled_anew_is_refused():
+    spec = mujoco.MjSpec.from_string(BALL)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    renderer = mjs.Renderer(model, 20, 30)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+    _, changed = spec.recompile(model, data)
+    for call in (lambda: renderer.update_scene(changed, "front"), lambda: renderer.render_batch([changed], "front")):
+        with pytest.raises(ValueError, match="`data` belongs to another model: ngeom is 2, but the renderer's model had 1"):
+            call()
+
+
 def test_a_pose_that_is_not_finite_is_named():
     model, data = load(BALL)
     renderer = mjs.Renderer(model, 20, 30)
