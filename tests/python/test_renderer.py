@@ -57,6 +57,8 @@ SOFT = """<mujoco><statistic extent="1" center="0 0 .3"/><worldbody><light pos="
 def load(xml, steps=0):
     if not hasattr(mujoco.MjModel, "cam_projection"):  # older versions
         xml = xml.replace('projection="orthographic"', 'orthographic="true"')
+    if not hasattr(mujoco.MjModel, "light_type"):
+        xml = xml.replace('type="directional"', 'directional="true"')
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     for _ in range(steps):

@@ -132,6 +132,11 @@ void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord 
   }
 }
 
+// Models of MuJoCo before 3.3.3 have no colour spaces.
+int color_space(const mjModel* model, int id) {
+  return model->tex_colorspace ? model->tex_colorspace[id] : mjCOLORSPACE_AUTO;
+}
+
 void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   Texture& texture = out.texture;
   const int channels = model->tex_nchannel[id];
@@ -141,7 +146,7 @@ void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
   const int height = texture.cube ? width : model->tex_height[id];
   const int faces = texture.cube ? 6 : 1;
-  const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
+  const bool srgb = color_space(model, id) == mjCOLORSPACE_SRGB && !texture.cube;
   const mjtByte* data = model->tex_data + model->tex_adr[id];
   const std::array<std::uint8_t, 256> linear = linear_values();
 
@@ -209,7 +214,7 @@ std::shared_ptr<const StoredTexture> stored_texture(const mjModel* m, int id) {
   const int channels = m->tex_nchannel[id], width = m->tex_width[id], height = m->tex_height[id];
   // Textures with another number of channels are encoded for another renderer and ignored.
   if (channels != 3 && channels != 4) return std::make_shared<const StoredTexture>();
-  const int form[] = {m->tex_type[id], m->tex_colorspace[id], channels, width, height};
+  const int form[] = {m->tex_type[id], color_space(m, id), channels, width, height};
   const std::size_t bytes = static_cast<std::size_t>(width) * height * channels;
   const ContentKey key = ContentKey()
                              .add(std::span<const int>(form))
