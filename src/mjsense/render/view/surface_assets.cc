@@ -143,9 +143,9 @@ void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
   const int width = model->tex_width[id];
   // A cube texture with a square image repeats that image on all faces.
-  const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
+  texture.same_faces = texture.cube && model->tex_width[id] == model->tex_height[id];
   const int height = texture.cube ? width : model->tex_height[id];
-  const int faces = texture.cube ? 6 : 1;
+  const int faces = texture.cube && !texture.same_faces ? 6 : 1;
   const bool srgb = color_space(model, id) == mjCOLORSPACE_SRGB && !texture.cube;
   const mjtByte* data = model->tex_data + model->tex_adr[id];
   const std::array<std::uint8_t, 256> linear = linear_values();
@@ -172,8 +172,7 @@ void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   };
   for (int f = 0; f < faces; ++f) {
     const Image first = image(0, f);
-    const mjtByte* from =
-        data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
+    const mjtByte* from = data + static_cast<std::size_t>(f) * width * height * channels;
     for (int y = 0; y < height; ++y) {
       std::uint32_t* row = first.row(y);
       int x = 0;
