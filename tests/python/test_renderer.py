@@ -163,6 +163,19 @@ def test_errors():
             call()
 
 
+def test_images_do_not_depend_on_the_number_of_images_before():
+    vertices = np.random.default_rng(0).normal(size=(200, 3))
+    vertices *= 0.4 / np.linalg.norm(vertices, axis=1, keepdims=True)
+    model, data = load(f"""<mujoco><asset><mesh name="rock" vertex="{" ".join(map(str, vertices.ravel()))}"/></asset><worldbody>
+        <light pos="1 0 3" dir="-.3 0 -1" castshadow="true"/><geom type="plane" size="2 2 .1"/>
+        <geom type="mesh" mesh="rock" pos="0 0 .5"/><geom type="box" size=".1 .5 .1" pos="0 0 1.1"/></worldbody></mujoco>""")
+    with mjs.Renderer(model, 60, 80) as renderer:
+        renderer.update_scene(data)
+        first = renderer.render()
+        for _ in range(60):  # its mesh gets a better tree for shadow rays
+            assert np.array_equal(renderer.render(), first)
+
+
 def test_data_of_a_model_that_was_compiled_anew_is_refused():
     spec = mujoco.MjSpec.from_string(BALL)
     model = spec.compile()

@@ -45,6 +45,7 @@ bool SceneAssets::Stamp::changed(const void* data, std::size_t bytes) {
 }
 
 void SceneAssets::reload_changed() {
+  improved_ = false;
   const mjModel* m = model_;
   for (int i = 0; i < m->nmesh; ++i) {
     if (!mesh_stamps_[i].changed(m->mesh_vert + 3 * m->mesh_vertadr[i],
@@ -82,17 +83,28 @@ const DrawnMesh* SceneAssets::mesh(int id) {
     if (id % 2) {
       made = hull(mesh);
     } else if (m->mesh_facenum[mesh] > 0) {
-      made.geometry = mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
-                                     3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
-                                    {m->mesh_face + 3 * m->mesh_faceadr[mesh],
-                                     3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
-                                    true, BuildQuality::kFast);
+      made.geometry = geometry(mesh, true, BuildQuality::kFast);
       made.tables = mesh_tables(m, mesh);
     }
     if (made.tables) made.surface = made.tables->surface();
     place = std::make_unique<DrawnMesh>(std::move(made));
   }
-  return place->geometry && place->geometry->scene ? place.get() : nullptr;
+  if (!place->geometry || !place->geometry->scene) return nullptr;
+  if (id % 2 == 0 && !place->shadows && !improved_ && ++place->uses > kManyUses) {
+    place->shadows = geometry(id / 2, false, BuildQuality::kHigh);
+    improved_ = true;
+  }
+  return place.get();
+}
+
+std::shared_ptr<const MeshGeometry> SceneAssets::geometry(int mesh, bool clusters,
+                                                          BuildQuality quality) const {
+  const mjModel* m = model_;
+  return mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
+                        3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
+                       {m->mesh_face + 3 * m->mesh_faceadr[mesh],
+                        3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
+                       clusters, quality);
 }
 
 // The faces of MuJoCo's convex hull, shaded flat.

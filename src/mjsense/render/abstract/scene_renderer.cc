@@ -219,6 +219,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       const DrawnMesh* mesh = assets_.mesh(geom.dataid);
       if (!mesh) return;
       out.bvh = mesh->geometry->scene.get();
+      out.shadow_bvh = mesh->shadows ? mesh->shadows->scene.get() : nullptr;
       out.mesh = &mesh->surface;
       out.clusters = mesh->geometry->clusters.nodes.empty() ? nullptr : &mesh->geometry->clusters;
       out.horizons = out.clusters ? mesh->geometry->horizons.get() : nullptr;
