@@ -43,6 +43,7 @@ class Dataset:
         outcome: Only episodes with this outcome: a text, a pattern (``"horizon reached*"``), several of them, or a function of the text.
         success: Only successful (True) or only failed (False) episodes.
         houses: Only episodes of these houses.
+        where: Only episodes for which this function is true: ``lambda episode: episode.quality.idle < 0.1``.
         tolerance_s: Maximum difference between an entry of ``delta_timestamps`` and a multiple of the period. [s]
         cache_mb: Memory for decoded rows and frames of one process, half for each. [MB]
     """
@@ -57,6 +58,7 @@ class Dataset:
         outcome: str | Iterable[str] | Callable[[str], bool] | None = None,
         success: bool | None = None,
         houses: Iterable[int] | None = None,
+        where: Callable[[Episode], bool] | None = None,
         tolerance_s: float = 1e-4,
         cache_mb: float = 512,
     ) -> None:
@@ -77,6 +79,8 @@ class Dataset:
         if houses is not None:
             numbers = set(houses)
             chosen = [episode for episode in chosen if episode.house in numbers]
+        if where is not None:
+            chosen = [episode for episode in chosen if where(episode)]
         self.episodes: list[Episode] = chosen
         """The episodes, in the order of houses, files and positions in the file."""
         self._ends = list(itertools.accumulate(episode.length for episode in chosen))

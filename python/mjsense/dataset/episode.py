@@ -19,6 +19,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import json_rows, playback
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
+from mjsense.dataset.quality import EpisodeQuality, idle_steps, quality_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
 from mjsense.errors import UnknownNameError
 
@@ -141,6 +142,16 @@ class Episode:
     def success(self) -> bool:
         """Whether the outcome is ``success``."""
         return self.outcome == "success"
+
+    @property
+    def quality(self) -> EpisodeQuality:
+        """Figures that describe how the episode was performed. They are computed at each access."""
+        return quality_of(self)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """Whether neither joints nor commands moved in the step that led to an observation: bool ``[T]``."""
+        return idle_steps(self)
 
     @property
     def settings(self) -> dict[str, Any]:
