@@ -102,7 +102,9 @@ def main() -> None:
         for frames in (1, 0):
             export(root, out, frames)
         loaders = {
-            "mjs.Dataset": [sys.executable, __file__, "--seconds", str(args.seconds), "--cache-mb", str(args.cache_mb), "--read", str(root)],
+            name: [sys.executable, __file__, "--seconds", str(args.seconds), "--cache-mb", str(cache_mb), "--read", str(root)]
+            for name, cache_mb in (("mjs.Dataset", args.cache_mb), ("mjs.Dataset, small cache", 8))
+        } | {
             "LeRobot": [args.lerobot, str(ROOT / "bench/peers/lerobot_loader.py"), str(out)],
         }
         for order in ("sequential", "random"):
@@ -110,7 +112,7 @@ def main() -> None:
                 words = [*command, order, *([str(args.seconds)] if name == "LeRobot" else [])]
                 done = subprocess.run(words, capture_output=True, text=True, check=True)
                 wall, cpu = map(float, done.stdout.split()[-2:])
-                print(f"{order:11} {name:12} {wall:9.1f} ({cpu:.1f}) samples/s")
+                print(f"{order:11} {name:24} {wall:9.1f} ({cpu:.1f}) samples/s")
         compare_writers(root, out, root.parent, args.lerobot, args.steps)
 
 

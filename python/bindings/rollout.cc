@@ -281,6 +281,28 @@ class PyRollout {
     }
     sim_lock_->change("step_chunk", [&] { rollout_->step_chunk(actions, stop_on_success); });
   }
+  // (phase, positions [N, 3] in the world frame) of each part of the policy's plan in a world.
+  nb::list planned_paths(int world) {
+    std::vector<episode::PlannedPath> paths;
+    sim_lock_->read([&] {
+      if (rollout_->policy() == nullptr || !rollout_->active(world)) return;
+      const std::array<int, 1> ids{world};
+      rollout_->for_each(ids,
+                         [&](const World& w) { paths = rollout_->policy()->planned_paths(w); });
+    });
+    nb::list out;
+    for (const episode::PlannedPath& path : paths) {
+      const auto rows =
+          std::make_shared<Array>(DType::kFloat64, Shape{static_cast<int>(path.poses.size()), 3});
+      double* row = rows->all<double>().data();
+      for (const Pose& pose : path.poses) {
+        write_vec(pose.p, row);
+        row += 3;
+      }
+      out.append(nb::make_tuple(std::string(path.phase), to_numpy(rows->view(), owner_of(rows))));
+    }
+    return out;
+  }
   // Actions that act() chose, [B, n], and the worlds for which the policy reported done.
   nb::tuple actions() {
     std::vector<std::vector<double>> rows(rollout_->num_worlds());
@@ -383,6 +405,7 @@ void bind_rollout(nb::module_& m) {
       .def("set_actions", &PyRollout::set_actions, nb::arg("values"), nb::arg("done") = nb::none())
 
       .def("actions", &PyRollout::actions)
+      .def("planned_paths", &PyRollout::planned_paths, nb::arg("world"))
       .def("action_layout", [](PyRollout& s) { return action_layout(s.rollout().task().robot()); })
       .def(
           "streams", [](PyRollout& s) { return suite_streams(s.rollout()); },

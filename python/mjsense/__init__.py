@@ -25,7 +25,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
-                                 export_zarr; import_robomimic
+                                 export_zarr; import_lerobot, import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
@@ -69,6 +69,7 @@ from mjsense.dataset import (
     Deviation,
     Episode,
     EpisodeCheck,
+    EpisodeQuality,
     RenderProgress,
     RenderSummary,
     ReplayReport,
@@ -79,6 +80,7 @@ from mjsense.dataset import (
     render,
     replay,
 )
+from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
@@ -123,14 +125,14 @@ __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
     "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
+    "EpisodeCheck", "EpisodeQuality", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
     "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
     "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
     "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
     "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
     "WorldState", "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
-    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_robomimic", "make", "make_vec", "observations",
+    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_lerobot", "import_robomimic", "make", "make_vec", "observations",
     "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names",
     "view",
     "__version__",

@@ -11,6 +11,8 @@ from itertools import pairwise
 from mjsense import _core, commands
 from mjsense.assets import use_installed_meshes
 from mjsense.cluster import program as cluster
+from mjsense.cluster import tools
+from mjsense.commands import record_format
 from mjsense.ffmpeg import use_installed_ffmpeg
 
 
@@ -22,9 +24,13 @@ def main() -> int:
     if words and words[0] in commands.COMMANDS:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         return commands.run(words)
+    if record_format.is_wanted(words):
+        return record_format.run(words)
     if cluster.is_wanted(words):
         signal.signal(signal.SIGINT, signal.default_int_handler)
         return cluster.run(words)
+    if tools.path_of(words) is not None:
+        return tools.run(words)
     if words[:2] == ["complete", "--"] and len(words) > 3 and words[2] in commands.COMMANDS:
         print(*commands.completions(words[2:]), sep="\n")
         return 0

@@ -71,7 +71,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: isinstance(value, (str, PurePath)) or _is_a(value, "Robot"),
         "the name of a robot, the path of its .toml, or a mjsense.Robot",
     ),
-    "Mapping": (lambda value: hasattr(value, "keys"), "a mapping"),
+    "Mapping": (lambda value: hasattr(value, "keys") or _is_a(value, "Mapping"), "a mapping"),
     "dict": (lambda value: isinstance(value, dict), "a dict"),
 }
 _ANYTHING = {"Any", "np.ndarray", "Sequence[int]"}  # world ids are checked elsewhere, because masks are valid too

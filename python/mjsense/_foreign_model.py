@@ -19,14 +19,17 @@ from mjsense._spec import RENUMBERED
 _ENUMS = {"actuator_dyntype": "mjtDyn", "actuator_gaintype": "mjtGain", "actuator_biastype": "mjtBias", "eq_type": "mjtEq"}
 """Arrays whose numbers differ between series, with their enumerations."""
 
+_NEW_SENSORS = {"mjSENS_TENDONACTFRC": 17, "mjSENS_INSIDESITE": 38, "mjSENS_CONTACT": 42, "mjSENS_TACTILE": 46}
+"""Types of sensors that were inserted after 3.3.0, with their numbers; those of the types after them were smaller before."""
+
 _DEFAULTS: dict[str, Any] = {
     "actuator_ctrlnum": 1, "actuator_outnum": 1, "actuator_historyadr": -1, "cam_output": 1, "dof_length": 1.0, "geom_castshadow": True,
     "jnt_actuatorid": -1, "jnt_plasticadr": -1, "light_softness": 0.2, "sensor_historyadr": -1, "site_dataid": -1, "tendon_actuatorid": -1, "tendon_plasticadr": -1, "tex_contenttypeadr": -1,
 }  # fmt: skip
 """Values of fields that older series lack; all others are 0."""
 
-_GONE = ("flex", "cam_orthographic")
-"""Beginnings of the names of arrays that only older series have. Models with flexes are refused; the content of the other is in a new field."""
+_GONE = ("flex", "cam_orthographic", "light_directional")
+"""Beginnings of the names of arrays that only older series have. Models with flexes are refused; the content of the others is in new fields."""
 
 
 def package_of(model: Any) -> Any:
@@ -57,8 +60,6 @@ def copy_of(model: Any) -> Any:
     """A copy of a model of another series; raises ValueError if it has something that cannot be copied."""
     mujoco = package_of(model)
     version = mujoco.mj_versionString()
-    if not hasattr(model, "M_rownnz"):  # the structure of its sparse matrices, which data had
-        raise ValueError(f"attach(): MuJoCo {version} is too old; 3.3.6 is the first version that can be attached")
     for size, what in (("nflex", "flexes"), ("nplugin", "plugins"), ("nhistory", "histories of sensors or actuators")):
         if getattr(model, size, 0):
             raise ValueError(f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
@@ -86,6 +87,9 @@ def copy_of(model: Any) -> Any:
         for member, number in RENUMBERED.items():
             if member in members:
                 view._get(name)[values == int(members[member])] = number
+    for member, number in _NEW_SENSORS.items():
+        if not hasattr(mujoco.mjtSensor, member):
+            view.sensor_type[view.sensor_type >= number] += 1
     _compute(view, model)
     _copy_structs(view, model, mujoco)
     return view
@@ -132,6 +136,38 @@ def _tendon_dofs(model: Any) -> list[list[int]]:
     return found
 
 
+def _sparse_matrices(model: Any) -> dict[str, np.ndarray]:
+    """The structure of the model's sparse matrices, which models have from 3.3.6 on.
+
+    M is the lower triangle of the inertia matrix without the zeros of simple degrees of freedom, D the whole matrix with them. B has the
+    degrees of freedom of each body, its ancestors and its descendants.
+    """
+
+    def chain(start: int, parents: np.ndarray, root: int) -> list[int]:
+        """`start` after all that it depends on."""
+        found = []
+        while start > root:
+            found.append(int(start))
+            start = parents[start]
+        return found[::-1]
+
+    chains = [chain(dof, model.dof_parentid, -1) for dof in range(model.nv)]
+    of_m = [[dof] if model.dof_simplenum[dof] else chains[dof] for dof in range(model.nv)]
+    of_d = [row + [below for below in range(dof + 1, model.nv) if dof in chains[below]] for dof, row in enumerate(chains)]
+    lines = [{0, *chain(body, model.body_parentid, 0)} for body in range(model.nbody)]
+    of_b = [[i for i, at in enumerate(model.dof_bodyid) if at in lines[body] or body in lines[at]] for body in range(model.nbody)]
+    out: dict[str, Any] = {"D_diag": [len(row) - 1 for row in chains]}
+    for name, rows in (("M", of_m), ("D", of_d), ("B", of_b)):
+        out[f"{name}_rownnz"] = [len(row) for row in rows]
+        out[f"{name}_rowadr"] = np.cumsum([0, *out[f"{name}_rownnz"]])[:-1]
+        out[f"{name}_colind"] = [dof for row in rows for dof in row]
+    in_m = {(i, j): out["M_rowadr"][i] + k for i, row in enumerate(of_m) for k, j in enumerate(row)}
+    out["mapM2D"] = [in_m.get((max(i, j), min(i, j)), -1) for i, row in enumerate(of_d) for j in row]
+    out["mapD2M"] = [out["D_rowadr"][i] + of_d[i].index(j) for i, j in in_m]
+    out["mapM2M"] = [model.dof_Madr[i] + len(row) - 1 - k for i, row in enumerate(of_m) for k in range(len(row))]
+    return {name: np.array(value, int) for name, value in out.items()}
+
+
 def _compute(view: Any, model: Any) -> None:
     """Fields that older series lack and that follow from others."""
     missing = {name for name in view._fields if not hasattr(model, name)}
@@ -145,6 +181,11 @@ def _compute(view: Any, model: Any) -> None:
     put("flg_gravcomp", bool(np.any(model.body_gravcomp)))
     if "cam_projection" in missing:
         put("cam_projection", model.cam_orthographic)
+    if "M_rownnz" in missing:
+        for name, value in _sparse_matrices(model).items():
+            view._get(name)[...] = value
+    if "light_type" in missing:
+        put("light_type", model.light_directional)  # mjLIGHT_DIRECTIONAL is 1
     if "mesh_extrema" in missing:
         directions = np.array(list(product((-1, 0, 1), repeat=3)), float)
         for mesh in np.flatnonzero(model.mesh_graphadr >= 0):

@@ -21,6 +21,8 @@ _STATE = (
     "userdata",
 )  # fmt: skip
 """Fields of mjData that determine what sensors measure."""
+_ELEMENTS = (("geom_xpos", "ngeom", "geoms"), ("site_xpos", "nsite", "sites"), ("cam_xpos", "ncam", "cameras"), ("xpos", "nbody", "bodies"))
+"""Fields of mjData and of the model by which data of a model that was compiled anew is recognised."""
 _WRITTEN_STATE = -2
 """Keyframe of a reset to the state as it is."""
 
@@ -85,6 +87,10 @@ class Attached(KnownAttributes):
             found, expected = np.size(getattr(data, name)), columns.stop - columns.start
             if found != expected:
                 raise ValueError(f"{what} belongs to another model: its {name} has {found} numbers, and this model's has {expected}")
+        for name, size, kind in _ELEMENTS:
+            found, expected = len(getattr(data, name)), getattr(self.models[0], size)
+            if found != expected:
+                raise ValueError(f"{what} belongs to another model: it has {found} {kind}, and this model has {expected}")
 
     def __repr__(self) -> str:
         if self._sim._core.closed:
@@ -320,7 +326,7 @@ def attach(
             attached.update()
             attached["front"].data.rgb      # uint8 [1, H, W, 3]
 
-    Works with every MuJoCo from 3.3.6 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
+    Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
     the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
 
     Args:

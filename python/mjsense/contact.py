@@ -42,4 +42,9 @@ class ContactSensor(NativeSensor):
 
     def _first(self, phase: str, dt: float, abs_tol: float) -> np.ndarray:
         self.data  # update the sensor
-        return _core.contact_first(self._handle, phase, dt, abs_tol)
+        if isinstance(self._core, _core.Simulation):
+            return _core.contact_first(self._handle, phase, dt, abs_tol)
+        if "current_air_time" not in self._fields:
+            raise RuntimeError(f"sensor '{self.name}' does not track air time: set track_air_time")
+        time = self._fields[f"current_{phase}_time"]
+        return (time > 0) & (time < dt + abs_tol)

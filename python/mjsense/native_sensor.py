@@ -46,7 +46,7 @@ class NativeSensor(KnownAttributes):
         """HTML for notebooks: its fields, and thumbnails of the first world's images."""
         images = {}
         if self.kind == "camera" and self._core is not None and not self._core.closed:
-            images = {name or self.name: rows[0] for name, rows in self.fields.items() if rows.ndim == 4}
+            images = {name or self.name: on_host(rows[0]) for name, rows in self.fields.items() if rows.ndim == 4}
         return _show.table(f"{self.kind} sensor '{self.name}'", self._shown(), images)
 
     def _shown(self) -> list[_show.Row]:
@@ -73,7 +73,7 @@ class NativeSensor(KnownAttributes):
 
     def _row(self, world: int) -> Any:
         """A copy of the current value of one world."""
-        rows = {name: array[world].copy() for name, array in self.fields.items()}
+        rows = {name: copied(array[world]) for name, array in self.fields.items()}
         return rows.get("", rows)
 
     @property
@@ -121,6 +121,17 @@ class NativeSensor(KnownAttributes):
 
 
 _show.help_of_objects(NativeSensor)
+
+
+def copied(array: Any) -> Any:
+    """A copy of an array, or of a tensor on its device; a ``wp.array`` becomes a NumPy array."""
+    return array.clone() if hasattr(array, "clone") else np.array(on_host(array))
+
+
+def on_host(array: Any) -> np.ndarray:
+    """An array, a tensor or a ``wp.array`` as a NumPy array."""
+    array = array.cpu() if hasattr(array, "cpu") else array
+    return array.numpy() if hasattr(array, "numpy") else np.asarray(array)
 
 
 def box_of(spec: _core.SensorSpec) -> gymnasium.spaces.Box:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mjsense import _core
 from mjsense._arguments import checked
 from mjsense.data import CameraData, RayCastData
-from mjsense.native_sensor import NativeSensor
+from mjsense.native_sensor import NativeSensor, copied, on_host
 
 
 class RayCastSensor(NativeSensor):
@@ -50,7 +50,7 @@ class LidarSensor(RayCastSensor):
         data: Any = self.data
         if not 0 <= world < len(data.points):
             raise ValueError(f"world {world}: must be in [0, {len(data.points)})")
-        _core.write_point_cloud(str(path), data.points[world], data.intensity[world], data.distances[world])
+        _core.write_point_cloud(str(path), *(on_host(rows[world]) for rows in (data.points, data.intensity, data.distances)))
 
 
 class CameraSensor(NativeSensor):
@@ -62,4 +62,4 @@ class CameraSensor(NativeSensor):
         data = super().data
         if self.cfg is None or not self.cfg.clone_data:
             return data
-        return replace(data, **{name: array.copy() for name, array in self._fields.items()})
+        return replace(data, **{name: copied(array) for name, array in self._fields.items()})

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import importlib
+import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -111,10 +113,15 @@ def record(
     ffmpeg: str = "",
     crf: int = 25,
     preset: str = "veryfast",
+    tune: str = "fastdecode",
     keyint: int = 20,
     molmospaces_depth: bool = False,
     # end of options
     sensors: Iterable[Any] = (),
+    format: Literal["mjsense", "lerobot"] = "mjsense",
+    map: Any = None,
+    keep_recording: bool = False,
+    ray: str | None = None,
     progress: bool | Callable[[RecordProgress], None] | None = None,
 ) -> RecordSummary:
     """Records episodes of a task as HDF5 and MP4 files in ``out/house_<house>/``.
@@ -172,6 +179,8 @@ def record(
         ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
         crf: Quality of the videos, from 0 (lossless) to 51 (worst).
         preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
         keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
@@ -180,17 +189,71 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
+        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` with
+            ``statistics_frames="key"`` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
+        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
+            data set is complete.
+        ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does, which has more
+            options. ``out`` may then be an address such as ``s3://bucket/pick``.
         progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
             True where stderr is a terminal or a notebook.
     """
     options = dict(locals())
-    del options["sensors"], options["progress"]
-    options["out"] = str(out)
+    for name in ("sensors", "progress", "format", "map", "keep_recording", "ray"):
+        del options[name]
+    if ray is not None:
+        given = {**options, "map": map, "keep_recording": keep_recording}
+        if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "keep_recording") if given[name]]:
+            raise ValueError(f"record: {refused[0]} cannot be combined with ray")
+        return _record_on_ray({**options, "format": format, "sensors": sensors}, ray, progress)
+    if format == "mjsense":
+        if map is not None or keep_recording:
+            raise ValueError("record: map and keep_recording are options of format='lerobot'")
+        return _record(options, sensors, progress)
+    if shard or append or overwrite:
+        raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
+    # Formats are modules of a folder that this one may not import; they are found by name, as `mjsense export` finds them.
+    module = importlib.import_module(f"mjsense.export.record_{format}")
+    with module.converted(out, resume=resume, map=map, keep_recording=keep_recording) as folder:
+        summary = _record({**options, "out": folder}, sensors, progress)
+    return replace(summary, path=Path(out))
+
+
+def _record_on_ray(options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
+    cluster = importlib.import_module("mjsense.cluster")  # as formats below
+    own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
+    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
+        del options[name]
+    if not options["threads"]:
+        del options["threads"]  # one per worker
+
+    def counts(now: Any) -> dict[str, Any]:
+        return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
+                "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
+
+    line = ProgressLine() if progress is True or (progress is None and interactive()) else None
+
+    def show(now: Any) -> None:
+        about = RecordProgress(**counts(now), seconds_left=math.nan)
+        if callable(progress):
+            progress(about)
+        elif line is not None:
+            line.show(of_recording(about))
+
+    made = cluster.record_on_ray(cluster.Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"],
+                                 resume=own["resume"], address=address, progress=show)  # fmt: skip
+    return RecordSummary(**counts(made), seconds_left=0.0, interrupted=False, enough=made.enough, failures=made.failures, lengths=[], times={},
+                         published_bytes=0, path=Path(own["out"]))  # fmt: skip
+
+
+def _record(options: dict[str, Any], sensors: Iterable[Any], progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
+    options["out"] = str(options["out"])
     objects = parts_of(options, sensors)
     line = ProgressLine() if progress is True or (progress is None and interactive()) else None
     show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
     report = None if show is None else lambda p: show(RecordProgress(**p))
-    if meshes == "real":
+    if options["meshes"] == "real":
         use_installed_meshes()
     use_installed_ffmpeg()
     made = _core.record(options, report, objects, Simulation._of)

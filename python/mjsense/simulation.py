@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,13 @@ class Simulation(KnownAttributes):
         step_dt: Duration of a control step, s.
     """
 
-    def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0) -> None:
+    def __new__(cls, *args: Any, backend: str = "cpu", **options: Any) -> Simulation:
+        return _on_warp(*args, **options) if backend == "warp" else super().__new__(cls)
+
+    def __init__(
+        self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
+        backend: Literal["cpu", "warp"] = "cpu", device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
+    ) -> None:  # fmt: skip
         """
         Args:
             scene: The scene. Its sensors belong to this simulation from now on, so that a second simulation needs its own scene.
@@ -86,7 +93,17 @@ class Simulation(KnownAttributes):
             decimation: Physics steps (substeps) per control step.
             threads: Number of threads; 0: one per CPU that is available to this process.
             seed: Seed of the random numbers (noise, delays).
+            backend: ``"cpu"``, or ``"warp"``: the physics of mujoco_warp and sensors on its device. The result is then a
+                :class:`mjsense.warp.simulation.WarpSimulation`.
+            device: With warp: ``"cpu"``, ``"cuda:0"`` ...; by default the first CUDA device, or the CPU without one.
+            nconmax: With warp: contacts for which each world has memory, on average over the worlds.
+            njmax: With warp: constraint rows for which each world has memory.
         """
+        if backend != "cpu":
+            raise ValueError(f"Simulation(): backend must be 'cpu' or 'warp', not '{backend}'")
+        for name, value in {"device": device, "nconmax": nconmax, "njmax": njmax}.items():
+            if value is not None:
+                raise ValueError(f"Simulation(): {name} is for backend='warp'")
         if scene._simulation is not None:
             raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
         num_worlds = scene.cfg.num_envs if num_worlds is None else num_worlds
@@ -110,6 +127,24 @@ class Simulation(KnownAttributes):
         return self
 
     def _adopt(self, scene: Scene, view: Any = None) -> None:
+        self._begin(scene, view)
+        for sensor in scene.sensors.values():
+            if isinstance(sensor, Sensor):
+                self._core.own_sensor(sensor._mjs_handle)
+                self._own(sensor, sensor._mjs_handle)
+            else:
+                sensor._bind(self._core)
+        self._complete = True
+
+    @classmethod
+    def _compiled(cls, scene: Scene, decimation: int, seed: int) -> Simulation:
+        """One world that checks the scene and has its ids; the scene's sensors do not read it."""
+        self = cls.__new__(cls)
+        self._core = _core.Simulation(scene._core, 1, decimation, 1, seed)
+        self._begin(scene)
+        return self
+
+    def _begin(self, scene: Scene, view: Any = None) -> None:
         self.scene = scene
         self._view = view
         self._env: PeerEnv | None = None
@@ -127,13 +162,6 @@ class Simulation(KnownAttributes):
         self._model: mujoco.MjModel | None = None
         self._models: dict[int, mujoco.MjModel] = {}
         self._models_version = 0
-        for sensor in scene.sensors.values():
-            if isinstance(sensor, Sensor):
-                self._core.own_sensor(sensor._mjs_handle)
-                self._own(sensor, sensor._mjs_handle)
-            else:
-                sensor._bind(self._core)
-        self._complete = True
 
     def __repr__(self) -> str:
         if self._core.closed:
@@ -146,7 +174,10 @@ class Simulation(KnownAttributes):
             return _show.block(repr(self), "")
         facts = [("worlds", self.num_worlds), ("control step", f"{self.step_dt:g} s, {self.decimation} substeps"),
                  ("time of world 0", f"{self.time[0]:g} s"), ("entities", ", ".join(self.scene.entities)), ("seed", self.seed)]  # fmt: skip
-        facts += [(f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {np.count_nonzero(counts)} worlds") for name, counts in self.warning_counts.items()]
+        facts += [
+            (f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {np.count_nonzero(counts)} worlds")
+            for name, counts in self.warning_counts.items()
+        ]
         own = "".join(sensor._repr_html_() for sensor in self._python)
         return _show.block("simulation", _show.grid(("", ""), facts) + own, {"scene and its sensors": self.scene._repr_html_()})
 
@@ -217,8 +248,7 @@ class Simulation(KnownAttributes):
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it.
-        """
+        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it."""
         if "state" not in self._views or self._core.closed:
             self._views["state"] = self._core.state()
         return self._views["state"]
@@ -319,13 +349,20 @@ class Simulation(KnownAttributes):
         self._check_randomizable(field)
         target = self.model_field(field)
         rows = self._rows(world_ids)
+        target[rows] = self._valid_values(field, values, target[rows], np.arange(self.num_worlds)[rows])
+        self._core.model_changed(_ids(world_ids), field in _core.setconst_inputs())
+        self._follow_models()
+        self.forward(world_ids)
+
+    def _valid_values(self, field: str, values: Any, like: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Values of a model field with the shape and dtype of `like`, a row for each of these worlds."""
         try:
-            values = np.broadcast_to(np.asarray(values, target.dtype), target[rows].shape)
+            values = np.broadcast_to(np.asarray(values, like.dtype), like.shape)
         except (TypeError, ValueError) as error:
-            raise ValueError(f"{field}: values must be of shape {target[rows].shape} or broadcast to it: {error}") from None
+            raise ValueError(f"{field}: values must be of shape {like.shape} or broadcast to it: {error}") from None
         if values.dtype.kind == "f" and not np.isfinite(values).all():
             world, *element = np.argwhere(~np.isfinite(values))[0].tolist()
-            place = f"that of world {np.arange(self.num_worlds)[rows][world]}, element {element}"
+            place = f"that of world {worlds[world]}, element {element}"
             raise ValueError(f"{field}: values must be finite numbers; {place} is {values[(world, *element)]}")
         if field.endswith("_condim") and not np.isin(values, (1, 3, 4, 6)).all():
             raise ValueError(f"{field}: values must be 1, 3, 4 or 6")
@@ -335,19 +372,21 @@ class Simulation(KnownAttributes):
             model, meshes = self.model, self.model.geom_type == _mujoco.Geom.MESH
             fits = np.where(meshes, (values >= 0) & (values < model.nmesh), values == model.geom_dataid)
             if not fits.all():
-                raise ValueError(f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs")
+                raise ValueError(
+                    f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs"
+                )
         if field in _IDS:
             count = getattr(self.model, _IDS[field])
             if (values < -1).any() or (values >= count).any():
-                raise ValueError(f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none")
+                raise ValueError(
+                    f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none"
+                )
         if field.endswith("quat") and values.size and (norms := np.linalg.norm(values, axis=-1)).min() < 1e-12:
             world, *element = np.argwhere(norms < 1e-12)[0].tolist()
-            world = np.arange(self.num_worlds)[rows][world]
-            raise ValueError(f"{field}: values must be quaternions; that of world {world}, element {element}, has length 0")
-        target[rows] = values
-        self._core.model_changed(_ids(world_ids), field in _core.setconst_inputs())
-        self._follow_models()
-        self.forward(world_ids)
+            raise ValueError(
+                f"{field}: values must be quaternions; that of world {worlds[world]}, element {element}, has length 0"
+            )
+        return values
 
     def _check_types(self, field: str, values: np.ndarray) -> None:
         """Geom types may change to other primitives; meshes, height fields and signed distance fields cannot change."""
@@ -502,6 +541,32 @@ class Simulation(KnownAttributes):
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:
         """Resets the sensors' episode state in these worlds without resetting the physics."""
         self._core.reset_sensors(_ids(world_ids))
+
+
+# Otherwise help() would show the arguments of __new__.
+Simulation.__signature__ = inspect.Signature([*inspect.signature(Simulation.__init__).parameters.values()][1:])  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@checked
+def _on_warp(
+    scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
+    device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
+) -> Any:  # fmt: skip
+    """The simulation of this scene on mujoco_warp."""
+    try:
+        from mjsense.warp.simulation import WarpSimulation
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.split(".")[0] not in ("warp", "mujoco_warp", "mujoco"):
+            raise
+        raise ImportError(f"backend='warp' needs {error.name}: pip install \"mjsense[warp]\"") from None
+    if scene._simulation is not None:
+        raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
+    if threads:
+        raise ValueError("Simulation(): threads is for backend='cpu'")
+    compiled = Simulation._compiled(scene, decimation, seed)
+    sim = WarpSimulation(compiled, scene.cfg.num_envs if num_worlds is None else num_worlds, device, nconmax, njmax)
+    scene._simulation = compiled._core
+    return sim
 
 
 class DerivedFields:

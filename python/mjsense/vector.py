@@ -234,6 +234,14 @@ class TaskVectorEnv(VectorEnv):
             commands = 2 * (commands - low) / (high - low) - 1
         return commands.astype(np.float32)
 
+    def planned_paths(self, world: int = 0) -> list[tuple[str, np.ndarray]]:
+        """The motion that the policy has planned in a world: the phase and the tool's positions, float64 ``[N, 3]`` m in the world
+        frame, of each part. Empty if the policy makes no plans."""
+        self._check_open()
+        if not 0 <= world < self.num_envs:
+            raise ValueError(f"world {world}: must be in [0, {self.num_envs})")
+        return self._rollout.planned_paths(world)
+
     def _observe(self) -> dict[str, Any]:
         return nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
 

@@ -147,7 +147,7 @@ def test_empty_argument_is_one_clear_line(mjsense, args):
 
 WORDS = ("tasks", "robots", "scenes", "schema", "--help", "--version", "record --help", "inspect data", "verify data", "repair data",
          "verify data --json", "inspect data --json", "sensors scene.xml", "scan scene.xml --frame site:s --out cloud.ply",
-         "record pick --out more --cameras none --horizon 2 --keep-failures -q")  # fmt: skip
+         "record pick --out more --cameras none --horizon 2 --keep-failures -q --json")  # fmt: skip
 
 
 def test_unwritable_stdout_is_an_error_of_every_command(mjsense):
@@ -340,6 +340,15 @@ def test_physics_that_fails_prints_no_table(mjsense):
     assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # without MuJoCo's log file
 
 
+def test_quiet_prints_nothing_but_errors(mjsense):
+    done = mjsense("record", "pick", "--cameras", "none", "--horizon", 2, "--keep-failures", "-q", "--out", "data")
+    assert (done.stdout, done.stderr) == ("", "")
+    done = mjsense("verify", "-q", "data")
+    assert (done.stdout, done.stderr) == ("", "")
+    (mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5").write_bytes(b"damaged")
+    assert "NOT intact" in mjsense("verify", "-q", "data", rc=1).stdout
+
+
 def test_record_reports_the_contact_sheet(mjsense):
-    text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "-q", "--out", "d").stdout
+    text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "--out", "d").stdout
     assert "contact sheet, every camera over time (4 of 5 episodes): d/contact_sheet.png" in text

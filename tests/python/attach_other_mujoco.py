@@ -51,6 +51,7 @@ MODEL = """
     <framepos name="pos" objtype="site" objname="tip"/><framequat name="quat" objtype="body" objname="rock"/><jointpos name="angle" joint="shoulder"/>
     <tendonpos name="length" tendon="spatial"/><rangefinder name="range" site="tip"/><subtreecom name="com" body="arm"/>
     <gyro name="gyro" site="imu"/><velocimeter name="speed" site="tip"/><tendonvel name="rate" tendon="spatial"/>
+    <distance name="distance" geom1="ball" geom2="upper" cutoff="5"/><clock name="clock"/>
     <accelerometer name="acc" site="imu"/><force name="force" site="tip"/><torque name="torque" site="tip"/><touch name="touch" site="imu"/>
     <actuatorfrc name="push" actuator="ACTUATOR"/><framelinacc name="a" objtype="body" objname="rock"/>
   </sensor>
@@ -90,7 +91,10 @@ for step in range(200):
         assert bool(attached["feet"].data.found[world, 0]) == touched
         assert abs(attached["feet"].data.current_air_time[world, 0] - air[world]) < 1e-6
 assert 20 < contacts < 380
-position = max(worst[n] for n in ("pos", "quat", "angle", "length", "range", "com"))
+if hasattr(model, "M_rownnz"):
+    for name, value in _foreign_model._sparse_matrices(model).items():
+        np.testing.assert_array_equal(value, getattr(model, name), name)
+position = max(worst[n] for n in ("pos", "quat", "angle", "length", "range", "com", "distance", "clock"))
 velocity = max(worst[n] for n in ("gyro", "speed", "rate"))
 force = max(worst[n] for n in ("acc", "force", "torque", "touch", "push", "a"))
 print(f"MuJoCo {mujoco.mj_versionString()}: positions {position:.1e}, velocities {velocity:.1e}, accelerations and forces {force:.1e}")

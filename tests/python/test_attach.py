@@ -267,6 +267,10 @@ def test_errors():
     other = mujoco.MjModel.from_xml_string("<mujoco/>")
     with pytest.raises(ValueError, match=r"data\[0\] belongs to another model: its qpos has 0 numbers, and this model's has 9"):
         mjs.attach(model, mujoco.MjData(other))
+    spec = mujoco.MjSpec.from_string(MODEL)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+    with pytest.raises(ValueError, match=r"data\[0\] belongs to another model: it has 5 geoms, and this model has 4"):
+        mjs.attach(model, mujoco.MjData(spec.compile()))
     with pytest.raises(KeyError, match="camera 'a': no camera named 'fornt'; did you mean 'front'"):
         mjs.attach(model, data, (mjs.CameraSensorCfg(name="a", camera_name="fornt"),))
     with pytest.raises(ValueError, match="sensor 'gyro': already exists"):

@@ -17,8 +17,9 @@ import pytest
 pytest.importorskip("ray", reason="Ray is not installed")
 h5py = pytest.importorskip("h5py")
 
-from mjsense.cluster import Job, record_on_ray
+from mjsense.cluster import Job, export_on_ray, record_on_ray, render_on_ray
 from mjsense.cluster import driver as driver_module
+from mjsense.cluster.job import Shard, ShardResult
 
 import mjsense as mjs
 
@@ -40,6 +41,33 @@ def content(root, count=EPISODES):
     return found
 
 
+def descendants(pid):
+    """Ids of the processes that this process and its children started, by command line."""
+    parents = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            stat, command = (folder / "stat").read_text(), (folder / "cmdline").read_bytes().decode(errors="replace")
+        except OSError:
+            continue
+        parents[int(folder.name)] = int(stat.rpartition(")")[2].split()[1]), command
+    found = {}
+    while new := {child: command for child, (parent, command) in parents.items() if child not in found and (parent == pid or parent in found)}:
+        found |= new
+    return found
+
+
+def workers_of(pid):
+    return [child for child, command in descendants(pid).items() if command.startswith("ray::run_shard")]
+
+
+def kill(pid):
+    try:
+        os.kill(pid, signal.SIGKILL)
+        return True
+    except ProcessLookupError:
+        return False
+
+
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
     out = tmp_path_factory.mktemp("alone")
@@ -49,6 +77,10 @@ def alone(tmp_path_factory):
 
 def test_episodes_are_those_of_one_process(alone, tmp_path):
     shown = []
+    direct = mjs.record(**ARGUMENTS, out=tmp_path / "direct", ray="local", episodes=EPISODES, progress=shown.append)
+    assert direct.enough and direct.kept == shown[-1].kept >= EPISODES and content(tmp_path / "direct") == alone
+    with pytest.raises(ValueError, match="append cannot be combined with ray"):
+        mjs.record(**ARGUMENTS, out=tmp_path / "direct", ray="local", append=True)
     summary = record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=EPISODES - 1, shard_attempts=ATTEMPTS, progress=shown.append)
     assert summary.enough and summary.kept >= EPISODES - 1 and shown[-1].kept == summary.kept
     found = content(tmp_path / "out")
@@ -60,18 +92,39 @@ def test_episodes_are_those_of_one_process(alone, tmp_path):
         record_on_ray(Job(str(tmp_path / "out"), {**ARGUMENTS, "seed": 6}), episodes=1, shard_attempts=ATTEMPTS, resume=True)
 
 
+def test_render_and_export_on_ray(tmp_path):
+    """Both equal what one process makes, from the index of a recording on Ray."""
+    data, ray = tmp_path / "data", pytest.importorskip("ray")
+    pytest.importorskip("av")
+    options = {"width": 48, "height": 32, "cameras": ["wrist_camera"]}
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
+    try:
+        record_on_ray(Job(str(data), ARGUMENTS), episodes=5, shard_attempts=2)
+        summary = render_on_ray(data, tmp_path / "rendered", shard_episodes=2, **options)
+        assert summary.enough and summary.kept == 5
+        mjs.render(data, tmp_path / "alone", **options)
+        assert content(tmp_path / "rendered") == content(tmp_path / "alone")
+        with pytest.raises(ValueError, match="contains a different recording: options"):
+            render_on_ray(data, tmp_path / "rendered", shard_episodes=2, resume=True, **{**options, "width": 64})
+        for format, export in (("lerobot", mjs.export_lerobot), ("lerobot21", mjs.export_lerobot21)):
+            made = [export_on_ray(format, data / "index.parquet", tmp_path / f"{format}_ray"), export(data, tmp_path / format)]
+            files = [{str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file()} for out in made]
+            assert files[0] == files[1]
+        with pytest.raises(ValueError, match="zarr is written by one process"):
+            export_on_ray("zarr", data, tmp_path / "zarr")
+    finally:
+        ray.shutdown()
+
+
 def test_killed_workers(alone, tmp_path):
     """Workers that are killed at random times lose nothing and add nothing."""
     generator, ended, kills = random.Random(3), threading.Event(), []
 
-    def kill():
+    def kill_some():
         while not ended.wait(generator.uniform(0.2, 0.8)) and len(kills) < 8:
-            found = subprocess.run(["pgrep", "-f", "ray::run_shard"], capture_output=True, text=True).stdout.split()
-            for pid in found[:1]:
-                os.kill(int(pid), signal.SIGKILL)
-                kills.append(pid)
+            kills.extend(pid for pid in workers_of(os.getpid())[:1] if kill(pid))
 
-    thread = threading.Thread(target=kill)
+    thread = threading.Thread(target=kill_some)
     thread.start()
     try:
         assert record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=EPISODES, shard_attempts=ATTEMPTS).enough
@@ -96,6 +149,40 @@ def test_killed_driver(alone, tmp_path):
     assert content(tmp_path / "out") == alone
 
 
+@pytest.mark.skipif(not os.environ.get("MJSENSE_TEST_KILLS"), reason="takes minutes; MJSENSE_TEST_KILLS=50 asks for 50 kills")
+def test_random_kills_of_workers_and_driver(tmp_path, capsys):
+    """SIGKILL of a random worker or of the driver, again and again; the union is that of one process."""
+    wanted, generator, kills = int(os.environ["MJSENSE_TEST_KILLS"]), random.Random(7), {"worker": 0, "driver": 0}
+    attempts = max(24, wanted // 2)
+    common = ["record", "pick", "--horizon", "4", "--keep-failures", "--size", "32x24", "--worlds", "1", "--seed", "5"]
+    words = [*common, "--out", str(tmp_path / "out"), "--episodes", str(attempts), "--max-attempts", str(attempts), "--ray", "local", "--shard-attempts", "1", "-q"]
+    subprocess.run([sys.executable, "-m", "mjsense", *common, "--out", str(tmp_path / "alone"), "--num-attempts", str(attempts), "-q", "--no-sheet"],
+                   check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+    more: list[str] = []
+    while True:
+        driver = subprocess.Popen([sys.executable, "-m", "mjsense", *words, *more], stderr=subprocess.PIPE, text=True)
+        while driver.poll() is None and sum(kills.values()) < wanted:
+            time.sleep(generator.uniform(0.1, 1.0))
+            found = workers_of(driver.pid)
+            if found and generator.random() < 0.15:
+                family = descendants(driver.pid)
+                driver.kill()
+                kills["driver"] += 1
+                driver.wait()
+                for pid in family:
+                    kill(pid)
+            elif found:
+                kills["worker"] += kill(generator.choice(found))
+        error = driver.communicate()[1]
+        more = ["--resume"]
+        if driver.returncode == 0:
+            break
+        assert driver.returncode == -signal.SIGKILL, error
+    assert content(tmp_path / "out", attempts) == content(tmp_path / "alone", attempts)
+    with capsys.disabled():
+        print(f"\n{kills}, {attempts} episodes equal")
+
+
 def test_user_code_and_errors(tmp_path):
     def fails(obs):
         raise ValueError("no network here")
@@ -116,6 +203,12 @@ def test_program_reports_wrong_options(tmp_path, words, message):
 
 
 def test_results_without_a_gap():
-    results = driver_module._Results.__new__(driver_module._Results)
-    results.done = {0: "a", 1: "b", 3: "d"}
-    assert results.without_gap() == ["a", "b"]
+    def result(number, episodes):
+        return ShardResult(Shard(number, 2 * number, 2), "", [{}] * episodes, 1, 1, 10)
+
+    results = driver_module._Results([result(1, 1)])
+    assert results.kept == 0 and not results.without_gap()
+    for number, episodes in ((3, 2), (0, 2)):
+        results.add(result(number, episodes))
+    assert results.kept == 3 and [found.shard.number for found in results.without_gap()] == [0, 1] and results.succeeded == 3
+    assert results.progress(9, 0, 1.0)["steps_per_second"] == 20  # of this driver

@@ -7,7 +7,9 @@ import pickle
 import shutil
 import subprocess
 import sys
+import tarfile
 from fractions import Fraction
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -33,11 +35,14 @@ def dataset(root):
     return mjs.Dataset(root)
 
 
-@pytest.fixture(params=["av", "ffmpeg"])
+@pytest.fixture(params=["av", "threads", "ffmpeg"])
 def decoder(request, monkeypatch):
-    if request.param == "av":
+    if request.param != "ffmpeg":
         pytest.importorskip("av")
-    monkeypatch.setattr(video, "_have_av", lambda: request.param == "av")
+    monkeypatch.setattr(video, "have_av", lambda: request.param != "ffmpeg")
+    if request.param == "threads":
+        monkeypatch.setattr(video, "_LARGE_IMAGE", 1)
+        monkeypatch.setattr(video, "_threads", lambda: 3)
 
 
 def trajectories(root):
@@ -130,6 +135,10 @@ def test_frames_are_those_of_ffmpeg(root, decoder):
         np.testing.assert_allclose(depth[:], units * 0.0002, atol=1e-6)
         lossy = episode.video("wrist_camera_depth")
         code = decode(lossy.path, "rgb24", (23, 32, 3)).astype(int) @ [256, 1, 0]
+        for t in rng.permutation(21):
+            sample = dataset[dataset.index_of(episode.index, t)]
+            np.testing.assert_array_equal(sample["obs/sensor_data/wrist_camera_depth_16bit"], units[t] * np.float32(0.0002))
+            assert ((sample["obs/sensor_data/wrist_camera_depth"] > 0) == (code[t] > 0)).all()
         np.testing.assert_allclose(lossy[:], np.where(code > 0, (code - 1) / 65534 * 0.5 + 0.05, 0), atol=1e-6)
         # H.264 changes the high byte, of which one unit is 2 mm.
         inside = (depth[:] > 0.06) & (depth[:] < 0.54) & (lossy[:] > 0)
@@ -151,12 +160,31 @@ def test_every_frame_of_a_long_video(tmp_path, decoder, encoding):
     source = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=32x24:rate=500/33", "-frames:v", "400"]
     subprocess.run([*source, *codec, path], check=True)
     expected = decode(path, "rgb24", (24, 32, 3)) if rgb else decode(path, "gray16le", (24, 32)) * np.float32(0.0002)
-    reader = video.FrameReader(Cache(150_000))
+    reader = video.FrameReader(Cache(150_000), Cache(150_000))
     frames = mjs.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
     for t in [*np.random.default_rng(0).permutation(400)[:16], 89, 90, 88, 179, 180, 399, 0, *range(200, 212)]:
         np.testing.assert_array_equal(frames[int(t)], expected[t], err_msg=str(t))
     with pytest.raises(RuntimeError, match="has no frame 400"):
         mjs.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
+
+
+def test_a_recording_of_the_first_format(tmp_path):
+    """Made by a version without data for replay, numbers and checksummed archives, whose videos have B-frames and no tuning."""
+    with tarfile.open(Path(__file__).parent / "recordings/first_format.tar.xz") as archive:
+        archive.extractall(tmp_path, filter="data")
+    for command, expected in (("verify", "intact: 1 files, 1 episodes, 3 steps, 2 videos"), ("inspect", "1 x horizon reached")):
+        done = subprocess.run([sys.executable, "-m", "mjsense", command, tmp_path], capture_output=True, text=True)
+        assert done.returncode == 0 and expected in done.stdout, done.stdout + done.stderr
+    dataset = mjs.Dataset(tmp_path)
+    episode = dataset.episodes[0]
+    rgb, depth = episode.video("wrist_camera"), episode.video("wrist_camera_depth")
+    units = decode(depth.path, "gray16le", (12, 16))
+    for t in (2, 0, 1):
+        np.testing.assert_array_equal(dataset[t]["obs/sensor_data/wrist_camera"], decode(rgb.path, "rgb24", (12, 16, 3))[t])
+        np.testing.assert_array_equal(dataset[t]["obs/sensor_data/wrist_camera_depth"], units[t] * np.float32(0.0002))
+    assert dataset[2]["obs/agent/qpos/arm"].shape == (7,) and dataset[1]["actions/joint_pos/given/arm"]
+    with pytest.raises(ValueError, match="has no data for replay"):
+        mjs.check_replay(dataset)
 
 
 def test_lossless_depth_is_what_the_sensor_measured(tmp_path):

@@ -75,6 +75,8 @@ def test_python(page, tmp_path, monkeypatch):
         if re.search(rf"^\s*(import|from) {name}\b", page.read_text(), re.MULTILINE):
             for module in (name, *OTHERS[name]):
                 monkeypatch.setitem(sys.modules, module, MagicMock())
+    if page.stem == "warp":
+        pytest.importorskip("mujoco_warp")
     for name, library in EXPORT_LIBRARIES.items():
         if f"export_{name}(" in page.read_text():
             pytest.importorskip(library)
@@ -105,6 +107,8 @@ def run(arguments, cwd):
         if ("view" in arguments and "--export" not in arguments) or (module and importlib.util.find_spec(module) is None) or "rrd" in arguments[-1]:
             commands.parser_of(arguments[0]).parse_args(arguments[1:])  # a viewer would wait for a browser
             return
+        program = [sys.executable, "-m", "mjsense"]
+    elif "--format" in arguments:
         program = [sys.executable, "-m", "mjsense"]
     path = os.pathsep.join([str(Path(mjs.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})

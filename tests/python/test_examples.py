@@ -14,8 +14,9 @@ import mjsense
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BUILD = Path(mjsense.__file__).absolute().parents[2]
 SAYS = {"01": "landed: [9.81 9.81 9.81 9.81]", "02": "picture: (3, 48, 64, 3) uint8", "03": "the planner picked 2 of 2",
-        "04": "the feet press on the floor with 88", "05": "pixels of the box: [1916 1234  826]", "06": "of 4 unseen episodes: untrained"}
-SHORT = {"06": ("4", "4", "1")}  # arguments that make it quick
+        "04": "the feet press on the floor with 88", "05": "pixels of the box: [1916 1234  826]", "06": "of 4 unseen episodes: untrained",
+        "07": "trained: "}
+SHORT = {"06": ("4", "4", "1"), "07": ("--episodes", "2", "--steps", "2", "--judged", "2")}  # arguments that make it quick
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))

@@ -74,6 +74,10 @@ def test_rows_are_states_with_the_actions_taken_there(root, v3):
         "action": "float32", "next.success": "bool", "task_index": "int64", "observation.images.wrist_camera": "video"}.items()  # fmt: skip
 
 
+def test_a_mapping_object_is_accepted(root):
+    assert Source(root, map=Mapping(state=("obs/extra/tcp_pose",)), episodes=[0]).features["state"].size == 7
+
+
 def test_videos_have_the_same_frames(root, v3):
     """The two houses have different codec parameters, so the second has a file of its own."""
     episodes = rows(v3 / "meta/episodes")
@@ -210,6 +214,14 @@ def test_wrong_maps_and_recordings(root, tmp_path):
     with pytest.raises(ValueError, match="no episode"):
         Source(root, success=True)
     assert Mapping.of(None) == Mapping()
+
+
+@pytest.mark.parametrize("export", (mjs.export_lerobot, mjs.export_lerobot21))
+def test_wrong_statistics_frames(export, root, tmp_path):
+    for wrong in ("all", -1):
+        with pytest.raises((ValueError, TypeError), match="statistics_frames"):
+            export(root, tmp_path / "out", statistics_frames=wrong)
+    assert not (tmp_path / "out").exists()
 
 
 def test_images_of_one_size(root, tmp_path):

@@ -196,8 +196,9 @@ def test_configurations_are_checked_when_the_scene_is_made():
     height.frame = (ref,)
     ref.name = "box"
     assert height.native().frame[0].full_name == "box/box" and height.native().viz.show_rays
+    scene = Scene(SceneCfg())
     with pytest.raises(ValueError, match="device is 'cuda:0'"):
-        Scene(SceneCfg(), device="cuda:0")
+        Simulation(1, SimulationCfg(), scene.compile(), device="cuda:0", backend="cpu")
     with pytest.raises(ValueError, match=r"must be what scene\.compile"):
         Simulation(1, SimulationCfg(), mujoco.MjModel.from_xml_string("<mujoco/>"))
 

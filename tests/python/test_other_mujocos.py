@@ -15,7 +15,7 @@ import pytest
 import mjsense
 
 ROOT = Path(__file__).parents[2]
-ALL = ("3.3.7", "3.8.1", "3.11.0", "3.17.0", "4.0.0", "none", "3.17.0+4.0")
+ALL = ("3.3.0", "3.3.7", "3.8.1", "3.11.0", "3.17.0", "4.0.0", "none", "3.17.0+4.0")
 chosen = os.environ.get("MJSENSE_TEST_MUJOCO", "3.8.1,3.17.0,none")
 VERSIONS = ALL if chosen == "all" else chosen.split(",")
 SCRIPT = Path(__file__).with_name("other_mujoco.py")

@@ -57,6 +57,8 @@ SOFT = """<mujoco><statistic extent="1" center="0 0 .3"/><worldbody><light pos="
 def load(xml, steps=0):
     if not hasattr(mujoco.MjModel, "cam_projection"):  # older versions
         xml = xml.replace('projection="orthographic"', 'orthographic="true"')
+    if not hasattr(mujoco.MjModel, "light_type"):
+        xml = xml.replace('type="directional"', 'directional="true"')
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     for _ in range(steps):
@@ -158,6 +160,31 @@ def test_errors():
         lambda: renderer.render_batch([data]),
     ):
         with pytest.raises(RuntimeError, match="used after close"):
+            call()
+
+
+def test_images_do_not_depend_on_the_number_of_images_before():
+    vertices = np.random.default_rng(0).normal(size=(200, 3))
+    vertices *= 0.4 / np.linalg.norm(vertices, axis=1, keepdims=True)
+    model, data = load(f"""<mujoco><asset><mesh name="rock" vertex="{" ".join(map(str, vertices.ravel()))}"/></asset><worldbody>
+        <light pos="1 0 3" dir="-.3 0 -1" castshadow="true"/><geom type="plane" size="2 2 .1"/>
+        <geom type="mesh" mesh="rock" pos="0 0 .5"/><geom type="box" size=".1 .5 .1" pos="0 0 1.1"/></worldbody></mujoco>""")
+    with mjs.Renderer(model, 60, 80) as renderer:
+        renderer.update_scene(data)
+        first = renderer.render()
+        for _ in range(60):  # its mesh gets a better tree for shadow rays
+            assert np.array_equal(renderer.render(), first)
+
+
+def test_data_of_a_model_that_was_compiled_anew_is_refused():
+    spec = mujoco.MjSpec.from_string(BALL)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    renderer = mjs.Renderer(model, 20, 30)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+    _, changed = spec.recompile(model, data)
+    for call in (lambda: renderer.update_scene(changed, "front"), lambda: renderer.render_batch([changed], "front")):
+        with pytest.raises(ValueError, match="`data` belongs to another model: ngeom is 2, but the renderer's model had 1"):
             call()
 
 

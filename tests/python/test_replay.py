@@ -2,6 +2,7 @@
 """Recorded episodes in plain MuJoCo: equal bit for bit, and deviations are named."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -116,16 +117,34 @@ def test_a_changed_state_is_named(copied):
     assert re.search(r"episode 1, stepwise: step 12: qpos of joint 'robot_0/fr3_joint4'\[0\]: recorded ", repr(report))
 
 
+@pytest.mark.parametrize("changed", [False, True])
+def test_without_the_package_mujoco(copied, door, changed):
+    """The states are simulated by the MuJoCo that mjsense contains, with the same report."""
+    if changed:
+        with h5py.File(file_of(copied), "a") as file:
+            row = file["traj_1/replay/state"][12]
+            row[5] = np.nextafter(row[5], 10)
+            file["traj_1/replay/state"][12] = row
+    for root in (copied,) if changed else (copied, door):
+        words = [sys.executable, "-m", "mjsense", "replay", root, "--json"]
+        done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "MJSENSE_MUJOCO": "private"})
+        assert json.loads(done.stdout) == mjs.check_replay(root).to_dict(), done.stderr
+        assert done.returncode == changed
+
+
 def test_every_part_of_the_state_has_a_name(door):
     from mjsense.dataset import replay_check
+    from mjsense.dataset.episode_worlds import OwnStepper
 
-    model = mjs.Dataset(door).episodes[0].model()
-    size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
+    episode = mjs.Dataset(door).episodes[0]
+    stepper, own = replay_check._stepper(episode), OwnStepper(episode)
+    size = mujoco.mj_stateSize(stepper.model, mujoco.mjtState.mjSTATE_INTEGRATION)
+    assert [stepper.part(i) for i in range(size)] == [own.part(i) for i in range(size)]
     fields = set()
     for i in range(size):
         recorded, replayed = np.zeros(size), np.zeros(size)
         replayed[i] = 1
-        found = replay_check._deviation(model, 3, recorded, replayed)
+        found = replay_check._deviation(stepper, 3, recorded, replayed)
         assert found.count == 1 and found.replayed == 1
         fields.add(found.field)
     assert {"time", "qpos", "qvel", "warmstart", "ctrl", "xfrc_applied", "mocap_pos", "mocap_quat"} <= fields

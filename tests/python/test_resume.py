@@ -197,6 +197,7 @@ OPTIONS = {
     "gzip": (dict(gzip=5), "'gzip' was 4 and is now 5"),
     "crf": (dict(crf=20), "'video/crf' was 25 and is now 20"),
     "keyint": (dict(keyint=10), "'video/keyint' was 20 and is now 10"),
+    "tune": (dict(tune=""), "video/tune"),
     "policy_dt_ms": (dict(policy_dt_ms=100), "fps|settings/policy_dt_ms"),
     "first_attempt": (dict(first_attempt=1), "'first_attempt' was absent and is now 1"),
     "num_attempts": (dict(num_attempts=40, episodes=1), "'num_attempts' was absent and is now 40"),

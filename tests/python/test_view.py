@@ -16,6 +16,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
+from mjsense._rotations import rotation_of
 from mjsense.view import curves, geometry, surfaces
 from mjsense.view.poses import PoseStream
 from scenes import BALL
@@ -128,9 +129,9 @@ def messages(viewer):
 def test_only_what_has_changed_is_sent(live):
     before = {m.name for m in messages(live).values() if type(m).__name__ in ("MeshMessage", "GlbMessage")}
     assert any("ball" in name for name in before)
-    assert live._stage.set_poses(*live._source.poses(0)) == 0
+    assert live._stage.set_poses(*(live._source.field(name, 0) for name in ("xpos", "xquat"))) == 0
     live.sim.step()
-    assert live._stage.set_poses(*live._source.poses(0)) == 1
+    assert live._stage.set_poses(*(live._source.field(name, 0) for name in ("xpos", "xquat"))) == 1
     ball = next(i for i in range(live.sim.model.ngeom) if live.sim.model.geom(i).name.startswith("ball/"))
     colours = np.tile(live.sim.model.geom_rgba, (2, 1, 1))
     colours[1, ball] = 0.2, 0.4, 0.6, 1
@@ -149,9 +150,50 @@ def test_hidden_groups(tmp_path, port):
     with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
         assert not viewer._stage._frames
         viewer._stage.show_groups({3})
-        assert np.array_equal(viewer._stage._frames[1].position, (1, 2, 3)) and viewer._stage._geoms[0][0] is not None
+        assert np.array_equal(viewer._stage._frames[1].position, (1, 2, 3)) and viewer._stage._solids["geom", 0][0] is not None
         viewer._stage.show_groups({0})
-        assert viewer._stage._geoms[0][0] is None
+        assert viewer._stage._solids["geom", 0][0] is None
+
+
+SOFT = """<mujoco><worldbody>
+  <body name='hinged' pos='0 0 1'><joint axis='0 1 0'/><geom size='.05'/><site name='tip' type='box' size='.02 .03 .04' pos='.1 0 0'/></body>
+  <site name='top' pos='0 0 2'/>
+  <flexcomp name='cloth' type='grid' count='4 4 1' spacing='.1 .1 .1' pos='1 0 1' dim='2' radius='.01' mass='.1'><edge equality='true'/></flexcomp>
+  <flexcomp name='block' type='grid' count='3 3 3' spacing='.1 .1 .1' pos='2 0 1' dim='3' radius='.01' mass='.1'><edge equality='true'/></flexcomp>
+  </worldbody>
+  <deformable><skin name='skin' vertex='1 0 0 0 1 0 0 0 1' face='0 1 2'>
+    <bone body='hinged' bindpos='0 0 1' bindquat='1 0 0 0' vertid='0 1 2' vertweight='1 1 1'/></skin></deformable>
+  <tendon><spatial name='rope' width='.01'><site site='tip'/><site site='top'/></spatial></tendon></mujoco>"""
+
+
+@needs_viser
+def test_flexes_skins_tendons_and_sites(tmp_path, port):
+    """Vertices and paths are those of MuJoCo, before and after a motion."""
+    (tmp_path / "model.xml").write_text(SOFT)
+    with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
+        sim = viewer._source.sim
+        handles = {surface.name: handle for surface, handle, _ in viewer._stage._soft._drawn}
+        assert set(handles) == {"/flexes/0", "/flexes/1", "/skins/0"}
+        assert len(handles["/flexes/0"].faces) == 18 and len(handles["/flexes/1"].faces) == 6 * 8
+        sim.qvel[0, 0] = 2.0
+        for _ in range(20):
+            sim.step()
+        viewer.update()
+        points = sim.data.flexvert_xpos[0]
+        np.testing.assert_allclose(np.concatenate([handles["/flexes/0"].vertices, handles["/flexes/1"].vertices]), points, atol=1e-5)
+        turn, place = sim.data.xmat[0, 1].reshape(3, 3), sim.data.xpos[0, 1]
+        np.testing.assert_allclose(handles["/skins/0"].vertices, (np.eye(3) - [0, 0, 1]) @ turn.T + place, atol=1e-5)
+        assert not np.allclose(turn, np.eye(3), atol=0.01)
+        (rope,) = viewer._stage._soft._tendons._nodes
+        ends = sim.data.site_xpos[0]
+        np.testing.assert_allclose(rope.batched_positions, [ends.mean(0)], atol=1e-5)
+        assert rope.batched_scales[0, 2] * 2 == pytest.approx(np.linalg.norm(ends[1] - ends[0]), abs=1e-5)
+        assert viewer._stage._solids["site", 0][0] is None
+        viewer._stage.show_groups({0}, sites=True)
+        assert viewer._stage._solids["site", 0][0] is not None
+        viewer._stage.show_groups({1})
+        viewer.update()
+        assert not viewer._stage._soft._drawn and not viewer._stage._soft._tendons._nodes
 
 
 @needs_viser
@@ -191,7 +233,7 @@ def test_an_environment_that_the_user_steps(port, monkeypatch, capsys):
 
         def shown():
             model = env.sim.model_of(0)
-            return [g for g, (_, key) in viewer._stage._geoms.items() if key and key != surfaces.key_of(model, g)]  # () is a hidden geom
+            return [g for (kind, g), (_, key) in viewer._stage._solids.items() if kind == "geom" and key and key != surfaces.key_of(model, g)]  # () is a hidden geom
 
         assert shown() == []
         env.reset(seed=1)
@@ -207,7 +249,7 @@ def test_cost_of_a_frame(tmp_path, port):
     bodies = "".join(f"<body pos='{i % 10} {i // 10} 1'><freejoint/><geom size='.1'/></body>" for i in range(100))
     (tmp_path / "model.xml").write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
     with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
-        positions, turns = (np.array(values) for values in viewer._source.poses(0))
+        positions, turns = (np.array(viewer._source.field(name, 0)) for name in ("xpos", "xquat"))
         costs = []
         for _ in range(30):
             positions += 0.01
@@ -295,6 +337,15 @@ def test_recordings(recording, port):
             viewer.seek(t)
             took.append(time.perf_counter() - began)
         assert np.median(took) < 0.05
+        viewer.update()
+        plain = viewer._pictures._panels["exo_camera_1"].image
+        viewer._pictures._points_box.value = True
+        viewer._show()
+        viewer.update()
+        marked = viewer._pictures._panels["exo_camera_1"].image
+        points = viewer._image_points("exo_camera_1")
+        x, y = (points[np.isfinite(points).all(1)][0] * (48, 32)).astype(int)
+        assert points.shape == (20, 2) and tuple(marked[y, x]) == (255, 0, 255) and not np.array_equal(plain, marked)
         model, data = viewer._model, mujoco.MjData(viewer._model)
         viewer.seek(20)
         viewer._episode.set_state(model, data, 20)
@@ -351,7 +402,7 @@ def test_ctrl_c_ends_the_program(port):
 def test_export(recording, tmp_path):
     run = [sys.executable, "-m", "mjsense", "view"]
     done = subprocess.run([*run, str(recording), "--export", "a.viser", "-q"], cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "Wrote a.viser.\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert (tmp_path / "a.viser").stat().st_size > 20_000
     wrong = subprocess.run([*run, "pick", "--export", "a.mp4"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2 and "ends in neither .viser nor .rrd" in wrong.stderr
@@ -383,6 +434,28 @@ def test_results_and_warnings_of_a_task(port):
         for _ in range(30):
             source.step()
         assert abs(source.value("qpos/arm", 0)[0] - 0.5) < 0.05
+
+
+@needs_viser
+def test_the_plan_is_where_the_tool_goes(port):
+    with mjs.view("pick", port=port, block=False, open_browser=False, cameras=[], seed=2) as viewer:
+        source = viewer._source
+        parts = source._env.planned_paths(0)
+        assert len(parts) > 3 and "grasp" in " ".join(phase for phase, _ in parts)
+        points = np.concatenate([points for _, points in parts])
+        assert np.abs(np.diff(points, axis=0)).max() < 0.1  # parts begin where the one before ends
+        assert np.linalg.norm(points - source._env.rows["grasp_pose"][0, :3], axis=1).min() < 1e-3
+        source.step()
+        base = source._env.rows["robot_base_pose"][0]
+        while not source.value("success", 0)[0]:
+            source.step()
+            tool = base[:3] + rotation_of(base[3:]) @ source._env.rows["tcp_pose"][0, :3]
+            assert np.linalg.norm(points - tool, axis=1).min() < 0.06
+            assert source.time(0) < 20
+        assert source.value("policy_num_retries", 0)[0] == 0
+        assert len(source.shapes(0, ["plan"]).of("line")) > 10
+    with pytest.raises(ValueError, match=r"world 1: must be in \[0, 1\)"):
+        mjs.make_vec("pick", num_envs=1, policy="planner", cameras=[]).planned_paths(1)
 
 
 # -------------------------------------------------------------------------------------------------------------------- browser

@@ -24,8 +24,8 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/checksum.h"
 #include "mjsense/record/recorder.h"
+#include "mjsense/record/sha256.h"
 #include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/replay/recording_tools.h"
 
@@ -118,9 +118,9 @@ int write_recording(const std::string& out, const Options& o) {
   cfg.sensors = suite.sensors();
   cfg.settings = R"({"task": "fake", "seed": 0})";
   cfg.archive = std::string(5000, 'a');  // stands for a ZIP archive of a model
-  record::Checksum sum;
+  record::Sha256 sum;
   sum.add(cfg.archive.data(), cfg.archive.size());
-  cfg.archive_name = fmt::format("model_{}.zip", sum.text());
+  cfg.archive_name = record::archive_name(sum.text());
   cfg.resume = o.flag("--resume");
   cfg.gzip = o.number("--gzip", 4);
   cfg.video.max_encoders = o.number("--encoders", 0);

@@ -3,5 +3,6 @@
 
 from mjsense.cluster.driver import ClusterProgress, ClusterSummary, record_on_ray
 from mjsense.cluster.job import Job
+from mjsense.cluster.readers import export_on_ray, render_on_ray
 
-__all__ = ["ClusterProgress", "ClusterSummary", "Job", "record_on_ray"]
+__all__ = ["ClusterProgress", "ClusterSummary", "Job", "export_on_ray", "record_on_ray", "render_on_ray"]

@@ -6,13 +6,14 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from mjsense.cluster.index import write_index
 from mjsense.cluster.job import Job, Shard, ShardResult, run_shard
 from mjsense.cluster.storage import Storage
+from mjsense.cluster.tasks import check_pickle, cluster, running
 
 
 @dataclass(frozen=True)
@@ -47,35 +48,47 @@ class ClusterSummary(ClusterProgress):
 
 
 class _Results:
-    """Shards that are done."""
+    """Shards that are done. Totals are kept up to date, because a job may have 100,000 shards."""
 
-    def __init__(self, storage: Storage, fingerprint: str) -> None:
+    def __init__(self, results: Iterable[ShardResult] = ()) -> None:
         self.done: dict[int, ShardResult] = {}
-        for path in storage.find("shard_*/done.json"):
-            result = ShardResult.parse(storage.read(path) or b"")
-            if result.fingerprint == fingerprint:
-                self.done[result.shard.number] = result
-        self._old_steps = sum(result.steps for result in self.done.values())
+        self.kept = 0
+        """Episodes of the shards without a gap from the first one."""
+        self.succeeded = self.failed = self.steps = 0
+        self._next = 0
+        for result in results:
+            self.add(result)
+        self._old_steps = self.steps
+
+    @staticmethod
+    def read(storage: Storage, fingerprint: str) -> _Results:
+        """The shards in a directory that belong to a job with this fingerprint."""
+        texts = storage.read_all(storage.find("shard_*/done.json"))
+        results = (ShardResult.parse(text) for text in texts)
+        return _Results(result for result in results if result.fingerprint == fingerprint)
+
+    def add(self, result: ShardResult) -> None:
+        self.done[result.shard.number] = result
+        self.succeeded += result.succeeded
+        self.failed += result.failed
+        self.steps += result.steps
+        while self._next in self.done:
+            self.kept += len(self.done[self._next].episodes)
+            self._next += 1
 
     def without_gap(self) -> list[ShardResult]:
-        count = 0
-        while count in self.done:
-            count += 1
-        return [self.done[number] for number in range(count)]
+        return [self.done[number] for number in range(self._next)]
 
     def progress(self, wanted: int, workers: int, seconds: float) -> dict[str, Any]:
-        results = self.done.values()
-        steps = sum(result.steps for result in results) - self._old_steps
         return {
-            "kept": sum(len(result.episodes) for result in self.without_gap()), "wanted": wanted,
-            "succeeded": sum(result.succeeded for result in results), "failed": sum(result.failed for result in results),
-            "shards": len(results), "workers": workers, "steps_per_second": steps / seconds if seconds > 0 else 0.0, "seconds": seconds,
+            "kept": self.kept, "wanted": wanted, "succeeded": self.succeeded, "failed": self.failed, "shards": len(self.done), "workers": workers,
+            "steps_per_second": (self.steps - self._old_steps) / seconds if seconds > 0 else 0.0, "seconds": seconds,
         }  # fmt: skip
 
 
-def _claim(storage: Storage, job: Job, shard_attempts: int, resume: bool) -> None:
+def _claim(storage: Storage, job: Any, more: dict[str, Any], resume: bool) -> None:
     """Writes what the directory contains, or compares it with what it contains already."""
-    ours = {**job.settings(), "shard_attempts": shard_attempts}
+    ours = {**job.settings(), **more}
     found = storage.read("job.json")
     if found is None:
         return storage.write("job.json", json.dumps(ours, indent=1, sort_keys=True).encode())
@@ -122,65 +135,54 @@ def record_on_ray(
         TypeError: An argument of the job cannot be sent to the workers.
         ModuleNotFoundError: Ray, fsspec or pyarrow is not installed.
     """
-    try:
-        import ray  # pyright: ignore[reportMissingImports]
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"Recording on a cluster needs Ray: pip install 'mjsense[ray]' ({error})", name=error.name) from error
     if episodes < 1 or shard_attempts < 1:
         raise ValueError(f"episodes is {episodes} and shard_attempts is {shard_attempts}: both must be at least 1")
-    _check_pickle(job)
-    storage, fingerprint = Storage(job.out), job.fingerprint()
-    _claim(storage, job, shard_attempts, resume)
-    results = _Results(storage, fingerprint)
+    if (job.arguments or {}).get("format", "mjsense") != "mjsense":
+        raise ValueError("record: format cannot be combined with a recording on Ray; export its index afterwards")
+    check_pickle("record", job.arguments)
     attempts = max_attempts or 6 * episodes
     shards = [Shard(n, n * shard_attempts, min(shard_attempts, attempts - n * shard_attempts)) for n in range(math.ceil(attempts / shard_attempts))]
+    return run_job(job, shards, episodes, {"shard_attempts": shard_attempts}, address, resume, runtime_env, progress)
 
-    started_here = not ray.is_initialized()
-    if started_here:
-        options: dict[str, Any] = {"log_to_driver": False, "runtime_env": runtime_env, "logging_level": "ERROR"}
-        ray.init(**options, include_dashboard=False) if address == "local" else ray.init(address=address, **options)
-    began, running = time.perf_counter(), {}
+
+def run_job(
+    job: Any, shards: list[Shard], episodes: int, more: dict[str, Any], address: str, resume: bool, runtime_env: dict[str, Any] | None,
+    progress: Callable[[ClusterProgress], None] | None,
+) -> ClusterSummary:  # fmt: skip
+    """Runs the shards of a job until ``episodes`` are there without a gap, and writes the index.
+
+    Args:
+        job: A :class:`Job`, or an object with its attributes ``out``, ``arguments``, ``settings``, ``fingerprint`` and ``record``.
+        more: Settings of the division into shards.
+    """
+    storage, fingerprint = Storage(job.out), job.fingerprint()
+    _claim(storage, job, more, resume)
+    results = _Results.read(storage, fingerprint)
+    began = time.perf_counter()
+    workers = 0
 
     def report() -> dict[str, Any]:
-        now = results.progress(episodes, len(running), time.perf_counter() - began)
+        now = results.progress(episodes, workers, time.perf_counter() - began)
         if progress is not None:
             progress(ClusterProgress(**now))
         return now
 
-    try:
-        task = ray.remote(num_cpus=1, max_retries=-1)(run_shard)
-        waiting = [shard for shard in shards if shard.number not in results.done]
-        while report()["kept"] < episodes and (waiting or running):
-            slots = max(1, int(ray.cluster_resources().get("CPU", 1)))
-            while waiting and len(running) < slots + 1:  # one more, so that no worker waits for the driver
-                shard = waiting.pop(0)
-                running[task.remote(job, shard, fingerprint)] = shard
-            for ref in ray.wait(list(running), timeout=1.0)[0]:
-                shard = running.pop(ref)
-                try:
-                    results.done[shard.number] = ray.get(ref)
-                except ray.exceptions.RayTaskError as error:
-                    raise (error.cause if isinstance(error.cause, Exception) else error) from None
+    with cluster(address, runtime_env) as ray:
+        began = time.perf_counter()
+        waiting = ((job, shard, fingerprint) for shard in shards if shard.number not in results.done)
+        with running(ray, run_shard, waiting) as tasks:
+            while report()["kept"] < episodes:
+                done = tasks.wait()
+                workers = tasks.count
+                for _, result in done:
+                    results.add(result)
+                if not done and not workers:
+                    break
+        workers = 0
         final = report()
-    finally:
-        for ref in running:
-            ray.cancel(ref, force=True)
-        if started_here:
-            ray.shutdown()
     write_index(storage, results.without_gap(), episodes)
     failures: dict[str, int] = {}
     for result in results.done.values():
         for reason, count in result.failures.items():
             failures[reason] = failures.get(reason, 0) + count
-    return ClusterSummary(**{**final, "workers": 0}, enough=final["kept"] >= episodes, failures=failures, out=job.out)
-
-
-def _check_pickle(job: Job) -> None:
-    """Raises TypeError that names the argument which cannot be sent to workers."""
-    from ray import cloudpickle  # pyright: ignore[reportMissingImports]
-
-    for name, value in (job.arguments or {}).items():
-        try:
-            cloudpickle.dumps(value)
-        except Exception as error:
-            raise TypeError(f"record: {name} cannot be sent to the workers: {error}. Pass the class or a function that creates it") from error
+    return ClusterSummary(**final, enough=final["kept"] >= episodes, failures=failures, out=job.out)

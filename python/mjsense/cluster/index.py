@@ -11,8 +11,12 @@ from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import INDEX
 
 
-def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int) -> None:
-    """Writes one row for each of the first ``episodes`` episodes, in the order of attempts. Paths are relative to the index."""
+def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int) -> int:
+    """Writes one row for each of the first ``episodes`` episodes, in the order of attempts. Paths are relative to the index.
+
+    Returns:
+        The number of rows.
+    """
     try:
         import pyarrow
         import pyarrow.parquet
@@ -28,3 +32,4 @@ def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int)
     data = io.BytesIO()
     pyarrow.parquet.write_table(table, data)
     storage.write(INDEX, data.getvalue())
+    return len(table)

@@ -6,21 +6,25 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from mjsense import _core
 from mjsense.cluster.storage import Storage
+from mjsense.dataset import Episode
+from mjsense.dataset.episode import Store
+from mjsense.dataset.files import entries_of
 
 _FREE = {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite", "ffmpeg",
-         "batches", "out", "progress", "sensors"}  # fmt: skip
+         "batches", "out", "progress", "sensors", "format", "map", "keep_recording", "ray"}  # fmt: skip
 """Arguments of ``record`` that do not change the episodes, or that the driver sets."""
 
 
@@ -99,13 +103,40 @@ class Job:
 
             summary = record(**{"threads": 1, "progress": False, **self.arguments, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count})
             return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
-        command = [sys.executable, "-m", "mjsense", "record", *self.words, "--out", str(folder), "--no-sheet", "--json", "--quiet"]
-        command += ["--first-attempt", str(shard.first), "--num-attempts", str(shard.count)]
-        command += [] if any(word.split("=")[0] == "--threads" for word in self.words) else ["--threads", "1"]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode not in (0, 1):
-            raise RuntimeError(done.stderr.strip().removeprefix("mjsense: "))
-        return json.loads(done.stdout)
+        words = ["record", *self.words, "--out", str(folder), "--no-sheet", "--json", "--quiet"]
+        words += ["--first-attempt", str(shard.first), "--num-attempts", str(shard.count)]
+        words += [] if any(word.split("=")[0] == "--threads" for word in self.words) else ["--threads", "1"]
+        code, text, error = _run_program(words)
+        if code not in (0, 1):
+            raise RuntimeError(error.strip().removeprefix("mjsense: "))
+        return json.loads(text)
+
+
+def _run_program(words: list[str]) -> tuple[int, str, str]:
+    """Exit code and output of the program, which runs in this process: a new one would need 0.6 s to start."""
+    from mjsense.assets import use_installed_meshes
+    from mjsense.ffmpeg import use_installed_ffmpeg
+
+    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
+        use_installed_meshes()
+    use_installed_ffmpeg()
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+        before = [os.dup(1), os.dup(2)]
+        sys.stdout.flush()
+        sys.stderr.flush()
+        try:
+            os.dup2(output.fileno(), 1)
+            os.dup2(errors.fileno(), 2)
+            code = _core.run_program([b"mjsense", *map(os.fsencode, words)], [])
+        finally:
+            for descriptor, saved in enumerate(before, 1):
+                os.dup2(saved, descriptor)
+                os.close(saved)
+        texts = []
+        for file in (output, errors):
+            file.seek(0)
+            texts.append(file.read().decode(errors="replace"))
+    return code, *texts
 
 
 def _without(words: Iterable[str], options: Sequence[str]) -> Iterator[str]:
@@ -121,11 +152,11 @@ def _without(words: Iterable[str], options: Sequence[str]) -> Iterator[str]:
 
 
 def _kept_episodes(folder: Path) -> Iterable[dict[str, Any]]:
-    from mjsense.dataset import Dataset
-
     if not any(folder.glob("house_*/trajectories_batch_*.h5")):
         return
-    for e in Dataset(folder).episodes:
+    entries, recordings = entries_of(folder)
+    store = Store(recordings, 0)
+    for e in (Episode(entry, i, store) for i, entry in enumerate(entries)):
         yield {"episode": e.number, "path": str(e.path.relative_to(folder)), "trajectory": e.trajectory, "seed": e.seed, "length": e.length,
                "success": e.success, "outcome": e.outcome, "task": e.task}  # fmt: skip
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mjsense.dataset.remote import open_address
+
 
 class Storage:
     """Files by their paths relative to the root."""
 
     def __init__(self, root: str) -> None:
-        try:
-            from fsspec.core import url_to_fs  # pyright: ignore[reportMissingImports]
-        except ModuleNotFoundError as error:
-            raise ModuleNotFoundError(f"Recording with Ray needs fsspec: pip install 'mjsense[ray]' ({error})", name=error.name) from error
-        self._fs, self._root = url_to_fs(root)
+        self._fs, self._root = open_address(root)
 
     def _path(self, path: str) -> str:
         return f"{self._root}/{path}"
@@ -33,14 +31,33 @@ class Storage:
         except FileNotFoundError:
             return None
 
+    def read_all(self, paths: list[str]) -> list[bytes]:
+        """The contents of many files, which object stores read in parallel."""
+        if not paths:
+            return []
+        found = self._fs.cat([self._path(path) for path in paths])
+        return list(found.values()) if isinstance(found, dict) else [found]
+
+    def exists(self, path: str) -> bool:
+        """Whether there is such a file."""
+        return self._fs.exists(self._path(path))
+
+    def remove(self, path: str) -> None:
+        """Removes a file."""
+        self._fs.rm_file(self._path(path))
+
     def find(self, pattern: str) -> list[str]:
         """Paths that match a glob pattern."""
         return [str(found)[len(self._root) + 1 :] for found in self._fs.glob(self._path(pattern))]
 
     def put_folder(self, local: Path, path: str) -> None:
-        """Copies a local folder. Files that are already there are replaced."""
+        """Copies a local folder. Files that are already there are replaced.
+
+        Args:
+            path: The folder's path; empty: the root.
+        """
         for file in sorted(local.rglob("*")):
             if file.is_file():
-                target = self._path(f"{path}/{file.relative_to(local)}")
+                target = self._path(f"{path}/{file.relative_to(local)}".lstrip("/"))
                 self._fs.makedirs(target.rsplit("/", 1)[0], exist_ok=True)
                 self._fs.put_file(str(file), target)

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
+from mjsense.commands._ray import add_ray, ray_options
 from mjsense.export import FORMATS
 
 EXAMPLES = [
     ("mjsense export lerobot data out", "Write the recording in data as a LeRobot v3.0 data set."),
     ("mjsense export lerobot data out --success --map map.toml", "Export the successful episodes with chosen features."),
+    ("mjsense export lerobot s3://bucket/pick out --ray auto", "Read a recording of a cluster, and compute the statistics on it."),
     ("mjsense export rerun data out && rerun out/*.rrd", "Show the videos, curves and the scene in the Rerun viewer."),
 ]
 
@@ -22,7 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
-    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show progress.")
+    parser.add_argument("--statistics", choices=("all", "key"), default="all",
+                        help="lerobot, lerobot21: frames that the statistics of images use; key: the key frames, which takes a tenth of the time.")  # fmt: skip
+    add_ray(parser)
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
 
 
@@ -33,8 +39,18 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
-    options = {"encode_again": True} if arguments.encode_again else {}
+    options: dict[str, Any] = {"encode_again": True} if arguments.encode_again else {}
+    if arguments.statistics != "all":
+        if arguments.format not in ("lerobot", "lerobot21"):
+            raise ValueError("--statistics is an option of the formats lerobot and lerobot21")
+        options["statistics_frames"] = arguments.statistics
+    options |= {"map": arguments.map, "episodes": arguments.episodes, "success": arguments.success or None}
+    report = counter("episodes", False if arguments.quiet else None)
+    if arguments.ray:
+        from mjsense.cluster import export_on_ray
+
+        export_on_ray(arguments.format, arguments.path, arguments.out, **options, progress=report, **ray_options(arguments))
+        return 0
     function = getattr(importlib.import_module(f"mjsense.export.{arguments.format}"), f"export_{arguments.format}")
-    success = arguments.success or None
-    function(arguments.path, arguments.out, map=arguments.map, episodes=arguments.episodes, success=success, progress=counter("episodes", False if arguments.quiet else None), **options)
+    function(arguments.path, arguments.out, progress=report, **options)
     return 0

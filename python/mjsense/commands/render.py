@@ -6,6 +6,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from mjsense.commands._ray import add_ray, ray_options
+
 EXAMPLES = [
     ('mjsense render data top --add-camera top="pos=0.5,0,1.6 lookat=0.5,0,0"', "Add a camera above the table; render the recorded ones again, too."),
     ('mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.17,0,-0.02 lookat=0,0,0.2 fovy=70"',
@@ -66,7 +68,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--crf", type=int, metavar="N", help="Quality of the videos, from 0 (lossless) to 51 (worst); by default as recorded.")
     parser.add_argument("--preset", metavar="NAME", help="Speed preset of the video encoder; by default as recorded.")
     parser.add_argument("--resume", action="store_true", help="Continue an interrupted rendering.")
-    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show progress.")
+    add_ray(parser)
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -80,10 +83,30 @@ def run(arguments: argparse.Namespace) -> int:
         added[name] = camera
     same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "brightness", "copy", "episodes", "worlds",
             "threads", "batches", "crf", "preset", "resume")  # fmt: skip
+    if arguments.ray:
+        return _on_ray(arguments, added, [name for name in same if name not in ("batches", "episodes", "resume")])
     made = render(
         arguments.path, arguments.out, add_cameras=added, progress=False if arguments.quiet else None,
         sensors=(lambda: sensors_of(arguments.sensors)) if arguments.sensors else (),
         **{name: getattr(arguments, name) for name in same},
     )  # fmt: skip
-    print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
+    if not arguments.quiet:
+        print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
+    return 0
+
+
+def _on_ray(arguments: argparse.Namespace, added: dict[str, Any], names: list[str]) -> int:
+    from functools import partial
+
+    from mjsense.cluster import render_on_ray
+    from mjsense.dataset.sensor_tables import sensors_of
+
+    options: dict[str, Any] = {name: getattr(arguments, name) for name in names} | {"add_cameras": added}
+    options["threads"] = arguments.threads or 1
+    if arguments.sensors:
+        options["sensors"] = partial(sensors_of, arguments.sensors)
+    options |= {"episodes": arguments.episodes, "resume": arguments.resume, **ray_options(arguments)}
+    made = render_on_ray(arguments.path, arguments.out, **options)
+    if not arguments.quiet:
+        print(f"{made.kept} episodes in {made.seconds:.1f} s: {made.out}")
     return 0

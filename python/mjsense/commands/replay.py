@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--worlds", type=int, default=4, metavar="N", help="Number of episodes whose sensors are computed in parallel.")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="Number of threads; 0: one per available CPU.")
     parser.add_argument("--json", action="store_true", help="Print the report as JSON.")
-    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show progress.")
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,5 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.path, actions=arguments.verify or arguments.from_ == "actions", states=arguments.verify or arguments.from_ == "states",
         episodes=arguments.episodes, worlds=arguments.worlds, threads=arguments.threads, progress=False if arguments.quiet else None,
     )  # fmt: skip
-    print(json.dumps(report.to_dict(), indent=2) if arguments.json else report)
+    if arguments.json:
+        print(json.dumps(report.to_dict(), indent=2))
+    elif not (arguments.quiet and report.ok):
+        print(report)
     return 0 if report.ok else FAILED

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one.")
     parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
     parser.add_argument("--export", metavar="FILE", help="Write a .viser or .rrd file instead of showing a page.")
-    parser.add_argument("-q", "--quiet", action="store_true", help="Do not show the progress of an export.")
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="Length of an export of live worlds, s.")
 
 
@@ -42,7 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.export:
         export(source, arguments.export, world=arguments.world, episode=arguments.episode, seconds=arguments.seconds,
                progress=False if arguments.quiet else None)  # fmt: skip
-        print(f"Wrote {arguments.export}.")
+        if not arguments.quiet:
+            print(f"Wrote {arguments.export}.")
         return 0
     viewer_of(source, world=arguments.world, episode=arguments.episode, seed=arguments.seed, **place).run(not arguments.no_open)
     return 0

@@ -20,6 +20,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
 from mjsense.dataset.files import entries_of
+from mjsense.dataset.remote import resolved
 from mjsense.errors import UnknownNameError
 
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
@@ -34,7 +35,8 @@ class Dataset:
     workers, forked or spawned. Row t of ``actions/*`` is the action that led to observation t.
 
     Args:
-        root: Output directory of a recording or of its shards, one of the ``house_N`` folders, or one HDF5 file.
+        root: Output directory of a recording or of its shards, its ``index.parquet``, one of the ``house_N`` folders, one HDF5 file, or an
+            address that fsspec reads (``s3://bucket/pick``).
         episodes: Positions of episodes in the recording; by default all.
         delta_timestamps: Windows: seconds relative to the observation, by stream or group. The stream becomes ``[n, ...]``, and
             ``{stream}_is_pad`` says which entries lie outside the episode; those repeat its first or last row.
@@ -43,6 +45,7 @@ class Dataset:
         outcome: Only episodes with this outcome: a text, a pattern (``"horizon reached*"``), several of them, or a function of the text.
         success: Only successful (True) or only failed (False) episodes.
         houses: Only episodes of these houses.
+        where: Only episodes for which this function is true: ``lambda episode: episode.quality.idle < 0.1``.
         tolerance_s: Maximum difference between an entry of ``delta_timestamps`` and a multiple of the period. [s]
         cache_mb: Memory for decoded rows and frames of one process, half for each. [MB]
     """
@@ -57,12 +60,13 @@ class Dataset:
         outcome: str | Iterable[str] | Callable[[str], bool] | None = None,
         success: bool | None = None,
         houses: Iterable[int] | None = None,
+        where: Callable[[Episode], bool] | None = None,
         tolerance_s: float = 1e-4,
         cache_mb: float = 512,
     ) -> None:
-        self.root = Path(root)
-        """The folder or file."""
-        entries, recordings = entries_of(self.root)
+        self.root, source = resolved(root)
+        """The folder or file; of an address, its copy on this machine."""
+        entries, recordings = entries_of(self.root, source)
         store = Store(recordings, int(cache_mb * 1e6))
         chosen = [Episode(entry, i, store) for i, entry in enumerate(entries)]
         if episodes is not None:
@@ -77,6 +81,8 @@ class Dataset:
         if houses is not None:
             numbers = set(houses)
             chosen = [episode for episode in chosen if episode.house in numbers]
+        if where is not None:
+            chosen = [episode for episode in chosen if where(episode)]
         self.episodes: list[Episode] = chosen
         """The episodes, in the order of houses, files and positions in the file."""
         self._ends = list(itertools.accumulate(episode.length for episode in chosen))
@@ -134,10 +140,10 @@ class Dataset:
             rows, single = self._rows(name, episode, t)
             values = episode._large_rows(name, rows if isinstance(rows, list) else [rows])
             sample[name] = values[0] if single else values
-        for name in self._videos:
-            rows, single = self._rows(name, episode, t)
-            video = episode.video(name)
-            sample[name] = video[rows] if single else np.stack([video[r] for r in rows])
+        if self._videos:
+            places = [self._rows(name, episode, t) for name in self._videos]
+            frames = episode._frames(self._videos, [[rows] if single else rows for rows, single in places])
+            sample |= {name: images[0] if single else np.stack(images) for name, images, (_, single) in zip(self._videos, frames, places)}
         for name, steps in self._windows.items():
             if not _is_mask(name):
                 sample[f"{name}_is_pad"] = np.array([not 0 <= t + step < episode.length for step in steps])

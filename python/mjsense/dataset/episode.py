@@ -19,6 +19,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import json_rows, playback
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
+from mjsense.dataset.quality import EpisodeQuality, idle_steps, quality_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
 from mjsense.errors import UnknownNameError
 
@@ -87,8 +88,10 @@ class Store:
     def __init__(self, recordings: list[dict[str, Any]], cache_bytes: int) -> None:
         self.recordings = recordings
         self.rows = Cache(cache_bytes // 2)
-        self.frames = FrameReader(Cache(cache_bytes // 2))
+        self.frames = FrameReader(Cache(cache_bytes // 2), self.rows)
         self.models = Cache(4)  # one unit per model
+        self.known: dict[int, dict[str, Stream | None]] = {}
+        """Arrays of each recording by their places in a trajectory; None: no stream."""
         self.leaves: set[str] | None = None
         """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
 
@@ -141,6 +144,16 @@ class Episode:
     def success(self) -> bool:
         """Whether the outcome is ``success``."""
         return self.outcome == "success"
+
+    @property
+    def quality(self) -> EpisodeQuality:
+        """Figures that describe how the episode was performed. They are computed at each access."""
+        return quality_of(self)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """Whether neither joints nor commands moved in the step that led to an observation: bool ``[T]``."""
+        return idle_steps(self)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -214,14 +227,21 @@ class Episode:
 
     def video(self, camera: str) -> Video:
         """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
+        return Video(self._video(camera), self._store.frames)
+
+    # The next functions are for this package.
+
+    def _video(self, camera: str) -> VideoInfo:
         videos = self._store.rows.get((self.index, "videos"), self._find_videos)
         info = videos.get(camera if camera.startswith(VIDEOS) else VIDEOS + camera)
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
             raise UnknownNameError(f"Episode {self.index} has no video '{camera}'; it has {cameras or 'no videos'}")
-        return Video(info, self._store.frames)
+        return info
 
-    # The next functions are for this package.
+    def _frames(self, cameras: list[str], rows: list[list[int]]) -> list[list[np.ndarray]]:
+        """Images of each camera at its rows."""
+        return self._store.frames.frames([(self._video(camera), at) for camera, at in zip(cameras, rows)])
 
     @property
     def _recording(self) -> dict[str, Any]:
@@ -251,19 +271,30 @@ class Episode:
     def _find_streams(self) -> tuple[dict[str, Stream], int]:
         streams: dict[str, Stream] = {}
         videos = self._store.rows.get((self.index, "videos"), self._find_videos)
+        # Opening a dataset takes most of the time. Arrays have the same type and attributes in all episodes of a recording.
+        known = self._store.known.setdefault(self._entry.recording, {})
 
-        def visit(name: str, dataset: Any) -> None:
-            if not hasattr(dataset, "dtype") or name in ("obs_scene", REPLAY + "held") or name.startswith(REPLAY + "model/"):
+        def visit(place: str) -> None:
+            if place not in known:
+                add(place)
+            elif (stream := known[place]) is not None:
+                streams[stream.name] = stream
+
+        def add(place: str) -> None:
+            dataset = trajectory[place]
+            if not hasattr(dataset, "dtype") or place in ("obs_scene", REPLAY + "held") or place.startswith(REPLAY + "model/"):
+                known[place] = None
                 return
             about = {key: text_of(dataset.attrs.get(key, "")) for key in ("unit", "frame", "description")}
-            name = name.removeprefix(NUMBERS)
+            name = place.removeprefix(NUMBERS)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
                     dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
                     streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
             elif _is_json(dataset):
-                if NUMBERS + name in file[self.trajectory]:
+                if NUMBERS + name in trajectory:
+                    known[place] = None
                     return
                 for leaf, values in self._decode(name, dataset).items():
                     unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
@@ -271,10 +302,12 @@ class Episode:
                     if mask := given_name(leaf):
                         streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
             else:
-                streams[name] = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
+                stream = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
+                streams[name] = known[place] = stream
 
         with open_h5(self.path) as file:
-            file[self.trajectory].visititems(visit)
+            trajectory = file[self.trajectory]
+            trajectory.visit(visit)
         return dict(sorted(streams.items())), 500 * len(streams)
 
     def _decode(self, place: str, dataset: Any) -> dict[str, np.ndarray]:

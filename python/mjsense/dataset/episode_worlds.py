@@ -6,6 +6,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 _LIGHT = ("light_ambient", "light_diffuse", "light_specular")
 # Elements that sensors and edits may add to the archived model, which renumbers the others.
 _RENUMBERED = {"cam": (_mujoco.Obj.CAMERA, "ncam"), "light": (_mujoco.Obj.LIGHT, "nlight"), "site": (_mujoco.Obj.SITE, "nsite")}
+
+_PARTS = ["time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "userdata"]
 
 
 def _model_fields(episode: Episode) -> dict[str, np.ndarray]:
@@ -112,6 +115,35 @@ class EpisodeWorlds:
             raise ValueError(f"{playback.where(episode)}: the edited model has another shape of '{name}': {now.shape} instead of {values.shape}. "
                              "Only cameras, lights, sites with names, and sensors can be added.")  # fmt: skip
         return values
+
+
+class OwnStepper(playback.Stepper):
+    """Simulates with the MuJoCo that mjsense contains, for environments without a ``mujoco`` of its series."""
+
+    def __init__(self, episode: Episode) -> None:
+        worlds = EpisodeWorlds(episode, 1, threads=1)
+        worlds.begin(0, episode)
+        self._sim = sim = worlds.sim
+        fields = ("ctrl", "qpos", "qvel", "mocap_pos", "mocap_quat")
+        super().__init__(episode, sim.model, SimpleNamespace(**{name: getattr(sim, name)[0] for name in fields}))
+
+    def _set_state(self, state: np.ndarray) -> None:
+        show_states(self._sim, [0], [state])
+
+    def _advance(self) -> None:
+        self._sim.step_raw()
+
+    def _get_state(self) -> np.ndarray:
+        return self._sim.state[0].copy()
+
+    def part(self, i: int) -> tuple[str, int]:
+        sim = self._sim
+        for name in _PARTS:
+            values = sim._component(name)
+            inside = i - (values.ctypes.data - sim.state.ctypes.data) // sim.state.itemsize
+            if 0 <= inside < values.size:  # of the only world
+                return name.removeprefix("qacc_"), inside
+        return "state", i
 
 
 def show_states(sim: Simulation, world_ids: Sequence[int], states: Sequence[np.ndarray]) -> None:

@@ -7,7 +7,7 @@ import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 INDEX = "index.parquet"
 """Index of a recording on a cluster."""
@@ -23,6 +23,12 @@ def open_h5(path: Path) -> Any:
     return h5py.File(path, "r")
 
 
+def video_options(recording: dict[str, Any]) -> dict[str, Any]:
+    """The recorder's options that give equal videos of equal images. Recordings of older versions have no tuning."""
+    about = {"tune": "", **recording["video"]} if "video" in recording else {}
+    return {"encoder_threads" if key == "threads" else key: value for key, value in about.items()}
+
+
 def text_of(value: Any) -> str:
     """A text attribute or a text dataset's value; a row of bytes ends at the first 0."""
     if isinstance(value, str):
@@ -30,11 +36,18 @@ def text_of(value: Any) -> str:
     return bytes(value).split(b"\0", 1)[0].decode()
 
 
+class Fetcher(Protocol):
+    """Brings a folder of a recording onto this machine."""
+
+    def fetch(self, folder: Path) -> None: ...
+
+
 @dataclass(frozen=True)
 class EpisodeEntry:
     """Where an episode is, and its attributes."""
 
-    path: Path
+    place: Path
+    """The HDF5 file, which need not be on this machine yet."""
     trajectory: str
     length: int
     house: int | None
@@ -43,19 +56,47 @@ class EpisodeEntry:
     outcome: str
     recording: int
     """Position in the list of the recordings' descriptions."""
+    source: Fetcher | None = None
+    """Where the file's folder comes from; None: it is on this machine."""
+
+    @property
+    def path(self) -> Path:
+        """The HDF5 file, on this machine."""
+        if self.source is not None:
+            self.source.fetch(self.place.parent)
+        return self.place
 
 
-def _indexed(root: Path) -> set[tuple[Path, str]] | None:
-    """Files and trajectories that the index of a recording on a cluster names; None without an index."""
+def read_index(root: Path) -> list[dict[str, Any]]:
+    """The rows of ``index.parquet``."""
     index = root / INDEX
-    if not index.exists():
-        return None
     try:
         from pyarrow import parquet
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(f"Reading {index} needs pyarrow: pip install 'mjsense[ray]' ({error})", name=error.name) from error
-    rows = parquet.read_table(index, columns=["path", "trajectory"]).to_pylist()
-    return {(root / row["path"], row["trajectory"]) for row in rows}
+    return parquet.read_table(index).to_pylist()
+
+
+def _indexed(root: Path, source: Fetcher | None) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:
+    """The episodes that an index names. Only one file of each house is opened: all shards of a job have the same description."""
+    entries: list[EpisodeEntry] = []
+    descriptions: list[dict[str, Any]] = []
+    of_house: dict[str, int] = {}
+    for row in read_index(root):
+        place = root / row["path"]
+        house = place.parent.name
+        entry = EpisodeEntry(place, row["trajectory"], row["length"], _house(place), row["episode"], row["seed"], row["outcome"],
+                             of_house.setdefault(house, len(of_house)), source)  # fmt: skip
+        if entry.recording == len(descriptions):
+            with open_h5(entry.path) as file:
+                descriptions.append(json.loads(text_of(file.attrs.get("recording", "{}"))))
+        entries.append(entry)
+    return entries, descriptions
+
+
+def _house(path: Path) -> int | None:
+    match = re.fullmatch(r"house_(\d+)", path.parent.name)
+    return int(match[1]) if match else None
 
 
 def _batches(root: Path) -> list[Path]:
@@ -78,23 +119,27 @@ def _batches(root: Path) -> list[Path]:
     return sorted(found, key=order)
 
 
-def entries_of(root: Path) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:
-    """All episodes of a recording, and the distinct descriptions of its files."""
+def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:
+    """All episodes of a recording, and the distinct descriptions of its files.
+
+    Args:
+        root: Folder or file.
+        source: Where the folders of the episodes come from, if ``root`` contains only an index.
+    """
+    if (root / INDEX).exists():
+        return _indexed(root, source)
     entries: list[EpisodeEntry] = []
     texts: dict[str, int] = {}
-    indexed = _indexed(root)
     for path in _batches(root):
-        house = re.fullmatch(r"house_(\d+)", path.parent.name)
         with open_h5(path) as file:
             recording = texts.setdefault(text_of(file.attrs.get("recording", "{}")), len(texts))
-            for name in sorted((name for name in file if name.startswith("traj_") and (indexed is None or (path, name) in indexed)), key=lambda name: int(name[5:])):
+            for name in sorted((name for name in file if name.startswith("traj_")), key=lambda name: int(name[5:])):
                 trajectory = file[name]
                 flags = trajectory["success"]
                 outcome = trajectory.attrs.get("outcome")
                 if outcome is None:  # MolmoSpaces' files have no attributes
                     outcome = "success" if len(flags) and flags[-1] else "no success"
                 seed = trajectory.attrs.get("seed")
-                entries.append(EpisodeEntry(path, name, len(flags), int(house[1]) if house else None,
-                                            int(trajectory.attrs.get("episode", int(name[5:]))), None if seed is None else int(seed),
-                                            text_of(outcome), recording))  # fmt: skip
+                entries.append(EpisodeEntry(path, name, len(flags), _house(path), int(trajectory.attrs.get("episode", int(name[5:]))),
+                                            None if seed is None else int(seed), text_of(outcome), recording))  # fmt: skip
     return entries, [json.loads(text) for text in texts]

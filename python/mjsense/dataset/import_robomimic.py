@@ -4,31 +4,25 @@
 from __future__ import annotations
 
 import importlib.util
-import io
 import json
-import zipfile
-import zlib
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 
-from mjsense import _core, _libmujoco
+from mjsense import _libmujoco
 from mjsense._arguments import checked
 from mjsense.dataset.files import open_h5, text_of
-from mjsense.recorder import FILE_OPTIONS
+from mjsense.dataset.import_rows import OPTIONS, Rows, archive_of, compile_archive, unique_name
 
 if TYPE_CHECKING:
     import mujoco
 else:
     mujoco = _libmujoco.shared
 
-_OPTIONS = {**FILE_OPTIONS, "ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
 _CONTROL_FREQ = 20  # robosuite's default
-_WRITTEN = "Values written into the previous state before this step; NaN: not written."
 
 
 @checked
@@ -78,7 +72,7 @@ def import_robomimic(
         done = 0
         for house, (archive, demos) in enumerate(houses.items()):
             settings = {"env": name, "source": path.name, "env_args": arguments}
-            options = {**_OPTIONS, "house": house, "episodes": len(demos)} | ({"archive": archive} if archive[0] else {})
+            options = {**OPTIONS, "house": house, "episodes": len(demos)} | ({"archive": archive} if archive[0] else {})
             writer = _Writer(out, data[demos[0]], archive, rate, settings, options)
             for i, demo in enumerate(demos):
                 writer.write(i, data[demo], {"task_description": name, "policy_dt_ms": float(1000 / rate)})
@@ -108,27 +102,14 @@ def _archive(path: Path, demo: Any, assets: str | Path | None) -> tuple[str, byt
     if "model_file" not in demo.attrs or "states" not in demo:
         return "", b""
     stored = {name: bytes(content[:]) for name, content in _leaves(demo.get("assets", {}))}
-    tree = ElementTree.fromstring(text_of(demo.attrs["model_file"]))
-    folders: dict[str, str] = {}
-    for compiler in tree.iter("compiler"):
-        for kind in ("assetdir", "meshdir", "texturedir"):
-            folders[kind] = compiler.attrib.pop(kind, folders.get(kind, ""))
-    files: dict[str, bytes] = {}
-    for element in tree.iter():
-        folder = folders.get({"mesh": "meshdir", "texture": "texturedir"}.get(element.tag, ""), "") or folders.get("assetdir", "")
-        for key in [key for key in element.attrib if key.startswith("file")]:
-            file = element.attrib[key]
-            content = stored.get(file) or _find(path, file, folder, assets, demo.name).read_bytes()
-            if "name" not in element.attrib and element.tag in ("mesh", "texture", "hfield"):
-                element.set("name", PurePosixPath(file).stem)  # the name that it has without one
-            new = file if file in stored else f"{zlib.crc32(content):08x}_{PurePosixPath(file).name}"
-            element.set(key, new)
-            files[new] = content
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in {"model.xml": ElementTree.tostring(tree), **dict(sorted(files.items()))}.items():
-            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
-    return f"model_{zlib.crc32(buffer.getvalue()):08x}.zip", buffer.getvalue()
+
+    def read(file: str, folder: str) -> tuple[str, bytes]:
+        if file in stored:
+            return file, stored[file]
+        content = _find(path, file, folder, assets, demo.name).read_bytes()
+        return unique_name(file, content), content
+
+    return archive_of(text_of(demo.attrs["model_file"]), read)
 
 
 def _leaves(group: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
@@ -159,9 +140,9 @@ class _Writer:
     """Writes the demonstrations that share one model."""
 
     def __init__(self, out: str | Path, demo: Any, archive: tuple[str, bytes], rate: Fraction, settings: dict[str, Any], options: dict[str, Any]) -> None:
-        self._model = _compile(archive[1], demo.name) if archive[0] else None
+        self._model = compile_archive(archive[1], demo.name[1:]) if archive[0] else None
+        self._streams = Rows()
         self._rows: dict[str, tuple[np.ndarray, str]] = {}  # row to write to, and the dataset of the demonstration that it comes from
-        self._handles: list[Any] = []
         for key, values in sorted(demo.get("obs", {}).items()):
             place = f"obs/{key}"
             if key.endswith("_image") and values.dtype == np.uint8 and values.ndim == 4 and values.shape[3] == 3:
@@ -171,19 +152,11 @@ class _Writer:
             else:
                 self._add(f"observation/{key}", place, values.dtype.name, values.shape[1:], "Observation of the demonstration.")
         self._add("actions/action", "actions", demo["actions"].dtype.name, demo["actions"].shape[1:], "Action that led to this row; 0 in the first row.")
-        if self._model is not None:
-            size = mujoco.mj_stateSize(self._model, mujoco.mjtState.mjSTATE_INTEGRATION)
-            self._add("replay/state", "", "float64", (size,), "MuJoCo's state, in the order of mjSTATE_INTEGRATION.", frame="world")
-            self._add("replay/written", "", "float64", (size,), _WRITTEN, frame="world")
-            self._rows["replay/written"][0][:] = np.nan
-        text = json.dumps(settings, sort_keys=True)
-        self._core = _core.Recorder(None, 1, self._handles, str(out), rate.numerator, rate.denominator, text, options)
+        self._state = None if self._model is None else self._streams.add_state(self._model)
+        self._core = self._streams.recorder(out, rate, settings, options)
 
     def _add(self, name: str, place: str, dtype: str, shape: tuple[int, ...], description: str, **more: Any) -> None:
-        spec = {"dtype": dtype, "shape": [*shape], "low": -np.inf, "high": np.inf, "is_dict": False, "unit": "", "frame": "",
-                "description": description, **more}  # fmt: skip
-        self._handles.append(_core.written_rows(name, spec, 1))
-        self._rows[name] = self._handles[-1].arrays(writable=True)[""], place
+        self._rows[name] = self._streams.add(name, dtype, shape, description, **more), place
 
     def write(self, number: int, demo: Any, scene: dict[str, Any]) -> None:
         about = _json_of(demo.attrs.get("ep_meta", "{}"))
@@ -193,16 +166,16 @@ class _Writer:
         ended = demo["dones"][:] if "dones" in demo else np.zeros(length)
         states = self._states(demo, self._model) if self._model is not None else None
         # Arrays are read as a whole, images one by one.
-        values = {place: demo[place] if demo[place].ndim == 4 else demo[place][:] for _, place in self._rows.values() if place}
+        values = {place: demo[place] if demo[place].ndim == 4 else demo[place][:] for _, place in self._rows.values()}
         self._core.begin_episode(0, number, int(about.get("seed") or 0))
         for t in range(length):
             for row, place in self._rows.values():
                 if place == "actions":
                     row[0] = values[place][t - 1] if t else 0
-                elif place:
+                else:
                     row[0] = values[place][t].reshape(row[0].shape)
-            if states is not None:
-                self._rows["replay/state"][0][0] = states[t]
+            if states is not None and self._state is not None:
+                self._state[0] = states[t]
             reward = float(rewards[t - 1]) if t else 0.0
             last = t == length - 1
             self._core.append([0], [reward], [bool(t and ended[t - 1])], [last], [reward > 0])
@@ -211,7 +184,8 @@ class _Writer:
 
     def _states(self, demo: Any, model: mujoco.MjModel) -> np.ndarray:
         """MuJoCo's whole state at each observation."""
-        place = self._rows["replay/state"][0]
+        place = self._state
+        assert place is not None
         if "integration_states" in demo and demo["integration_states"].shape[1:] == place.shape[1:]:
             return demo["integration_states"][:]
         states = demo["states"][:]
@@ -226,13 +200,3 @@ class _Writer:
     def complete(self) -> None:
         self._core.complete()
 
-
-def _compile(archive: bytes, demo: str) -> mujoco.MjModel:
-    if mujoco is None:
-        raise RuntimeError(f"import needs the series of MuJoCo that mjsense uses: {_libmujoco.explain()}")
-    with zipfile.ZipFile(io.BytesIO(archive)) as files:
-        contents = {name: files.read(name) for name in files.namelist()}
-    try:
-        return mujoco.MjModel.from_xml_string(contents.pop("model.xml").decode(), contents)
-    except ValueError as error:
-        raise ValueError(f"{demo[1:]}: MuJoCo {mujoco.__version__} cannot compile its model_file: {error}") from error

@@ -134,17 +134,11 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray) -> 
     mujoco.mj_forward(model, data)
 
 
-def _get_state(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    state = np.empty(mujoco.mj_stateSize(model, STATE))
-    mujoco.mj_getState(model, data, state, STATE)
-    return state
-
-
 class Stepper:
-    """Simulates one step of the policy as it was recorded."""
+    """Simulates one step of the policy as it was recorded, in plain MuJoCo."""
 
-    def __init__(self, episode: Episode, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        self._model, self._data, self._inputs = model, data, inputs_of(episode)
+    def __init__(self, episode: Episode, model: mujoco.MjModel, data: Any) -> None:
+        self.model, self._data, self._inputs = model, data, inputs_of(episode)
         period = episode.settings.get("policy_dt_ms") or float(1000 / episode.fps)
         self._substeps = round(period / 1000 / model.opt.timestep)
         ctrl = self._inputs.ctrl
@@ -153,9 +147,9 @@ class Stepper:
 
     def step(self, state: np.ndarray, t: int) -> np.ndarray:
         """The state at observation ``t``, simulated from ``state`` at observation ``t - 1``."""
-        model, data, inputs = self._model, self._data, self._inputs
+        data, inputs = self._data, self._inputs
         written = inputs.written[t]
-        mujoco.mj_setState(model, data, np.where(np.isnan(written), state, written), STATE)
+        self._set_state(np.where(np.isnan(written), state, written))
         poses = [data.qpos[q : q + 7].copy() for q, _ in self._held]
         for substep in range(self._substeps):
             if inputs.ctrl is not None and substep % self._per_tick == 0:
@@ -164,11 +158,31 @@ class Stepper:
                 if inputs.mocap is not None:
                     data.mocap_pos[:] = inputs.mocap[t, tick, :, :3]
                     data.mocap_quat[:] = inputs.mocap[t, tick, :, 3:]
-            mujoco.mj_step(model, data)
+            self._advance()
             for (q, v), pose in zip(self._held, poses):
                 data.qpos[q : q + 7] = pose
                 data.qvel[v : v + 6] = 0
-        return _get_state(model, data)
+        return self._get_state()
+
+    def _set_state(self, state: np.ndarray) -> None:
+        mujoco.mj_setState(self.model, self._data, state, STATE)
+
+    def _advance(self) -> None:
+        mujoco.mj_step(self.model, self._data)
+
+    def _get_state(self) -> np.ndarray:
+        state = np.empty(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(self.model, self._data, state, STATE)
+        return state
+
+    def part(self, i: int) -> tuple[str, int]:
+        """The part of the state to which its value ``i`` belongs, and the position inside the part."""
+        for bit in (1 << n for n in range(STATE.bit_length()) if STATE >> n & 1):
+            size = mujoco.mj_stateSize(self.model, bit)
+            if i < size:
+                return mujoco.mjtState(bit).name.removeprefix("mjSTATE_").lower(), i
+            i -= size
+        raise AssertionError(i)
 
 
 def replay_episode(

@@ -21,7 +21,7 @@ from mjsense.core_sensors import CoreSensor
 from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.files import open_h5
+from mjsense.dataset.files import open_h5, video_options
 from mjsense.dataset.playback import archive_of, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
@@ -129,7 +129,7 @@ class _House:
         description = first._recording
         files = FILE_OPTIONS | {"episodes": len(episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
                  "gzip": description.get("gzip", 4)}  # fmt: skip
-        video = {"encoder_threads" if key == "threads" else key: value for key, value in description.get("video", {}).items()}
+        video = video_options(description)
         video |= {key: options[key] for key in ("crf", "preset") if options[key] is not None}
         archive = archive_of(first)
         files["archive"] = archive.name, archive.read_bytes()
@@ -273,16 +273,15 @@ def render(
         raise ValueError("episodes= cannot be combined with a Dataset; choose them when it is created")
     if not dataset.episodes:
         raise ValueError(f"{dataset.root} contains no episodes")
-    houses: dict[Path, list[Episode]] = {}
+    houses: dict[str, list[Episode]] = {}  # by the name of the folder: a house may be in many shards
     for episode in dataset.episodes:
-        houses.setdefault(episode.path.parent, []).append(episode)
+        houses.setdefault(episode.path.parent.name, []).append(episode)
     made = sensors if callable(sensors) else None
     given = () if callable(sensors) else list(sensors)
     if len(houses) > 1 and any(not hasattr(sensor, "kind") or isinstance(sensor, CoreSensor) for sensor in given):
         raise ValueError(f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs to one simulation")
-    for folder in houses:
-        if folder.resolve().parent == Path(out).resolve():
-            raise ValueError(f"the output directory '{out}' is that of the recording; choose another one")
+    if Path(out).resolve() in {dataset.root.resolve(), *(episodes[0].path.resolve().parents[1] for episodes in houses.values())}:
+        raise ValueError(f"the output directory '{out}' is that of the recording; choose another one")
     state = _Progress(len(dataset.episodes), progress)
     paths = []
     for chosen in houses.values():

@@ -12,10 +12,12 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
+from mjsense._mujoco import Obj, id2name
 from mjsense._progress import counter
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.deviation import Deviation
-from mjsense.dataset.playback import STATE, Stepper, inputs_of, model_of
+from mjsense.dataset.episode_worlds import OwnStepper
+from mjsense.dataset.playback import Stepper, inputs_of, model_of
 from mjsense.dataset.sensor_check import SensorCheck, check_sensors
 
 if TYPE_CHECKING:
@@ -111,63 +113,58 @@ class ReplayReport:
         return {"ok": self.ok, "episodes": [asdict(episode) | {"ok": episode.ok} for episode in self.episodes]}
 
 
-def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, i: int, inside: int) -> str:
-    word = kind.name.removeprefix("mjOBJ_").lower()
-    return f"{word} '{mujoco.mj_id2name(model, kind, int(i)) or i}'[{inside}]"
-
-
 def _element(model: mujoco.MjModel, part: str, i: int) -> str:
     """The element to which the value ``i`` of a part of the state belongs."""
-    objects = mujoco.mjtObj
+
+    def named(kind: Obj, element: int, inside: int) -> str:
+        return f"{kind.name.lower()} '{id2name(model, kind, int(element)) or element}'[{inside}]"
+
     if part == "qpos":
         joint = int(np.searchsorted(model.jnt_qposadr, i, "right")) - 1
-        return _named(model, objects.mjOBJ_JOINT, joint, i - model.jnt_qposadr[joint])
+        return named(Obj.JOINT, joint, i - model.jnt_qposadr[joint])
     if part in ("qvel", "warmstart", "qfrc_applied"):
         joint = model.dof_jntid[i]
-        return _named(model, objects.mjOBJ_JOINT, joint, i - model.jnt_dofadr[joint])
+        return named(Obj.JOINT, joint, i - model.jnt_dofadr[joint])
     if part == "ctrl":
-        return _named(model, objects.mjOBJ_ACTUATOR, i, 0)
+        return named(Obj.ACTUATOR, i, 0)
     if part == "act":
         owner = int(np.flatnonzero((model.actuator_actadr <= i) & (i < model.actuator_actadr + model.actuator_actnum))[0])
-        return _named(model, objects.mjOBJ_ACTUATOR, owner, i - model.actuator_actadr[owner])
+        return named(Obj.ACTUATOR, owner, i - model.actuator_actadr[owner])
     if part == "xfrc_applied":
-        return _named(model, objects.mjOBJ_BODY, i // 6, i % 6)
+        return named(Obj.BODY, i // 6, i % 6)
     if part == "eq_active":
-        return _named(model, objects.mjOBJ_EQUALITY, i, 0)
+        return named(Obj.EQUALITY, i, 0)
     if part in ("mocap_pos", "mocap_quat"):
         width = 3 if part == "mocap_pos" else 4
         body = int(np.flatnonzero(model.body_mocapid == i // width)[0])
-        return _named(model, objects.mjOBJ_BODY, body, i % width)
+        return named(Obj.BODY, body, i % width)
     return f"value {i}"
 
 
-def _deviation(model: mujoco.MjModel, t: int, recorded: np.ndarray, replayed: np.ndarray) -> Deviation | None:
+def _deviation(stepper: Stepper, t: int, recorded: np.ndarray, replayed: np.ndarray) -> Deviation | None:
     differs = recorded.view(np.uint64) != replayed.view(np.uint64)
     if not differs.any():
         return None
     first = int(differs.argmax())
-    part, i = "state", first
-    start = 0
-    for bit in range(STATE.bit_length()):
-        if not STATE >> bit & 1:
-            continue
-        size = mujoco.mj_stateSize(model, 1 << bit)
-        if first < start + size:
-            part, i = mujoco.mjtState(1 << bit).name.removeprefix("mjSTATE_").lower(), first - start
-            break
-        start += size
-    return Deviation(t, part, _element(model, part, i), float(recorded[first]), float(replayed[first]), int(differs.sum()))
+    part, i = stepper.part(first)
+    return Deviation(t, part, _element(stepper.model, part, i), float(recorded[first]), float(replayed[first]), int(differs.sum()))
+
+
+def _stepper(episode: Episode) -> Stepper:
+    if mujoco is None:
+        return OwnStepper(episode)
+    model = model_of(episode)
+    return Stepper(episode, model, mujoco.MjData(model))
 
 
 def check_episode(episode: Episode) -> EpisodeCheck:
-    model = model_of(episode)
-    states, stepper = inputs_of(episode).state, Stepper(episode, model, mujoco.MjData(model))
+    states, stepper = inputs_of(episode).state, _stepper(episode)
     found: dict[str, Any] = {"stepwise": None, "open_loop": None}
     for how in found:
         state = states[0]
         for t in range(1, episode.length):
             state = stepper.step(states[t - 1] if how == "stepwise" else state, t)
-            found[how] = _deviation(model, t, states[t], state)
+            found[how] = _deviation(stepper, t, states[t], state)
             if found[how]:
                 break
     return EpisodeCheck(episode.index, episode.length - 1, **found)
@@ -190,7 +187,7 @@ def check_replay(
 
     Args:
         root: Folder of a recording, or a :class:`Dataset`.
-        actions: Simulate in plain MuJoCo with the recorded controls, stepwise from each recorded state and open loop from the first one,
+        actions: Simulate in plain MuJoCo (without the package ``mujoco``: in mjsense's own copy of it) with the recorded controls, stepwise from each recorded state and open loop from the first one,
             and compare the states.
         states: Build the recording's task again, repeat each step from the recorded state, and compare every stream, rewards and success.
             Depth is compared bit for bit, rgb by its video, because the encoder makes equal files of equal images. Streams of the policy,

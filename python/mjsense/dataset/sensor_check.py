@@ -20,7 +20,7 @@ from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import VIDEOS
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.files import open_h5, text_of
+from mjsense.dataset.files import open_h5, text_of, video_options
 from mjsense.dataset.playback import ReplayInputs, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
@@ -149,7 +149,7 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     """Records the sensors of these episodes on their recorded states, under the numbers 0, 1, ..."""
     first = episodes[0]
     rate = Fraction(first.fps)
-    video = {"encoder_threads" if key == "threads" else key: value for key, value in first._recording.get("video", {}).items()}
+    video = video_options(first._recording)
     options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
     recorder = _core.Recorder(worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options)
     for start in range(0, len(episodes), worlds.sim.num_worlds):
@@ -240,9 +240,9 @@ def _compare(recorded: Episode, replayed: Episode, worlds: Any, otherwise: str) 
 
 def check_sensors(episodes: list[Episode], *, worlds: int = 4, threads: int = 0) -> Iterator[tuple[Episode, SensorCheck]]:
     """Yields the comparison of every episode."""
-    houses: dict[Path, list[Episode]] = {}
+    houses: dict[str, list[Episode]] = {}
     for episode in episodes:
-        houses.setdefault(episode.path.parent, []).append(episode)
+        houses.setdefault(episode.path.parent.name, []).append(episode)
     use_installed_ffmpeg()
     for chosen in houses.values():
         playing, otherwise = _worlds_of(chosen[0], min(worlds, len(chosen)), threads)

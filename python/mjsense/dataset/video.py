@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,11 +18,12 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.dataset.cache import Cache
+from mjsense.dataset.video_decoder import Decoder, Packets, have_av, to_array
 from mjsense.ffmpeg import use_installed_ffmpeg
 
 _CHUNK = 64  # frames that one start of ffmpeg decodes; a start costs as much as about 50 frames of 640x368
 _OPEN_DECODERS = 16
-_SKIP = 16  # frames that are decoded rather than skipped by a seek
+_LARGE_IMAGE = 100_000  # pixels; with smaller images, starting threads costs more than they save
 
 
 @dataclass(frozen=True)
@@ -56,68 +59,90 @@ def decoded(info: VideoInfo, pixels: np.ndarray) -> np.ndarray:
     return np.where(code > 0, (code - 1) / np.float32(65534) * np.float32(0.5) + np.float32(0.05), np.float32(0))
 
 
-class _AvDecoder:
-    """An open video. It decodes in one thread: DataLoader's workers run in parallel, and a fork copies no threads."""
-
-    def __init__(self, info: VideoInfo) -> None:
-        import av  # pyright: ignore[reportMissingImports]
-
-        self._fps = info.fps
-        self._container = av.open(str(info.path))
-        self._stream = self._container.streams.video[0]
-        self._stream.codec_context.thread_count = 1
-        assert self._stream.time_base is not None  # only streams that are being written have none
-        self._time_base = self._stream.time_base
-        self._frames = self._container.decode(self._stream)
-        self._next = 0
-
-    def frames_until(self, index: int) -> Iterator[tuple[int, Any]]:
-        """Decoded frames up to the frame ``index``, with their numbers: from the current position or from the key frame before it."""
-        if not self._next <= index < self._next + _SKIP:
-            self._container.seek(round(index / self._fps / self._time_base), stream=self._stream)
-            self._frames = self._container.decode(self._stream)
-        for frame in self._frames:
-            number = round((frame.pts or 0) * self._time_base * self._fps)
-            self._next = number + 1
-            yield number, frame
-            if number >= index:
-                return
+def _threads() -> int:
+    """Number of threads. The workers of a DataLoader run in parallel already."""
+    return 1 if multiprocessing.parent_process() else len(os.sched_getaffinity(0))
 
 
-def _have_av() -> bool:
-    try:
-        import av  # pyright: ignore[reportMissingImports]
-    except ImportError:
-        return False
-    return int(av.__version__.split(".")[0]) >= 18  # to_ndarray(threads=...)
+@dataclass
+class _Job:
+    """Frames of one video of a sample. It does not use the cache, because it may run in another thread."""
+
+    info: VideoInfo
+    indices: list[int]
+    found: dict[int, Any]
+    """Frames in the codec's format, which is half as large as rgb; only requested ones are converted."""
+    missing: list[int]
+    decoder: Decoder | None
+    new: list[tuple[int, Any]] = field(default_factory=list)
+    """All frames that were decoded, with their numbers."""
+
+    def run(self) -> list[np.ndarray]:
+        for t in self.missing:
+            if self.found[t] is None:
+                assert self.decoder is not None
+                decoded_now = self.decoder.until(t)
+                self.new += decoded_now
+                self.found |= {number: frame for number, frame in decoded_now if number in self.found}
+            if self.found[t] is None:
+                raise _no_frame(self.info, t)
+        return [self._image(self.found[t]) for t in self.indices]
+
+    def _image(self, frame: Any) -> np.ndarray:
+        return decoded(self.info, frame if isinstance(frame, np.ndarray) else to_array(frame, self.info.pixel_format))
+
+
+def _no_frame(info: VideoInfo, index: int) -> Exception:
+    return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
 
 
 class FrameReader:
     """Frames of all videos of a data set, with a cache of decoded ones."""
 
-    def __init__(self, cache: Cache) -> None:
-        self._cache = cache
+    def __init__(self, cache: Cache, tables: Cache) -> None:
+        self._cache, self._tables = cache, tables
         self._decoders = Cache(_OPEN_DECODERS, per_process=True)
-        self._av = _have_av()
+        self._pools = Cache(1, per_process=True)
+        self._av = have_av()
 
     def frame(self, info: VideoInfo, index: int) -> np.ndarray:
-        with self._cache.lock:
-            found = self._cache.find((info.path, index))
-            if found is None:
-                found = self._decode_av(info, index) if self._av else self._decode_program(info, index)
-        # One thread: with more, a frame keeps the converter's threads, and its copy in a forked process waits for them forever.
-        return decoded(info, found if isinstance(found, np.ndarray) else found.to_ndarray(format=info.pixel_format, threads=1))
+        return self.frames([(info, [index])])[0][0]
 
-    def _decode_av(self, info: VideoInfo, index: int) -> Any:
-        decoder = self._decoders.get(info.path, lambda: (_AvDecoder(info), 1))
-        found = None
-        # Frames stay in the codec's format, which is half as large as rgb; only requested ones are converted.
-        for number, frame in decoder.frames_until(index):
-            self._cache.add((info.path, number), frame, sum(plane.buffer_size for plane in frame.planes))
-            found = frame if number == index else None
-        if found is None:
-            raise self._missing(info, index)
-        return found
+    def frames(self, wanted: Sequence[tuple[VideoInfo, list[int]]]) -> list[list[np.ndarray]]:
+        """Frames of several videos. Those of different videos are decoded in parallel."""
+        with self._cache.lock:
+            jobs = [self._job(info, indices) for info, indices in wanted]
+            work = [job for job in jobs if job.missing]
+            if len(work) > 1 and work[0].info.width * work[0].info.height >= _LARGE_IMAGE and _threads() > 1:
+                pool = self._pools.get("pool", lambda: (ThreadPoolExecutor(_threads()), 1))
+                futures = [pool.submit(job.run) for job in jobs]
+                wait(futures)  # also if one fails: no decoder is in use after this call
+                results = [future.result() for future in futures]
+            else:
+                results = [job.run() for job in jobs]
+            for job in work:
+                size = sum(plane.buffer_size for plane in job.new[0][1].planes)
+                for number, frame in job.new:
+                    self._cache.add((job.info.path, number), frame, size)
+        return results
+
+    def _job(self, info: VideoInfo, indices: list[int]) -> _Job:
+        found = {t: self._cache.find((info.path, t)) for t in indices}
+        missing = sorted(t for t, frame in found.items() if frame is None)
+        if missing and not self._av:
+            for t in missing:  # one call decodes many frames
+                frame = self._cache.find((info.path, t))
+                found[t] = self._decode_program(info, t) if frame is None else frame
+            missing = []
+        decoder = self._decoders.get(info.path, lambda: (Decoder(self._packets(info)), 1)) if missing else None
+        return _Job(info, indices, found, missing, decoder)
+
+    def _packets(self, info: VideoInfo) -> Packets:
+        def read() -> tuple[Packets, int]:
+            packets = Packets(info.path, info.fps)
+            return packets, packets.bytes
+
+        return self._tables.get(info.path, read)
 
     def _decode_program(self, info: VideoInfo, index: int) -> Any:
         use_installed_ffmpeg()
@@ -142,11 +167,8 @@ class FrameReader:
             self._cache.add((info.path, first + i), pixels, size)
             found = pixels if first + i == index else found
         if found is None:
-            raise self._missing(info, index)
+            raise _no_frame(info, index)
         return found
-
-    def _missing(self, info: VideoInfo, index: int) -> Exception:
-        return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
 
 
 @checked

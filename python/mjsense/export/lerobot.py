@@ -8,14 +8,14 @@ import shutil
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.dataset import Episode, statistics
 from mjsense.export import lerobot_depth
-from mjsense.export.frame_statistics import frame_histograms
+from mjsense.export.frame_statistics import check_frames, frame_histograms
 from mjsense.export.mapping import Feature, Mapping, Source
 from mjsense.export.output import needs, new_output
 from mjsense.export.remux import Concatenation
@@ -23,6 +23,8 @@ from mjsense.export.remux import Concatenation
 FILES_PER_CHUNK = 1000
 DATA_FILE_MB, VIDEO_FILE_MB = 100, 200
 _TOLERANCE_S = 1e-4  # LeRobot's tolerance of times of frames
+Histograms = Callable[[Path, int, "int | Literal['key']"], tuple[np.ndarray, int]]
+"""A function with the arguments and the result of ``frame_histograms``."""
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 
 
@@ -34,7 +36,8 @@ def export_lerobot(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
-    statistics_frames: int = 0,
+    statistics_frames: int | Literal["key"] = 0,
+    histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
@@ -45,15 +48,18 @@ def export_lerobot(
         map: Features and cameras: a :class:`mjsense.export.Mapping`, a TOML file, or a dict of the same form.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all.
+        statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
+            by default every 20th, which takes a tenth of the time.
+        histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
+    check_frames(statistics_frames)
     source = Source(root, map=map, episodes=episodes, success=success)
     with new_output(out) as path:
-        writer = Writer(source, path, statistics_frames)
+        writer = Writer(source, path, statistics_frames, histograms)
         for n, episode in enumerate(source.episodes, 1):
             writer.add(episode)
             if progress:
@@ -100,7 +106,7 @@ def features_of(source: Source, codec: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def columns_of(source: Source, episode: Episode, position: int, first_index: int) -> dict[str, np.ndarray]:
+def columns_of(source: Source, episode: Episode, position: int, first_index: int, task_index: int) -> dict[str, np.ndarray]:
     """Columns of an episode: ``[T - 1, size]``, and ``[T - 1]`` of single numbers. The last observation has no action and is left out."""
     rows = source.rows(episode)
     length = episode.length - 1
@@ -110,7 +116,7 @@ def columns_of(source: Source, episode: Episode, position: int, first_index: int
     columns["frame_index"] = np.arange(length)
     columns["episode_index"] = np.full(length, position)
     columns["index"] = first_index + np.arange(length)
-    columns["task_index"] = np.full(length, source.tasks.index(episode.task))
+    columns["task_index"] = np.full(length, task_index)
     return {name: column[:, 0] if column.ndim == 2 and column.shape[1] == 1 else column for name, column in columns.items()}
 
 
@@ -246,17 +252,27 @@ def _place(file: int) -> dict[str, int]:
 class Writer:
     """A data set that is being written."""
 
-    def __init__(self, source: Source, path: Path, statistics_frames: int) -> None:
-        self._source, self._path = source, path
+    def __init__(self, source: Source, path: Path, statistics_frames: int | Literal["key"], histograms: Histograms = frame_histograms) -> None:
+        self._source, self._path, self._histograms = source, path, histograms
+        self._tasks: list[str] = []
         self._data, self._episodes = _Tables(path / "data"), _Tables(path / "meta/episodes")
         self._videos = {camera: _Videos(path / "videos" / image_key(camera), source.fps) for camera in source.cameras}
-        self._statistics, self._statistics_frames = Statistics(), statistics_frames
+        self._statistics = Statistics()
+        self._statistics_frames: int | Literal["key"] = statistics_frames
         self._count = self._frames = 0
         self._codec: dict[str, Any] = {}
 
-    def add(self, episode: Episode) -> None:
+    def add(self, episode: Episode, source: Source | None = None) -> None:
+        """Appends an episode.
+
+        Args:
+            source: The recording that contains it, if it is not the writer's own; its features must be the same.
+        """
+        self._source = source or self._source
         pa = needs("pyarrow")
-        columns = columns_of(self._source, episode, self._count, self._frames)
+        if episode.task not in self._tasks:
+            self._tasks.append(episode.task)
+        columns = columns_of(self._source, episode, self._count, self._frames, self._tasks.index(episode.task))
         length = episode.length - 1
         entry: dict[str, Any] = {"episode_index": self._count, "tasks": [episode.task], "length": length}
         entry |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + length}
@@ -271,7 +287,7 @@ class Writer:
                 path = self._source.video(episode, camera).path
                 self._codec = self._codec or codec_of(path)
                 place, first = videos.add(path, length)
-                histograms[key] = frame_histograms(path, length, self._statistics_frames)
+                histograms[key] = self._histograms(path, length, self._statistics_frames)
             entry |= {f"videos/{key}/{name}": value for name, value in place.items()}
             entry |= {f"videos/{key}/from_timestamp": first, f"videos/{key}/to_timestamp": first + length / float(self._source.fps)}
         for name, found in self._statistics.add(columns, histograms).items():
@@ -298,11 +314,11 @@ class Writer:
         self._episodes.flush()
         for videos in self._videos.values():
             videos.close()
-        _write_tasks(self._path / "meta/tasks.parquet", self._source.tasks)
+        _write_tasks(self._path / "meta/tasks.parquet", self._tasks)
         write_json(self._path / "meta/stats.json", {name: lists(found) for name, found in self._statistics.all().items()})
         info = {
             "codebase_version": "v3.0", "robot_type": self._source.robot or None, "total_episodes": self._count, "total_frames": self._frames,
-            "total_tasks": len(self._source.tasks), "chunks_size": FILES_PER_CHUNK, "data_files_size_in_mb": DATA_FILE_MB,
+            "total_tasks": len(self._tasks), "chunks_size": FILES_PER_CHUNK, "data_files_size_in_mb": DATA_FILE_MB,
             "video_files_size_in_mb": VIDEO_FILE_MB, "fps": number(self._source.fps), "splits": {"train": f"0:{self._count}"},
             "data_path": f"data/{_PLACE}.parquet", "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
             "features": features_of(self._source, self._codec),

@@ -123,5 +123,5 @@ class DrivePage(Viewer):
         return super()._handle_events() or bool(presses)
 
     def _show(self) -> None:
-        self._stage.set_poses(*self._source.poses(0))
+        self._stage.show(lambda name: self._source.field(name, 0))
         self._pictures.refresh(lambda name: self._source.picture(name, 0))

@@ -16,6 +16,7 @@ from mjsense.dataset import Dataset, Episode
 from mjsense.view import surfaces
 from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES
+from mjsense.view.soft import fields_of
 from mjsense.view.source import LiveSource
 from mjsense.view.stage import MIN_REACH, VISIBLE_GROUPS, Stage, node
 from mjsense.view.viewer import serve, stop
@@ -28,8 +29,8 @@ class Moment(NamedTuple):
     """s since the start."""
     model: Any
     """The model from now on; None: unchanged."""
-    xpos: np.ndarray
-    xquat: np.ndarray
+    fields: dict[str, np.ndarray]
+    """What the picture of the model depends on, of MjData."""
     values: dict[str, np.ndarray]
     """Rows of streams."""
     images: dict[str, np.ndarray]
@@ -64,7 +65,8 @@ def _live(source: LiveSource, world: int, count: int, full: bool) -> Iterator[Mo
     for step in range(count):
         values = {name: source.value(name, world) for name in streams}
         images = {name: source.picture(name, world) for name in pictures}
-        yield Moment(step * source.period, source.model(world) if source.version != shown else None, *source.poses(world), values, images)
+        fields = {name: source.field(name, world).copy() for name in fields_of(source.sim.model)}
+        yield Moment(step * source.period, source.model(world) if source.version != shown else None, fields, values, images)
         shown = source.version
         source.step()
 
@@ -77,7 +79,7 @@ def _recorded(dataset: Dataset, episode: Episode, full: bool) -> Iterator[Moment
         rows = {name: episode[name] for name in names if name in episode}
         videos = {name: episode.video(name) for name, stream in dataset.streams.items() if stream.kind == "video"}
     for t, data in episode.replay(model=model):
-        yield Moment(t / float(dataset.fps), None if t else model, data.xpos.copy(), data.xquat.copy(),
+        yield Moment(t / float(dataset.fps), None if t else model, {name: getattr(data, name).copy() for name in fields_of(model)},
                      {name: np.asarray(values[t], np.float64).reshape(-1) for name, values in rows.items()},
                      {name: video[t] for name, video in videos.items()})  # fmt: skip
 
@@ -92,11 +94,11 @@ def _write_viser(moments: Iterator[Moment], period: float, path: Path) -> None:
         for moment in moments:
             if moment.model is not None:
                 stage.set_model(moment.model)
-            stage.set_poses(moment.xpos, moment.xquat)
+            stage.show(moment.fields.__getitem__)
             if serializer is None:
-                xmat = np.stack([rotation_of(quaternion) for quaternion in moment.xquat])
+                xmat = np.stack([rotation_of(quaternion) for quaternion in moment.fields["xquat"]])
                 camera = server.initial_camera
-                camera.position, camera.look_at, camera.fov = first_view(moment.model, moment.xpos, xmat)
+                camera.position, camera.look_at, camera.fov = first_view(moment.model, moment.fields["xpos"], xmat)
                 serializer = server.get_scene_serializer()
             serializer.insert_sleep(period)
         if serializer is not None:
@@ -120,7 +122,7 @@ def _write_rerun(moments: Iterator[Moment], period: float, path: Path) -> None:
         if moment.model is not None:
             bodies = _log_model(recording, rr, moment.model)
             sent = np.full((len(bodies), 7), np.nan)
-        poses = np.concatenate([moment.xpos, moment.xquat], 1)
+        poses = np.concatenate([moment.fields["xpos"], moment.fields["xquat"]], 1)
         for body in np.flatnonzero((poses != sent).any(1)).tolist():
             recording.log(bodies[body], rr.Transform3D(translation=poses[body, :3], quaternion=rr.Quaternion(xyzw=poses[body, [4, 5, 6, 3]])))
         sent = poses

@@ -10,15 +10,14 @@ import numpy as np
 from mjsense.drawing import DebugShapes
 from mjsense.view import geometry
 
-_NODE = "/shapes"
 _ROUND_LIMIT = 400  # spheres; more of them are drawn as points
 
 
 class ShapeLayer:
     """Draws spheres, arrows, lines and cylinders, one node for each kind."""
 
-    def __init__(self, server: Any) -> None:
-        self._server = server
+    def __init__(self, server: Any, node: str = "/shapes") -> None:
+        self._server, self._node = server, node
         self._nodes: list[Any] = []
 
     def show(self, shapes: DebugShapes) -> None:
@@ -28,7 +27,7 @@ class ShapeLayer:
             for kind, add in (("sphere", self._spheres), ("arrow", self._arrows), ("line", self._lines), ("cylinder", self._cylinders)):
                 part = shapes.of(kind)
                 if len(part):
-                    self._nodes.append(add(f"{_NODE}/{kind}", part))
+                    self._nodes.append(add(f"{self._node}/{kind}", part))
             kept = {node.name for node in self._nodes}
             for node in old:
                 if node.name not in kept:  # adding a node of the same name has replaced the others

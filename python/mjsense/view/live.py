@@ -47,7 +47,7 @@ class LiveViewer(Viewer):
             for box in self._drawn.values():
                 self._later(box, self._draw)
         with tabs.add_tab("Cameras"):
-            self._pictures = Pictures(gui, source.pictures(), self._later, self._show)
+            self._pictures = Pictures(gui, source.pictures(), self._later, self._show, points=lambda name: source.image_points(name, self._world))
         with tabs.add_tab("Curves"):
             self._curves = Curves(gui, source.streams(), self._later)
         with tabs.add_tab("Control"):
@@ -136,7 +136,7 @@ class LiveViewer(Viewer):
         source, world = self._source, self._world
         if source.version != self._version:
             self._model_changed()
-        self._stage.set_poses(*source.poses(world))
+        self._stage.show(lambda name: source.field(name, world))
         if self._layer_used:
             self._draw()
         now = time.perf_counter()

@@ -9,6 +9,8 @@ from typing import Any
 from mjsense._core import robot_names
 from mjsense.configs import SceneCfg, SceneFileCfg
 from mjsense.dataset import Dataset
+from mjsense.dataset.files import INDEX
+from mjsense.dataset.remote import is_address
 from mjsense.env import TaskEnv
 from mjsense.errors import UnknownNameError
 from mjsense.scene import Scene
@@ -25,9 +27,11 @@ _PERIOD = 1 / 60  # s, about: control step of a model that is viewed alone
 
 
 def is_recording(path: str | Path) -> bool:
-    """Whether this is an existing file or folder of a recording."""
+    """Whether this is an existing file or folder of a recording, its index, or the address of one."""
+    if is_address(path):
+        return True
     path = Path(path)
-    return path.is_dir() or path.suffix in (".h5", ".hdf5")
+    return path.is_dir() or path.suffix in (".h5", ".hdf5") or path.name == INDEX
 
 
 def options_of(given: dict[str, Any]) -> dict[str, Any]:
@@ -47,10 +51,14 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
         return thing
     if isinstance(thing, Simulation):
         return LiveSource(thing)
+    if hasattr(thing, "warp_model"):
+        raise NotImplementedError("mjs.view is not available with backend='warp'; use backend='cpu'")
     if isinstance(thing, TaskEnv):
         thing = thing.worlds
     if isinstance(thing, TaskVectorEnv):
         return TaskSource(thing)
+    if isinstance(thing, (str, Path)) and is_address(thing):
+        return Dataset(thing)
     if isinstance(thing, Path) or (isinstance(thing, str) and Path(thing).exists() and thing not in task_names()):
         path = Path(thing)
         if is_recording(path):
@@ -68,7 +76,9 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
     try:
         return TaskSource(make_vec(options.pop("task", "pick"), scene=thing, **options), title)
     except UnknownNameError as error:
-        raise UnknownNameError(f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}") from None
+        raise UnknownNameError(
+            f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}"
+        ) from None
 
 
 def _model(path: Path, worlds: int, seed: int) -> LiveSource:

@@ -12,7 +12,7 @@ from mjsense.dataset.episode import VIDEOS
 from mjsense.drawing import DebugShapes
 from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES, Curves, StreamInfo
-from mjsense.view.pictures import Pictures
+from mjsense.view.pictures import Pictures, point_streams
 from mjsense.view.poses import POSE, PoseStream
 from mjsense.view.viewer import Viewer
 
@@ -68,7 +68,7 @@ class RecordingViewer(Viewer):
         # Colour images first.
         videos = sorted((stream for stream in dataset.streams.values() if stream.kind == "video"), key=lambda stream: stream.dtype.kind != "u")
         with tabs.add_tab("Videos"):
-            self._pictures = Pictures(gui, [stream.name.removeprefix(VIDEOS) for stream in videos], self._later, self._show, shown=2)
+            self._pictures = Pictures(gui, [stream.name.removeprefix(VIDEOS) for stream in videos], self._later, self._show, shown=2, points=self._image_points)
         with tabs.add_tab("Curves"):
             self._curves = Curves(gui, curve_streams(dataset), self._later, self._rows, lambda: max(self._shown, 0))
         self._filter(episode)
@@ -130,6 +130,10 @@ class RecordingViewer(Viewer):
         self._time.value = min(max(t, 0), self._episode.length - 1)
         self._show()
 
+    def _image_points(self, camera: str) -> np.ndarray | None:
+        names = point_streams(camera, self._dataset.streams)
+        return np.concatenate([self._episode[name][max(self._shown, 0)] for name in names if name in self._episode] or [np.zeros((0, 2))]) if names else None
+
     def _rows(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         rows = np.asarray(self._episode[name], np.float64) if name in self._episode else np.zeros((0, 1))
         return np.arange(len(rows)) / float(self._dataset.fps), rows
@@ -160,7 +164,7 @@ class RecordingViewer(Viewer):
         t = self._shown = min(int(self._time.value), self._episode.length - 1)
         if self._model is not None:
             self._episode.set_state(self._model, self._data, t)
-            self._stage.set_poses(self._data.xpos, self._data.xquat)
+            self._stage.show(lambda name: getattr(self._data, name))
             if self._drawn:
                 self._draw()
         self._stale = True

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +16,11 @@ from mjsense.simulation import Simulation
 from mjsense.vector import TaskVectorEnv
 from mjsense.view.camera import View, first_view
 from mjsense.view.curves import MAX_CURVES, StreamInfo
+from mjsense.view.pictures import point_streams
 from mjsense.view.poses import POSE, PoseStream
 
-_CONTACTS = "contacts"
+_CONTACTS, _PLAN = "contacts", "plan"
+_PLAN_COLOURS = ((0.1, 0.5, 0.9, 1), (0.95, 0.6, 0.1, 1), (0.2, 0.7, 0.3, 1), (0.7, 0.3, 0.8, 1))  # of successive parts
 _CONTACT_COLOUR = (0.9, 0.3, 0.1, 1.0)
 
 
@@ -74,10 +77,9 @@ class LiveSource:
         """The model with the values of one world."""
         return self.sim.model_of(world)
 
-    def poses(self, world: int) -> tuple[np.ndarray, np.ndarray]:
-        """Positions [nbody, 3] and orientations [nbody, 4] of the bodies."""
-        data = self.sim.data
-        return data.xpos[world], data.xquat[world]
+    def field(self, name: str, world: int) -> np.ndarray:
+        """A field of MjData in a world."""
+        return getattr(self.sim.data, name)[world]
 
     def streams(self) -> dict[str, StreamInfo]:
         """Streams that can be drawn as curves, by name."""
@@ -107,6 +109,10 @@ class LiveSource:
             return own[world]
         sensor, _, field = name.rpartition("/")
         return self.sim.scene[sensor].fields[field][world]
+
+    def image_points(self, name: str, world: int) -> np.ndarray | None:
+        """Points on an image, as fractions [N, 2]; None: it never has any."""
+        return None
 
     def _user_rows(self) -> dict[str, tuple[Sensor, np.ndarray]]:
         """Rows of the sensors that are written in Python, as they were last computed."""
@@ -157,18 +163,22 @@ class LiveSource:
             except (ValueError, TypeError, RuntimeError):
                 continue  # this sensor never has anything to draw
             found.append(name)
-        return [*found, *self._pose_rows(), _CONTACTS]
+        return [*found, *self._pose_rows(), *([_PLAN] if self.policy is not None else []), _CONTACTS]
 
     def shapes(self, world: int, names: list[str]) -> DebugShapes:
         """The shapes of one world."""
         poses = self._pose_rows()
-        sensors = [name for name in names if name not in poses and name != _CONTACTS]
+        sensors = [name for name in names if name not in poses and name not in (_CONTACTS, _PLAN)]
         shapes = self.sim.debug_shapes(world, sensors) if sensors else DebugShapes(world, float(self.sim.model.stat.meansize))
         if poses:
             model, data = self.sim.model, self.sim.data
             for name in (name for name in names if name in poses):
                 frame, rows = poses[name]
                 PoseStream(name, frame).draw(shapes, rows[world], model, data.xpos[world], data.xmat[world])
+        if _PLAN in names:
+            for k, points in enumerate(self._planned(world)):
+                for start, end in pairwise(points):
+                    shapes.add_line(start, end, _PLAN_COLOURS[k % len(_PLAN_COLOURS)], 3.0)
         if _CONTACTS in names:
             for contact in self._contacts(world):
                 shapes.add_sphere(contact[:3], 0.05 * shapes.meansize, _CONTACT_COLOUR)
@@ -177,6 +187,10 @@ class LiveSource:
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {}
+
+    def _planned(self, world: int) -> list[np.ndarray]:
+        """Positions of the tool along each part of the policy's plan."""
+        return []
 
     def _contacts(self, world: int) -> np.ndarray:
         """Point and normal of each contact, float64 [n, 6]."""
@@ -279,9 +293,16 @@ class TaskSource(LiveSource):
                 return rows[name]
         return super()._row(name)
 
+    def image_points(self, name: str, world: int) -> np.ndarray | None:
+        names = point_streams(name.split("/")[0], self._env.rows)
+        return np.concatenate([self._env.rows[one][world] for one in names]) if names else None
+
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
         return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()
                 if spec.unit == POSE and PoseStream.can_draw(spec.frame)}  # fmt: skip
+
+    def _planned(self, world: int) -> list[np.ndarray]:
+        return [points for _, points in self._env.planned_paths(world)]
 
     def controls(self) -> list[Control]:
         space: Any = self._env.single_action_space

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bodies of one world in the browser: meshes sent once, and poses sent when they change."""
+"""One world in the browser: meshes sent once, and poses sent when they change."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.view import surfaces
+from mjsense.view.soft import Read, SoftParts
 
 VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups that MuJoCo shows by default."""
@@ -30,12 +31,15 @@ class Stage:
     def __init__(self, server: Any) -> None:
         self._server, self._model = server, None
         self._frames: dict[int, Any] = {}
-        self._geoms: dict[int, tuple[Any, tuple[Any, ...]]] = {}
+        self._solids: dict[tuple[str, int], tuple[Any, tuple[Any, ...]]] = {}  # by "geom" or "site", and index
+        self._soft = SoftParts(server)
         self._lights: list[Any] = []
         self._light_key: bytes = b""
         self._sent = np.zeros((0, 7))
         self.groups: set[int] = set(VISIBLE_GROUPS)
-        """Geom groups that are shown."""
+        """Groups that are shown, of geoms, flexes, skins and tendons, and of sites if these are shown."""
+        self.sites = False
+        """Whether sites are shown."""
 
     def set_model(self, model: Any) -> None:
         """Shows a model with its sizes, colours and lights. Unchanged geoms are not sent again."""
@@ -46,9 +50,17 @@ class Stage:
                 self._sent = np.full((model.nbody, 7), np.nan)
             self._model = model
             reach = max(MIN_REACH, 2 * float(model.stat.extent))
-            for geom in range(model.ngeom):
-                self._set_geom(model, geom, reach)
+            for kind, count, seen in (("geom", model.ngeom, model), ("site", model.nsite, surfaces.SitesAsGeoms(model))):
+                for index in range(count):
+                    self._set_solid(model, seen, kind, index, reach)
+            self._soft.set_model(model, self.groups)
             self._set_lights(model)
+
+    def show(self, read: Read) -> None:
+        """Shows the present state of a world."""
+        with self._server.atomic():
+            self.set_poses(read("xpos"), read("xquat"))
+            self._soft.update(read)
 
     def set_poses(self, positions: np.ndarray, quaternions: np.ndarray) -> int:
         """Moves the bodies. Returns how many poses were sent.
@@ -69,19 +81,19 @@ class Stage:
         self._sent[changed] = poses[changed]
         return count
 
-    def show_groups(self, groups: set[int]) -> None:
-        """Shows the geoms of these groups, and hides the others."""
-        self.groups = groups
+    def show_groups(self, groups: set[int], sites: bool = False) -> None:
+        """Shows what is in these groups, and hides everything else."""
+        self.groups, self.sites = groups, sites
         if self._model is not None:
             self.set_model(self._model)
 
     def _structure(self, model: Any) -> tuple[Any, ...]:
-        return model.nbody, model.ngeom, model.nlight, model.geom_bodyid.tobytes(), bytes(model.names)
+        return model.nbody, model.ngeom, model.nsite, model.nlight, model.geom_bodyid.tobytes(), bytes(model.names)
 
     def _clear(self) -> None:
         for handle in (*self._lights, *self._frames.values()):  # lights may be below frames
             handle.remove()
-        self._frames, self._geoms, self._lights, self._light_key = {}, {}, [], b""
+        self._frames, self._solids, self._lights, self._light_key = {}, {}, [], b""
 
     def _frame(self, model: Any, body: int) -> str:
         name = f"/bodies/{node(model, 'body', body)}"
@@ -91,22 +103,22 @@ class Stage:
             self._frames[body] = self._server.scene.add_frame(name, show_axes=False, **at)
         return name
 
-    def _set_geom(self, model: Any, geom: int, reach: float) -> None:
-        pose = model.geom_pos[geom], model.geom_quat[geom]
-        shown = int(model.geom_group[geom]) in self.groups
-        old, old_key = self._geoms.get(geom, (None, None))
-        key = surfaces.key_of(model, geom) if shown else ()
+    def _set_solid(self, model: Any, seen: Any, kind: str, index: int, reach: float) -> None:
+        pose = seen.geom_pos[index], seen.geom_quat[index]
+        shown = int(seen.geom_group[index]) in self.groups and (kind == "geom" or self.sites)
+        old, old_key = self._solids.get((kind, index), (None, None))
+        key = surfaces.key_of(seen, index) if shown else ()
         if key == old_key:
             if old is not None and not (np.allclose(old.position, pose[0]) and np.allclose(old.wxyz, pose[1])):
                 old.position, old.wxyz = pose
             return
-        surface = surfaces.of_geom(model, geom, reach) if shown else None
+        surface = surfaces.of_geom(seen, index, reach) if shown else None
         if surface is None:
             if old is not None:
                 old.remove()
-            self._geoms[geom] = None, key
+            self._solids[kind, index] = None, key
             return
-        name = f"{self._frame(model, int(model.geom_bodyid[geom]))}/{node(model, 'geom', geom)}"
+        name = f"{self._frame(model, int(seen.geom_bodyid[index]))}/{node(model, kind, index)}"
         scene = self._server.scene  # a node of the same name is replaced
         if surface.glb is not None:
             handle = scene.add_glb(name, surface.glb, position=pose[0], wxyz=pose[1])
@@ -114,7 +126,7 @@ class Stage:
             rgb, alpha = (np.clip(surface.rgba[:3], 0, 1) * 255).round().astype(int), float(surface.rgba[3])
             handle = scene.add_mesh_simple(name, surface.shape.vertices, surface.shape.faces, color=tuple(rgb.tolist()),
                                            opacity=alpha if alpha < 1 else None, position=pose[0], wxyz=pose[1])  # fmt: skip
-        self._geoms[geom] = handle, key
+        self._solids[kind, index] = handle, key
 
     def _set_lights(self, model: Any) -> None:
         names = ("active", "type", "pos", "dir", "ambient", "diffuse", "castshadow", "bodyid")

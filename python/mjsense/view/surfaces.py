@@ -33,6 +33,17 @@ class Surface(NamedTuple):
     """uint8 [H, W, 3], if there is a texture."""
 
 
+class SitesAsGeoms:
+    """A model whose sites are read as geoms, for the functions of this module."""
+
+    def __init__(self, model: Any) -> None:
+        self._model = model
+        self.geom_dataid = np.full(model.nsite, -1)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name.replace("geom_", "site_"))
+
+
 def key_of(model: Any, geom: int) -> tuple[Any, ...]:
     """The values of the model that the surface of a geom depends on."""
     material = int(model.geom_matid[geom])

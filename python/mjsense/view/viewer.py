@@ -101,9 +101,10 @@ class Viewer:
         (handle.on_click if hasattr(handle, "on_click") else handle.on_update)(note)
 
     def _add_groups(self, gui: Any) -> None:
-        boxes = [gui.add_checkbox(f"Geom group {k}", initial_value=k in self._stage.groups) for k in range(6)]
-        for box in boxes:
-            self._later(box, lambda: self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}))
+        boxes = [gui.add_checkbox(f"Group {k}", initial_value=k in self._stage.groups) for k in range(6)]
+        sites = gui.add_checkbox("Sites", initial_value=self._stage.sites)
+        for box in (*boxes, sites):
+            self._later(box, lambda: (self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}, sites.value), self._show())[1])
 
     def _add_play(self, gui: Any) -> None:
         """Adds the button that starts and stops time."""

@@ -23,6 +23,7 @@
 #include "mjsense/app/field_options.h"
 #include "mjsense/app/help.h"
 #include "mjsense/app/list_command.h"
+#include "mjsense/app/progress.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/app/scan_command.h"
 #include "mjsense/app/schema.h"
@@ -79,25 +80,37 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
       ->type_name("FILE");
   app.add_flag_callback(
       "--no-sheet", [&options] { options.sheet = false; }, "Do not write a contact sheet.");
-  // Options of the Python package (mjsense/cluster), which handles a command with --ray itself.
-  const auto add_ray = [&](const char* name, const char* type, const char* help) {
+  // Options of the Python package, which handles a command with --ray or --format itself.
+  const auto add_python = [&](const char* name, const char* type, const char* help) {
     app.add_option_function<std::string>(
            name,
            [name](const std::string&) {
              throw ValueError(fmt::format(
-                 "{} needs the Python package and --ray: run python -m mjsense record", name));
+                 "{} needs the Python package, and --ray or --format: run python -m mjsense record",
+                 name));
            },
            help)
         ->type_name(type);
   };
-  add_ray("--ray", "ADDRESS",
-          "Record on a Ray cluster: local (the CPUs of this machine), auto, or its address.");
-  add_ray("--shard-attempts", "N", "With --ray: attempts of one task of the cluster; default 16.");
-  add_ray("--ray-working-dir", "DIR", "With --ray: directory with your code, sent to the workers.");
-  add_ray("--ray-pip", "NAMES",
-          "With --ray: Python packages that workers install, separated by commas.");
+  add_python("--ray", "ADDRESS",
+             "Record on a Ray cluster: local (the CPUs of this machine), auto, or its address.");
+  add_python("--shard-attempts", "N",
+             "With --ray: attempts of one task of the cluster; default 16.");
+  add_python("--ray-working-dir", "DIR",
+             "With --ray: directory with your code, sent to the workers.");
+  add_python("--ray-pip", "NAMES",
+             "With --ray: Python packages that workers install, separated by commas.");
+  add_python("--format", "FORMAT", "lerobot: write a LeRobot data set (v3.0) instead of HDF5.");
+  add_python("--map", "FILE", "With --format: TOML file that chooses features and cameras.");
+  app.add_flag_callback(
+      "--keep-recording",
+      [] {
+        throw ValueError(
+            "--keep-recording needs the Python package and --format: run python -m mjsense record");
+      },
+      "With --format: keep the recording itself too.");
   app.add_flag("--json", options.json, "Print the summary as JSON.");
-  app.add_flag("-q,--quiet", options.quiet, "Do not show progress.");
+  app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors.");
   add_examples(app, {{"mjsense record pick --episodes 8 --worlds 4 --out data",
                       "Record eight episodes of the task pick, four at a time."},
                      {"mjsense record open --scene kitchen:7 --robot rby1 --depth --out data",
@@ -169,7 +182,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
 
 struct PathOptions {
   std::string path, sheet, ffmpeg;
-  bool json = false, decode = false;
+  bool json = false, decode = false, quiet = false;
 };
 
 CLI::App& add_path_command(CLI::App& program, const char* name, const char* help,
@@ -244,6 +257,7 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
   CLI::App& verify_app = add_path_command(
       program, "verify", "Check that a recording is complete and undamaged.", verify_options);
   verify_app.add_flag("--decode", verify_options.decode, "Decode every frame of the videos.");
+  verify_app.add_flag("-q,--quiet", verify_options.quiet, "Print nothing but errors.");
   verify_app.add_option("--ffmpeg", verify_options.ffmpeg, "Path of the ffmpeg program.")
       ->type_name("PATH");
   CLI::App& repair_app = add_path_command(
@@ -365,9 +379,15 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     return 0;
   }
   if (verify_app.parsed()) {
-    const replay::VerifyResult result = replay::verify(
-        existing(verify_options.path), {verify_options.decode, verify_options.ffmpeg});
-    print(verify_options.json ? result.json() : result.text());
+    const replay::VerifyResult result = [&] {
+      StatusLine line(verify_options.quiet);
+      return replay::verify(existing(verify_options.path),
+                            {.decode = verify_options.decode,
+                             .ffmpeg = verify_options.ffmpeg,
+                             .progress = [&](const std::string& text) { line.show(text); }});
+    }();
+    if (!verify_options.quiet || verify_options.json || !result.ok())
+      print(verify_options.json ? result.json() : result.text());
     return result.ok() ? 0 : kFailed;
   }
   const replay::RepairResult result = replay::repair(existing(repair_options.path));

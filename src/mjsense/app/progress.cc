@@ -39,6 +39,19 @@ std::string progress_text(const rollout::RecordProgress& p) {
   return text;
 }
 
+StatusLine::StatusLine(bool quiet) : enabled_(!quiet && isatty(STDERR_FILENO) != 0) {}
+
+StatusLine::~StatusLine() {
+  if (enabled_) print_stderr_raw("\r\033[K");
+}
+
+void StatusLine::show(const std::string& text) {
+  const auto now = std::chrono::steady_clock::now();
+  if (!enabled_ || now < due_) return;
+  due_ = now + std::chrono::milliseconds(100);
+  print_stderr_raw("\r\033[K" + text.substr(0, terminal_width(STDERR_FILENO) - 1));
+}
+
 ProgressLine::ProgressLine(std::string title, bool quiet)
     : title_(std::move(title)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 

@@ -4,6 +4,7 @@
 // each episode. The title is printed once, when the recording has begun, so that an error in the
 // configuration is printed without it.
 
+#include <chrono>
 #include <string>
 
 #include "mjsense/rollout/record_job.h"
@@ -25,6 +26,20 @@ class ProgressLine {
   std::string text_, printed_;
   int shown_ended_ = -1;
   double shown_at_ = -1e9;
+};
+
+// A text on stderr that is rewritten, if that is a terminal; the destructor clears it.
+class StatusLine {
+ public:
+  explicit StatusLine(bool quiet);
+  ~StatusLine();
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+  void show(const std::string& text);
+
+ private:
+  bool enabled_;
+  std::chrono::steady_clock::time_point due_;  // before this time a text is not shown
 };
 
 // "3/8 episodes  100 % success  412 steps/s  824 frames/s  0:42 left"

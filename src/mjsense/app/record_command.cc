@@ -170,7 +170,7 @@ int run_record(const RecordOptions& options) {
   }
   if (options.json) {
     fmt::print("{}", summary_json(summary, sheet));
-  } else {
+  } else if (!options.quiet) {
     fmt::print("{}", summary_text(summary, sheet));
   }
   for (const std::string& damage : summary.damage) print_stderr("mjsense: {}\n", damage);

@@ -19,27 +19,43 @@ class ContentKey {
  public:
   template <class T>
   ContentKey& add(std::span<T> values) {
-    mix(values.size());
+    own_.mix(values.size());
     const auto bytes = std::as_bytes(values);
     std::size_t at = 0;
-    for (; at + 8 <= bytes.size(); at += 8) mix(word(bytes.data() + at, 8));
-    if (at < bytes.size()) mix(word(bytes.data() + at, bytes.size() - at));
+    // Each step of a hash waits for the step before it, so large arrays have several hashes in turns.
+    if (constexpr std::size_t kRow = 8 * kParts; bytes.size() >= 8 * kRow) {
+      Hash parts[kParts];
+      for (; at + kRow <= bytes.size(); at += kRow)
+        for (std::size_t i = 0; i < kParts; ++i) parts[i].mix(word(bytes.data() + at + 8 * i, 8));
+      for (const Hash& part : parts) {
+        own_.mix(part.a);
+        own_.mix(part.b);
+      }
+    }
+    for (; at + 8 <= bytes.size(); at += 8) own_.mix(word(bytes.data() + at, 8));
+    if (at < bytes.size()) own_.mix(word(bytes.data() + at, bytes.size() - at));
     return *this;
   }
   auto operator<=>(const ContentKey&) const = default;
 
  private:
+  static constexpr std::size_t kParts = 4;
+  struct Hash {
+    std::uint64_t a = 0x243F6A8885A308D3u, b = 0x13198A2E03707344u;
+
+    void mix(std::uint64_t w) {
+      a = std::rotl((a ^ w) * 0x9E3779B97F4A7C15u, 29);
+      b = std::rotl((b + w) * 0xC2B2AE3D27D4EB4Fu, 31) ^ a;
+    }
+    auto operator<=>(const Hash&) const = default;
+  };
   static std::uint64_t word(const std::byte* from, std::size_t count) {
     std::uint64_t w = 0;
     std::memcpy(&w, from, count);
     return w;
   }
-  void mix(std::uint64_t w) {
-    a_ = std::rotl((a_ ^ w) * 0x9E3779B97F4A7C15u, 29);
-    b_ = std::rotl((b_ + w) * 0xC2B2AE3D27D4EB4Fu, 31) ^ a_;
-  }
 
-  std::uint64_t a_ = 0x243F6A8885A308D3u, b_ = 0x13198A2E03707344u;
+  Hash own_;
 };
 
 // Cache of objects of one type. It holds weak references only, so an object is released with its

@@ -29,6 +29,12 @@ struct Phase {
   int number;
 };
 
+// A part of a planned motion: the way of one tool.
+struct PlannedPath {
+  std::string_view phase;
+  std::vector<Pose> poses;  // X_WT
+};
+
 class Policy {
  public:
   virtual ~Policy() = default;
@@ -58,6 +64,8 @@ class Policy {
   // Why the policy gave up, or why it last started again, in a few words. The same reason always
   // has the same words. "" if it did neither, or if the reason is unknown.
   virtual std::string failure(int /*world*/) const { return ""; }
+  // The motion that the policy has planned in this world, for viewers. Empty: it has no plan.
+  virtual std::vector<PlannedPath> planned_paths(const World& /*world*/) const { return {}; }
   // Sensors that this policy adds to the suite. They refer to this policy.
   virtual std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const { return {}; }
 };

@@ -4,6 +4,7 @@
 // steeply than its horizon do not hit the mesh again. Most shadow rays do, so they need not be cast
 // against the mesh on which they start.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -31,15 +32,20 @@ class Horizons {
   static constexpr int kMaxRequests = 50;
 
   explicit Horizons(const Clusters& clusters) {
-    for (std::size_t i = kClusterSize * clusters.blocks.size(); i-- > 0;) {
-      const int face = clusters.blocks[i / kClusterSize].face[i % kClusterSize];
-      if (slots_.size() <= static_cast<std::size_t>(face)) slots_.resize(face + 1);
+    const std::size_t lanes = kClusterSize * clusters.blocks.size();
+    slots_.resize(lanes);
+    planes_.resize(lanes);
+    int last = -1;
+    for (std::size_t i = lanes; i-- > 0;) {
+      const TriangleBlock& block = clusters.blocks[i / kClusterSize];
+      const int lane = static_cast<int>(i % kClusterSize), face = block.face[lane];
       // Unused lanes repeat the first lane of their block; the lowest index wins.
       slots_[face] = static_cast<int>(i);
+      planes_[face] = plane_of(block, lane);
+      last = std::max(last, face);
     }
-    planes_.reserve(slots_.size());
-    for (const int slot : slots_)
-      planes_.push_back(plane_of(clusters.blocks[slot / kClusterSize], slot % kClusterSize));
+    slots_.resize(last + 1);
+    planes_.resize(last + 1);
     sines_ = std::make_unique<std::atomic<std::uint8_t>[]>(kOctants * slots_.size());
   }
 

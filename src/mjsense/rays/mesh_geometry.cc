@@ -64,13 +64,16 @@ void check_built(RTCDevice device, const std::string& what) {
 }
 
 SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
-                            std::span<const int> faces) {
+                            std::span<const int> faces, BuildQuality quality) {
   const std::string what =
       fmt::format("a mesh of {} vertices and {} faces", vertices.size() / 3, faces.size() / 3);
   SceneHandle scene(rtcNewScene(device));
   rtcSetSceneFlags(scene.get(), kSceneFlags);
-  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
+  const RTCBuildQuality built =
+      quality == BuildQuality::kHigh ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_LOW;
+  rtcSetSceneBuildQuality(scene.get(), built);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  if (quality == BuildQuality::kFast) rtcSetGeometryBuildQuality(geometry, built);
   void* v = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                     3 * sizeof(float), vertices.size() / 3);
   void* f = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
@@ -90,15 +93,20 @@ SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
 }
 
 std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
-                                                  std::span<const int> faces, bool clusters) {
+                                                  std::span<const int> faces, bool clusters,
+                                                  BuildQuality quality) {
   static ContentCache<MeshGeometry> all;
-  const ContentKey key = ContentKey().add(vertices).add(faces).add(std::span(&clusters, 1));
+  const ContentKey key = ContentKey()
+                             .add(vertices)
+                             .add(faces)
+                             .add(std::span(&clusters, 1))
+                             .add(std::span(&quality, 1));
   return all.get(key, [&] {
     auto made = std::make_shared<MeshGeometry>();
     made->box = box_around(vertices);
     if (faces.empty()) return made;
     made->device = ray_device();
-    made->scene = build_triangles(made->device.get(), vertices, faces);
+    made->scene = build_triangles(made->device.get(), vertices, faces, quality);
     if (clusters) {
       made->clusters =
           build_clusters(vertices.data(), faces.data(), static_cast<int>(faces.size() / 3));

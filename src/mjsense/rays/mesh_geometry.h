@@ -4,6 +4,7 @@
 // process share it.
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -32,10 +33,17 @@ std::shared_ptr<RTCDeviceTy> ray_device();
 // built.
 void check_built(RTCDevice device, const std::string& what);
 
+// How a mesh is built. Occlusion does not depend on it; of several hits at the same distance another
+// may be found.
+enum class BuildQuality : std::uint8_t {
+  kHigh,  // for many rays in all directions
+  kFast,  // a quarter of the time; images of robots and kitchens take as long as with kHigh
+};
+
 // Builds a scene of one triangle mesh; positions [n, 3] and indices [m, 3] are copied. Throws
 // RuntimeError.
 SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
-                            std::span<const int> faces);
+                            std::span<const int> faces, BuildQuality quality);
 
 struct MeshGeometry {
   std::shared_ptr<RTCDeviceTy> device;
@@ -48,6 +56,7 @@ struct MeshGeometry {
 // Returns the geometry of these vertices [n, 3] (m) and faces [m, 3]. `clusters`: also build what
 // cameras need.
 std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
-                                                  std::span<const int> faces, bool clusters);
+                                                  std::span<const int> faces, bool clusters,
+                                                  BuildQuality quality = BuildQuality::kHigh);
 
 }  // namespace mjsense::rays

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <thread>
 #include <vector>
 
@@ -52,7 +53,7 @@ TEST(MeshGeometry, FailedBuildThrows) {
     ASSERT_LT(allowed, 100);
     left = allowed;
     try {
-      built = build_triangles(device.get(), kVertices, kFaces) != nullptr;
+      built = build_triangles(device.get(), kVertices, kFaces, BuildQuality::kHigh) != nullptr;
       EXPECT_GE(left, 0);
     } catch (const RuntimeError& error) {
       EXPECT_STREQ(error.what(),
@@ -96,6 +97,22 @@ TEST(ContentKey, DistinguishesArrays) {
   EXPECT_NE(key(a, b), key(ab));
   EXPECT_NE(key(a, b), key(b, a));
   EXPECT_NE(key(a), key(a, std::vector<int>{}));
+}
+
+TEST(ContentKey, DependsOnEveryElementOfALongArray) {
+  std::vector<int> values(203);
+  std::iota(values.begin(), values.end(), 0);
+  const auto key = [&] { return ContentKey().add(std::span<const int>(values)); };
+  const ContentKey first = key();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    ++values[i];
+    EXPECT_NE(key(), first) << i;
+    --values[i];
+    std::swap(values[i], values[(i + 2) % values.size()]);
+    EXPECT_NE(key(), first) << i;
+    std::swap(values[i], values[(i + 2) % values.size()]);
+  }
+  EXPECT_EQ(key(), first);
 }
 
 }  // namespace

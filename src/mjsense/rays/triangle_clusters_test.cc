@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -77,6 +78,35 @@ TEST(Clusters, ContainEveryFaceOnceWithinBoxesAndCones) {
       }
     }
     for (int count : seen) EXPECT_EQ(count, 1);
+  }
+}
+
+// A strip whose faces have a random order: each child of a node has the faces before the next child's.
+TEST(Clusters, AreSortedAlongAStrip) {
+  Rng rng(3, 0, 2, 0);
+  for (int n : {9, 100, 1000, 5000}) {
+    std::vector<float> vertices;
+    std::vector<int> order(n), faces;
+    for (int i = 0; i < n; ++i) order[i] = i / 2;  // pairs of equal faces
+    for (int i = n - 1; i > 0; --i) std::swap(order[i], order[rng.below(i + 1)]);
+    for (int i : order) {
+      const float x = static_cast<float>(i);
+      vertices.insert(vertices.end(), {x, 0, 0, x + 0.5f, 0, 0, x, 0.5f, 0});
+    }
+    for (int i = 0; i < 3 * n; ++i) faces.push_back(i);
+    const Clusters clusters = build_clusters(vertices.data(), faces.data(), n);
+    for (const ClusterNode& node : clusters.nodes) {
+      int last = -1;
+      for (int i = 0; i < node.count; ++i) {
+        int low = n, high = -1;
+        each_triangle(clusters, node, i, [&](const TriangleBlock& block, int lane) {
+          low = std::min(low, order[block.face[lane]]);
+          high = std::max(high, order[block.face[lane]]);
+        });
+        EXPECT_LE(last, low);
+        last = high;
+      }
+    }
   }
 }
 

@@ -18,6 +18,7 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/record/crc32.h"
 #include "mjsense/record/folder.h"
+#include "mjsense/record/sha256.h"
 
 namespace mjsense::record {
 namespace {
@@ -28,9 +29,10 @@ std::string seal_text(const std::string& crc, std::int64_t bytes) {
   return fmt::format("\nmjsense: crc32 {} of the {:>16} bytes above\n", crc, bytes);
 }
 
-// Checksum of the first `bytes` of a file, or of all of it if it is shorter.
-std::string checksum_of(int fd, std::int64_t bytes) {
-  Checksum sum;
+// Sum of the first `bytes` of a file, or of all of it if it is shorter.
+template <class Sum>
+std::string sum_of(int fd, std::int64_t bytes) {
+  Sum sum;
   std::array<std::uint8_t, kPieceBytes> piece;
   for (std::int64_t at = 0; at < bytes;) {
     const std::int64_t maximum = std::min<std::int64_t>(kPieceBytes, bytes - at);
@@ -55,7 +57,9 @@ void Checksum::add(const void* bytes, std::size_t count) { crc_ = crc32_of(crc_,
 
 std::string Checksum::text() const { return fmt::format("{:08x}", crc_); }
 
-std::string checksum_of(int fd) { return checksum_of(fd, file_size(fd)); }
+std::string checksum_of(int fd) { return sum_of<Checksum>(fd, file_size(fd)); }
+
+std::string sha256_of(int fd) { return sum_of<Sha256>(fd, file_size(fd)); }
 
 void seal_file(const Folder& folder, const std::string& name) {
   const FileLimitGuard limit;
@@ -63,7 +67,7 @@ void seal_file(const Folder& folder, const std::string& name) {
   const auto fail = [&] { throw_file("write", folder.display_path(name), errno); };
   if (!file) fail();
   const std::int64_t size = file_size(file.get());
-  const std::string seal = seal_text(checksum_of(file.get(), size), size);
+  const std::string seal = seal_text(sum_of<Checksum>(file.get(), size), size);
   if (lseek(file.get(), size, SEEK_SET) != size || !write_all(file, std::as_bytes(std::span(seal))))
     fail();
 }
@@ -75,7 +79,7 @@ Seal check_seal(int fd) {
   std::string found(form.size(), '\0');
   if (pread(fd, found.data(), found.size(), end) != static_cast<ssize_t>(found.size()))
     return Seal::kNone;
-  if (found == seal_text(checksum_of(fd, end), end)) return Seal::kValid;
+  if (found == seal_text(sum_of<Checksum>(fd, end), end)) return Seal::kValid;
   // The line itself may be damaged. It counts as a checksum line if more than half of its fixed
   // characters match.
   std::size_t same = 0, fixed = 0;

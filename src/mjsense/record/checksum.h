@@ -23,9 +23,10 @@ class Checksum {
   std::uint32_t crc_ = 0;
 };
 
-// Checksum of everything from the descriptor's start to its end. Throws RuntimeError if reading
-// fails.
+// CRC-32 and SHA-256 of everything from the descriptor's start to its end. Throw RuntimeError if
+// reading fails.
 [[nodiscard]] std::string checksum_of(int fd);
+[[nodiscard]] std::string sha256_of(int fd);
 
 inline constexpr const char* kChecksumAttribute = "crc32";
 inline constexpr const char* kBytesAttribute = "bytes";

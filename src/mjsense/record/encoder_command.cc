@@ -28,6 +28,7 @@ std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
       // frames, and the order in the file is the order in time, as MCAP's readers require.
       add({"-c:v", "libx264", "-pix_fmt", pixels, "-preset", cfg.preset, "-crf",
            fmt::format("{}", cfg.crf), "-bf", "0", "-g", fmt::format("{}", cfg.keyint)});
+      if (!cfg.tune.empty()) add({"-tune", cfg.tune});
       break;
     case VideoKind::kDepth16:
       add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", pixels});

@@ -38,6 +38,7 @@ struct VideoCfg {
   int threads = 1;
   int crf = 25;
   std::string preset = "veryfast";
+  std::string tune = "fastdecode";
   int keyint = 20;
   double depth_unit = 0.0002;
   double ffmpeg_timeout = 60;
@@ -51,6 +52,9 @@ void visit_fields(V& v, VideoCfg& c) {
   v("crf", c.crf, "Quality of the videos, from 0 (lossless) to 51 (worst).").within(0, 51);
   v("preset", c.preset,
     "Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.");
+  v("tune", c.tune,
+    "Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and "
+    "files are a seventh larger.");
   v("keyint", c.keyint,
     "Maximum number of frames between key frames. A small value makes random access faster, a "
     "large value makes files smaller.")

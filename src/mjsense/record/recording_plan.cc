@@ -156,6 +156,7 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
     const VideoCfg& v = cfg.video;
     j["video"] = {{"crf", v.crf},
                   {"preset", v.preset},
+                  {"tune", v.tune},
                   {"keyint", v.keyint},
                   {"threads", v.threads},
                   {"depth_unit", v.depth_unit},

@@ -112,6 +112,30 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
   expect_pixel(s.center({9, 0, 9}, {0, -1, 0}, {0, 0, 1}), faces[0]);
 }
 
+// Each face shows the one square image; its left and right halves have different colours.
+TEST(Texture, ASquareCubeMapHasTheSameImageOnAllFaces) {
+  TestRenderer s(std::string(kFlat) +
+                 R"(<asset><texture name="t" type="cube" builtin="flat" width="8" height="48"/>
+    <material name="m" texture="t"/></asset>
+    <worldbody><geom type="box" size=".5 .5 .5" material="m"/></worldbody>)");
+  s.model->tex_height[0] = 8;
+  const std::array<Pixel, 2> halves{{{255, 0, 0}, {0, 0, 255}}};
+  s.paint(0, [&](int i) { return halves[i % 8 / 4]; });
+  // Camera above the middle of each half of a face, as OpenGL orients faces.
+  expect_pixel(s.center({2, 0, 0.25}, {0, 1, 0}, {0, 0, 1}), halves[0]);
+  expect_pixel(s.center({2, 0, -0.25}, {0, 1, 0}, {0, 0, 1}), halves[1]);
+  expect_pixel(s.center({-2, 0, -0.25}, {0, -1, 0}, {0, 0, 1}), halves[0]);
+  expect_pixel(s.center({-2, 0, 0.25}, {0, -1, 0}, {0, 0, 1}), halves[1]);
+  for (const double side : {-2.0, 2.0}) {
+    expect_pixel(s.center({-0.25, side, 0}, {side < 0 ? 1.0 : -1.0, 0, 0}, {0, 0, 1}), halves[0]);
+    expect_pixel(s.center({0.25, side, 0}, {side < 0 ? 1.0 : -1.0, 0, 0}, {0, 0, 1}), halves[1]);
+  }
+  expect_pixel(s.center({-0.25, 0, 2}, {1, 0, 0}, {0, 1, 0}), halves[0]);
+  expect_pixel(s.center({0.25, 0, 2}, {1, 0, 0}, {0, 1, 0}), halves[1]);
+  expect_pixel(s.center({0.25, 0, -2}, {1, 0, 0}, {0, -1, 0}), halves[0]);
+  expect_pixel(s.center({-0.25, 0, -2}, {1, 0, 0}, {0, -1, 0}), halves[1]);
+}
+
 // The sky is a cylinder of radius 0.7 * 50 * 1 m and the camera is 7 m above the floor, so a ray
 // that falls by 0.2 s per metre meets the floor at 1 / s of that radius.
 TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ struct VerifyResult {
 struct VerifyOptions {
   bool decode = false;  // decode every frame instead of counting packets
   std::string ffmpeg;   // as in VideoCfg
+  // Called after each file and video: "12 of 40 files". Calls do not overlap.
+  std::function<void(const std::string& text)> progress;
 };
 
 // Checks structure, names and types, equal lengths, JSON rows, NaN in streams whose description does

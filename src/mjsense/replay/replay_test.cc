@@ -72,7 +72,13 @@ TEST(Replay, DiscardedAttemptsAreNotStored) {
   ASSERT_THAT(result.files, SizeIs(1));
   EXPECT_EQ(result.files[0].episodes, 4);
   EXPECT_THAT(tree(dir.path), SizeIs(1 + 4 * 2));
-  EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
+  std::vector<std::string> progress;
+  const VerifyResult found =
+      verify(dir.path, {.progress = [&](const std::string& text) { progress.push_back(text); }});
+  EXPECT_TRUE(found.ok()) << found.text();
+  ASSERT_THAT(progress, SizeIs(1 + 4 * 2));
+  EXPECT_EQ(progress.front(), "1 of 1 files");
+  EXPECT_EQ(progress.back(), "8 of 8 videos");
 }
 
 TEST(Replay, UnfinishedRecordingIsReadableAndRepairable) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -14,6 +15,7 @@
 #include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_folder.h"
 #include "mjsense/record/recording_lock.h"
+#include "mjsense/record/sha256.h"
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/recording_tools.h"
@@ -277,7 +279,11 @@ class Verifier {
 
   VerifyResult run(const fs::path& path) {
     listed_ = recorded_files(path);
-    for (const RecordedFile& file : listed_) check_file(file);
+    for (std::size_t i = 0; i < listed_.size(); ++i) {
+      check_file(listed_[i]);
+      if (options_.progress)
+        options_.progress(fmt::format("{} of {} files", i + 1, listed_.size()));
+    }
     check_videos();
     for (const auto& [folder, name] : archives_) check_archive(folder, name);
     for (const fs::path& house : recorded_houses(path)) {
@@ -344,16 +350,21 @@ class Verifier {
     }
   }
 
-  // The name of a model archive contains the checksum of its bytes: model_1a2b3c4d.zip.
+  // The name of a model archive contains the start of its SHA-256, model_1a2b3c4d5e6f.zip, and in
+  // earlier recordings its CRC-32, model_1a2b3c4d.zip.
   void check_archive(const fs::path& folder, const std::string& name) {
     const std::string context = folder.filename().string();
     if (!is_plain_name(name))
       return error(context,
                    fmt::format("names a model archive '{}', which is not a plain file name", name));
     try {
-      const std::string crc = record::checksum_of(open_plain(folder, name).get());
-      if (name != fmt::format("model_{}.zip", crc))
-        error(context, fmt::format("'{}' is damaged: its checksum is {}", name, crc));
+      const Fd file = open_plain(folder, name);
+      const std::string crc = fmt::format("model_{}.zip", record::checksum_of(file.get()));
+      const std::string expected =
+          name.size() == crc.size() ? crc : record::archive_name(record::sha256_of(file.get()));
+      if (name != expected)
+        error(context,
+              fmt::format("'{}' is damaged: its checksum is that of '{}'", name, expected));
     } catch (const Error& e) {
       error(context, fmt::format("the model archive, which replay needs: {}", e.what()));
     }
@@ -363,8 +374,15 @@ class Verifier {
     result_.videos = static_cast<int>(videos_.size());
     std::vector<std::string> wrong(videos_.size());
     ThreadPool pool(0);
-    pool.run(static_cast<int>(videos_.size()),
-             [&](int i, int) { wrong[i] = check_video(videos_[i]); });
+    std::mutex counting;
+    int done = 0;
+    pool.run(static_cast<int>(videos_.size()), [&](int i, int) {
+      wrong[i] = check_video(videos_[i]);
+      const std::scoped_lock lock(counting);
+      ++done;
+      if (options_.progress)
+        options_.progress(fmt::format("{} of {} videos", done, videos_.size()));
+    });
     for (std::size_t i = 0; i < videos_.size(); ++i) {
       if (!wrong[i].empty()) error(videos_[i].context, wrong[i]);
     }

@@ -85,6 +85,9 @@ class TopDownPlanner final : public episode::PlannerPolicy {
   int phase(int world) const override { return active_planner(world).phase(world); }
   int num_retries(int world) const override { return active_planner(world).num_retries(world); }
   Pose grasp_pose(int world) const override { return active_planner(world).grasp_pose(world); }
+  std::vector<episode::PlannedPath> planned_paths(const World& world) const override {
+    return active_planner(world.id).planned_paths(world);
+  }
   std::string failure(int world) const override { return active_planner(world).failure(world); }
 
  private:
@@ -135,6 +138,9 @@ class AnyPlanner final : public episode::PlannerPolicy {
   int phase(int world) const override { return planner_->phase(world); }
   int num_retries(int world) const override { return planner_->num_retries(world); }
   Pose grasp_pose(int world) const override { return planner_->grasp_pose(world); }
+  std::vector<episode::PlannedPath> planned_paths(const World& world) const override {
+    return planner_->planned_paths(world);
+  }
   std::string failure(int world) const override { return planner_->failure(world); }
   std::vector<std::pair<std::string, std::string>> info(int world) const override {
     return planner_->info(world);

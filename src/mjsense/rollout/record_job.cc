@@ -12,9 +12,9 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/rng.h"
-#include "mjsense/record/checksum.h"
 #include "mjsense/record/model_fields.h"
 #include "mjsense/record/outcome_details.h"
+#include "mjsense/record/sha256.h"
 #include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/model_archive.h"
@@ -43,9 +43,9 @@ record::RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout,
   if (const Sensor* replay = rollout.replay_sensor()) {
     cfg.sensors.push_back(replay);
     cfg.archive = scene::model_archive(rollout.simulation().scene());
-    record::Checksum sum;
+    record::Sha256 sum;
     sum.add(cfg.archive.data(), cfg.archive.size());
-    cfg.archive_name = fmt::format("model_{}.zip", sum.text());
+    cfg.archive_name = record::archive_name(sum.text());
   }
   cfg.settings = recording_settings(job, rollout);
   cfg.model = rollout.task().model();

@@ -45,8 +45,8 @@ class CartTask final : public episode::Task {
   }
   episode::Evaluation evaluate(const World& world) const override {
     const double error = std::abs(world.data->qpos[0] - marks_[world.id]);
-    return make_evaluation(world.id, -error,
-                           error<0.02, /*over=*/std::abs(world.data->qpos[0])> 0.95);
+    const bool over = std::abs(world.data->qpos[0]) > 0.95;
+    return make_evaluation(world.id, -error, error < 0.02, over);
   }
   void evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) override {
     ++evaluations;

@@ -12,6 +12,7 @@
 #include "mjsense/core/fields/toml_fields.h"
 #include "mjsense/core/files/data_file.h"
 #include "mjsense/scenes/object_catalogue.h"
+#include "mjsense/scenes/scene_split.h"
 
 namespace mjsense::scenes {
 namespace {
@@ -57,6 +58,7 @@ std::vector<std::string> scene_names() { return kScenes.names(); }
 SceneFileCfg load_scene(std::string_view name) {
   SceneFileCfg cfg;
   const std::optional<int> house = cut_house(name);
+  const std::optional<SceneSplit> split = cut_split(name);
   if (name.ends_with(".xml")) {
     cfg.base = std::string(name);
     if (!std::filesystem::is_regular_file(cfg.base))
@@ -72,7 +74,8 @@ SceneFileCfg load_scene(std::string_view name) {
     throw ValueError(fmt::format("scene '{}' has no generator, so {} have no effect", name,
                                  cfg.parameters.empty() ? "houses" : "parameters"));
   check_fields(cfg, fmt::format("scene '{}'", name));
-  return with_catalogue_objects(std::move(cfg));
+  if (split) cfg = split_scene(std::move(cfg), *split);
+  return with_catalogue_objects(std::move(cfg), split);
 }
 
 SceneFileCfg task_scene(const episode::TaskCfg& cfg, std::string_view own) {

@@ -16,7 +16,7 @@ std::vector<std::string> scene_names();
 
 // Loads a built-in scene by name, a scene.toml by path, or an MJCF file by path (.xml), which is
 // used as a complete model with its bodies at their positions. "kitchen:7" is house 7 of a scene
-// with a generator. Throws KeyError with the nearest names, or ValueError with the file, line and
+// with a generator, and "table@train" and "table@test" are its splits (scene_split.h). Throws KeyError with the nearest names, or ValueError with the file, line and
 // key of the fault.
 SceneFileCfg load_scene(std::string_view name_or_path);
 

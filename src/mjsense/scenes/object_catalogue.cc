@@ -98,13 +98,15 @@ bool is_installed(const CatalogueObjectCfg& object) {
   }
 }
 
-SceneFileCfg with_catalogue_objects(SceneFileCfg cfg) {
+SceneFileCfg with_catalogue_objects(SceneFileCfg cfg, std::optional<SceneSplit> split) {
   if (cfg.catalogue.empty()) return cfg;
   const std::string context = fmt::format("scene '{}'", cfg.name);
   std::vector<int> chosen, receptacles;
   for (const std::string& entry : cfg.catalogue) {
     for (int i : denoted(entry, context)) {
-      std::vector<int>& into = object_catalogue().objects[i].receptacle ? receptacles : chosen;
+      const CatalogueObjectCfg& object = object_catalogue().objects[i];
+      if (split && !object.receptacle && !has_kind(*split, object.kind)) continue;
+      std::vector<int>& into = object.receptacle ? receptacles : chosen;
       if (std::ranges::find(into, i) == into.end()) into.push_back(i);
     }
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mjsense/scenes/scene_file.h"
+#include "mjsense/scenes/scene_split.h"
 
 namespace mjsense::scenes {
 
@@ -82,8 +83,9 @@ const ObjectSourceCfg& source_of(const CatalogueObjectCfg& object);
 // Whether the model is built in, or its package is installed.
 bool is_installed(const CatalogueObjectCfg& object);
 
-// Adds the entities and objects of cfg.catalogue to those of the scene, and clears it. Throws
-// KeyError for an entry that matches no object.
-SceneFileCfg with_catalogue_objects(SceneFileCfg cfg);
+// Adds the entities and objects of cfg.catalogue to those of the scene, and clears it; of a split
+// only the objects of its kinds, and all receptacles. Throws KeyError for an entry that matches no
+// object.
+SceneFileCfg with_catalogue_objects(SceneFileCfg cfg, std::optional<SceneSplit> split = {});
 
 }  // namespace mjsense::scenes

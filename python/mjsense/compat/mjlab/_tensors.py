@@ -13,9 +13,9 @@ _FOUND = importlib.util.find_spec("torch")
 HAS_TORCH = _FOUND is not None and _FOUND.origin is not None  # None for a mere folder named torch
 
 
-def tensor(array: np.ndarray | None) -> Any:
-    """A torch tensor that shares the memory of ``array``; the array itself if torch is not installed."""
-    if array is None or not HAS_TORCH:
+def tensor(array: Any) -> Any:
+    """A torch tensor that shares the memory of ``array``; the array itself if torch is not installed, or if it is on a device."""
+    if not isinstance(array, np.ndarray) or not HAS_TORCH:
         return array
     import torch  # pyright: ignore[reportMissingImports]
 

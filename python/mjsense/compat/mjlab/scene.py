@@ -80,9 +80,8 @@ class Scene:
     """``scene[name]`` is a sensor or an entity. ``native`` is the :class:`mjsense.Scene` that does the work."""
 
     def __init__(self, scene_cfg: SceneCfg, device: str = "cpu") -> None:
-        if str(device) != "cpu":
-            raise ValueError(f"Scene: device is '{device}': everything is on the 'cpu'")
         self._cfg = scene_cfg
+        self._device = str(device)
         self._simulation: Any = None
         self.native = mjsense.Scene(scene_cfg.native())
         by_name = {cfg.prefixed_name: cfg for cfg in scene_cfg.sensors if isinstance(cfg, SensorCfg)}
@@ -134,11 +133,12 @@ class Scene:
     @property
     def env_origins(self) -> Any:
         """float32 ``[B, 3]`` m."""
-        return tensor(self.native.env_origins(self.num_envs))
+        origins = tensor(self.native.env_origins(self.num_envs))
+        return origins.to(self._device) if hasattr(origins, "to") else origins
 
     @property
     def device(self) -> str:
-        return "cpu"
+        return self._device
 
     @property
     def sensor_context(self) -> SensorContext | None:

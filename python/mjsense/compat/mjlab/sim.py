@@ -40,7 +40,7 @@ class MujocoCfg:
 
 @dataclass(kw_only=True)
 class SimulationCfg:
-    """Only ``mujoco`` has an effect: limits on the number of contacts are not needed."""
+    """Only ``mujoco`` has an effect, and with ``backend="warp"`` ``nconmax`` and ``njmax``: otherwise there are no limits on contacts."""
 
     nconmax: int | None = None
     njmax: int | None = None
@@ -59,14 +59,19 @@ class Simulation:
     """
 
     def __init__(self, num_envs: int, cfg: SimulationCfg, model: mujoco.MjModel | None = None, device: str = "cpu", *,
-                 spec: mujoco.MjSpec | None = None, threads: int = 0) -> None:  # fmt: skip
-        if str(device) != "cpu":
-            raise ValueError(f"Simulation: device is '{device}': everything is on the 'cpu'")
+                 spec: mujoco.MjSpec | None = None, threads: int = 0, backend: str | None = None) -> None:  # fmt: skip
+        """``backend`` is that of :class:`mjsense.Simulation`; by default ``"cpu"`` on the CPU and ``"warp"`` on other devices."""
         self.scene = scene_of(spec if model is None else model)
-        self.cfg, self.num_envs, self.device = cfg, num_envs, "cpu"
+        self.cfg, self.num_envs, self.device = cfg, num_envs, str(device)
         self.scene._cfg.num_envs = num_envs
         self.scene.native._set_options(cfg.mujoco.native())
-        self.native = mjsense.Simulation(self.scene.native, num_envs, threads=threads)
+        backend = backend or ("cpu" if self.device == "cpu" else "warp")
+        options: dict[str, Any] = {"threads": threads, "backend": backend}
+        if backend == "warp":
+            options |= {"device": self.device, "nconmax": cfg.nconmax, "njmax": cfg.njmax}
+        elif self.device != "cpu":
+            raise ValueError(f"Simulation: device is '{device}': backend='cpu' is on the 'cpu'")
+        self.native = mjsense.Simulation(self.scene.native, num_envs, **options)
         self.scene._simulation = self.native
         self._data = Data(self.native)
 

@@ -42,6 +42,7 @@ class TaskPlanner : public episode::PlannerPolicy {
   int phase(int world) const override { return follower_.phase(world); }
   int num_retries(int world) const override { return states_[world].retries; }
   std::string failure(int world) const override;
+  std::vector<episode::PlannedPath> planned_paths(const World& world) const override;
   Pose grasp_pose(int world) const override { return follower_.plan(world).grasp; }
   // Reason of the last retry or of giving up; kNone if there was none.
   PlanFailure last_failure(int world) const { return states_[world].failure; }

@@ -45,6 +45,7 @@ bool SceneAssets::Stamp::changed(const void* data, std::size_t bytes) {
 }
 
 void SceneAssets::reload_changed() {
+  improved_ = false;
   const mjModel* m = model_;
   for (int i = 0; i < m->nmesh; ++i) {
     if (!mesh_stamps_[i].changed(m->mesh_vert + 3 * m->mesh_vertadr[i],
@@ -82,17 +83,28 @@ const DrawnMesh* SceneAssets::mesh(int id) {
     if (id % 2) {
       made = hull(mesh);
     } else if (m->mesh_facenum[mesh] > 0) {
-      made.geometry = rays::mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
-                                           3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
-                                          {m->mesh_face + 3 * m->mesh_faceadr[mesh],
-                                           3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
-                                          true);
+      made.geometry = geometry(mesh, true, rays::BuildQuality::kFast);
       made.tables = mesh_tables(m, mesh);
     }
     if (made.tables) made.surface = made.tables->surface();
     place = std::make_unique<DrawnMesh>(std::move(made));
   }
-  return place->geometry && place->geometry->scene ? place.get() : nullptr;
+  if (!place->geometry || !place->geometry->scene) return nullptr;
+  if (id % 2 == 0 && !place->shadows && !improved_ && ++place->uses > kManyUses) {
+    place->shadows = geometry(id / 2, false, rays::BuildQuality::kHigh);
+    improved_ = true;
+  }
+  return place.get();
+}
+
+std::shared_ptr<const rays::MeshGeometry> SceneAssets::geometry(int mesh, bool clusters,
+                                                                rays::BuildQuality quality) const {
+  const mjModel* m = model_;
+  return rays::mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
+                              3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
+                             {m->mesh_face + 3 * m->mesh_faceadr[mesh],
+                              3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
+                             clusters, quality);
 }
 
 // The faces of MuJoCo's convex hull, shaded flat.
@@ -105,8 +117,8 @@ DrawnMesh SceneAssets::hull(int mesh) const {
                                    3 * static_cast<std::size_t>(num_faces));
   const float* vert = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
   DrawnMesh made;
-  made.geometry =
-      rays::mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])}, faces, true);
+  made.geometry = rays::mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
+                                      faces, true, rays::BuildQuality::kFast);
   auto tables = std::make_shared<MeshTables>();
   for (int f = 0; f < num_faces; ++f) {
     const float *a = vert + 3 * faces[3 * f], *b = vert + 3 * faces[3 * f + 1],

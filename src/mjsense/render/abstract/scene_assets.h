@@ -19,6 +19,10 @@ struct DrawnMesh {
   std::shared_ptr<const rays::MeshGeometry> geometry;
   std::shared_ptr<const MeshTables> tables;
   MeshSurface surface;
+  int uses = 0;
+  // With a better tree, for shadow rays, whose results do not depend on the tree; null before many
+  // uses.
+  std::shared_ptr<const rays::MeshGeometry> shadows;
 };
 
 class SceneAssets {
@@ -51,8 +55,14 @@ class SceneAssets {
     bool changed(const void* data, std::size_t bytes);
   };
   DrawnMesh hull(int mesh) const;
+  std::shared_ptr<const rays::MeshGeometry> geometry(int mesh, bool clusters,
+                                                     rays::BuildQuality quality) const;
+
+  // Number of images after which a better tree is built.
+  static constexpr int kManyUses = 50;
 
   const mjModel* model_;
+  bool improved_ = false;  // whether a mesh got its better tree in this image
   std::vector<std::unique_ptr<DrawnMesh>> meshes_;  // [2 * nmesh]
   std::vector<std::shared_ptr<const StoredTexture>> textures_;
   std::vector<Stamp> mesh_stamps_, texture_stamps_, height_field_stamps_;

@@ -219,6 +219,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       const DrawnMesh* mesh = assets_.mesh(geom.dataid);
       if (!mesh) return;
       out.bvh = mesh->geometry->scene.get();
+      out.shadow_bvh = mesh->shadows ? mesh->shadows->scene.get() : nullptr;
       out.mesh = &mesh->surface;
       out.clusters = mesh->geometry->clusters.nodes.empty() ? nullptr : &mesh->geometry->clusters;
       out.horizons = out.clusters ? mesh->geometry->horizons.get() : nullptr;
@@ -266,7 +267,8 @@ void SceneRenderer::add_triangles(DrawnGeom drawn, ShapeTriangles triangles) {
   if (triangles.faces.empty()) return;
   Decoration& d = *decorations_.emplace_back(std::make_unique<Decoration>());
   d.triangles = std::move(triangles);
-  d.scene = rays::build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces);
+  d.scene = rays::build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces,
+                                  rays::BuildQuality::kFast);
   d.surface.normals = d.triangles.normals.data();
   rays::box_around(d.triangles.vertices, d.box);
   std::copy_n(d.box, 3, drawn.shape.center);

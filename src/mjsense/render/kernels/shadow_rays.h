@@ -63,7 +63,8 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
     store(ray.time, zero);
     store(reinterpret_cast<int*>(ray.mask), int_of(-1));
     store(reinterpret_cast<int*>(ray.flags), int_of(0));
-    rays::embree_occluded(valid, static_cast<RTCScene>(g.bvh), &ray, false, true);
+    rays::embree_occluded(valid, static_cast<RTCScene>(g.shadow_bvh ? g.shadow_bvh : g.bvh), &ray,
+                          false, true);
     dark |= bits(hit & (load(ray.tfar) < zero)) << k;
   }
   return dark;

@@ -126,7 +126,8 @@ inline Rgb sample_cube(const Texture& texture, Mask wanted, Vec3f d, Float footp
   const Int face =
       select(is_x, select(nx, int_of(1), int_of(0)),
              select(not_z, select(ny, int_of(3), int_of(2)), select(nz, int_of(5), int_of(4))));
-  return sample(texture, wanted, face, fma(half, s / m, half), fma(half, t / m, half), footprint);
+  return sample(texture, wanted, texture.same_faces ? int_of(0) : face, fma(half, s / m, half),
+                fma(half, t / m, half), footprint);
 }
 
 constexpr float kPi = 3.14159265358979f;

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "mjsense/core/content_cache.h"
 #include "mjsense/rays/flex_surface.h"
@@ -56,29 +56,45 @@ struct Image {
   std::uint32_t* row(int y) const { return texels + static_cast<std::size_t>(y) * (width + 1); }
 };
 
+// Functions that go over all texels are compiled for wide vectors too. Without fused operations, so
+// that the results are the same.
+#ifdef __x86_64__
+#define MJSENSE_VECTORS [[gnu::target_clones("avx2", "default")]]
+#else
+#define MJSENSE_VECTORS
+#endif
+
 // Computes the next mip level of one image by interpolation at its texels' centres, as OpenGL
 // drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts the
 // image nor drops its border.
-void halve(const Image& src, const Image& dst) {
-  using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
-  using Sums [[gnu::vector_size(8)]] = std::uint16_t;
-  using Channels [[gnu::vector_size(16)]] = float;
+MJSENSE_VECTORS void halve(const Image& src, const Image& dst) {
   if (src.width == 2 * dst.width && src.height == 2 * dst.height) {
-    const auto sums = [](std::uint32_t texel) {
-      return __builtin_convertvector(std::bit_cast<Bytes>(texel), Sums);
-    };
+    // Two neighbours at once, as four sums of 16 bits: red and blue, then green and alpha.
+    constexpr std::uint64_t kChannels = 0x00ff00ff00ff00ff;
+    constexpr std::uint32_t kHalf = 0x00020002;  // rounds the division by four
     for (int y = 0; y < dst.height; ++y) {
       const std::uint32_t *above = src.row(2 * y), *below = src.row(2 * y + 1);
       std::uint32_t* out = dst.row(y);
       for (int x = 0; x < dst.width; ++x, above += 2, below += 2) {
-        const Sums sum = sums(above[0]) + sums(above[1]) + sums(below[0]) + sums(below[1]) + 2;
-        out[x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(sum >> 2, Bytes));
+        std::uint64_t upper, lower;
+        std::memcpy(&upper, above, sizeof upper);
+        std::memcpy(&lower, below, sizeof lower);
+        const auto mean = [&](int shift) {
+          const std::uint64_t sums = (upper >> shift & kChannels) + (lower >> shift & kChannels);
+          return static_cast<std::uint32_t>(((sums + (sums >> 32) + kHalf) >> 2 & kChannels));
+        };
+        out[x] = mean(0) | mean(8) << 8;
       }
     }
     return;
   }
-  const auto unpacked = [](std::uint32_t texel) {
-    return __builtin_convertvector(std::bit_cast<Bytes>(texel), Channels);
+  using Channels [[gnu::vector_size(16)]] = float;
+  using Words [[gnu::vector_size(16)]] = std::int32_t;
+  constexpr Words kShifts = {0, 8, 16, 24};
+  const auto unpacked = [&](std::uint32_t texel) {
+    const auto word = static_cast<std::int32_t>(texel);
+    const Words words = Words{word, word, word, word} >> kShifts & 255;
+    return __builtin_convertvector(words, Channels);
   };
   std::vector<Between> columns(dst.width);
   for (int x = 0; x < dst.width; ++x) columns[x] = between(x, src.width, dst.width);
@@ -94,7 +110,8 @@ void halve(const Image& src, const Image& dst) {
       };
       const Channels upper = mix(above);
       const Channels value = upper + v.weight * (mix(below) - upper) + 0.5f;
-      out[x] = std::bit_cast<std::uint32_t>(__builtin_convertvector(value, Bytes));
+      const Words words = __builtin_convertvector(value, Words) << kShifts;
+      out[x] = static_cast<std::uint32_t>(words[0] | words[1] | words[2] | words[3]);
     }
   }
 }
@@ -115,16 +132,21 @@ void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord 
   }
 }
 
+// Models of MuJoCo before 3.3.3 have no colour spaces.
+int color_space(const mjModel* model, int id) {
+  return model->tex_colorspace ? model->tex_colorspace[id] : mjCOLORSPACE_AUTO;
+}
+
 void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   Texture& texture = out.texture;
   const int channels = model->tex_nchannel[id];
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
   const int width = model->tex_width[id];
   // A cube texture with a square image repeats that image on all faces.
-  const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
+  texture.same_faces = texture.cube && model->tex_width[id] == model->tex_height[id];
   const int height = texture.cube ? width : model->tex_height[id];
-  const int faces = texture.cube ? 6 : 1;
-  const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
+  const int faces = texture.cube && !texture.same_faces ? 6 : 1;
+  const bool srgb = color_space(model, id) == mjCOLORSPACE_SRGB && !texture.cube;
   const mjtByte* data = model->tex_data + model->tex_adr[id];
   const std::array<std::uint8_t, 256> linear = linear_values();
 
@@ -150,11 +172,19 @@ void fill_texture(const mjModel* model, int id, StoredTexture& out) {
   };
   for (int f = 0; f < faces; ++f) {
     const Image first = image(0, f);
-    const mjtByte* from =
-        data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
+    const mjtByte* from = data + static_cast<std::size_t>(f) * width * height * channels;
     for (int y = 0; y < height; ++y) {
       std::uint32_t* row = first.row(y);
-      for (int x = 0; x < width; ++x, from += channels) {
+      int x = 0;
+      if (!srgb && channels == 3) {
+        // Whole words, which read one byte of the next texel.
+        for (; x + 1 < width; ++x, from += 3) {
+          std::uint32_t texel;
+          std::memcpy(&texel, from, sizeof texel);
+          row[x] = texel | 0xff000000;
+        }
+      }
+      for (; x < width; ++x, from += channels) {
         const std::uint32_t alpha = channels == 4 ? from[3] : 255;
         row[x] = srgb ? linear[from[0]] | linear[from[1]] << 8 | linear[from[2]] << 16 | alpha << 24
                       : from[0] | from[1] << 8 | from[2] << 16 | alpha << 24;
@@ -183,7 +213,7 @@ std::shared_ptr<const StoredTexture> stored_texture(const mjModel* m, int id) {
   const int channels = m->tex_nchannel[id], width = m->tex_width[id], height = m->tex_height[id];
   // Textures with another number of channels are encoded for another renderer and ignored.
   if (channels != 3 && channels != 4) return std::make_shared<const StoredTexture>();
-  const int form[] = {m->tex_type[id], m->tex_colorspace[id], channels, width, height};
+  const int form[] = {m->tex_type[id], color_space(m, id), channels, width, height};
   const std::size_t bytes = static_cast<std::size_t>(width) * height * channels;
   const ContentKey key = ContentKey()
                              .add(std::span<const int>(form))

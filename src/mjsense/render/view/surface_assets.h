@@ -21,7 +21,8 @@ namespace mjsense::render {
 struct Texture {
   static constexpr int kMaxLevels = 15;
   bool cube = false;
-  int levels = 0;  // 0: the texture cannot be drawn
+  bool same_faces = false;  // a cube map with one image for all faces, which is stored once
+  int levels = 0;           // 0: the texture cannot be drawn
   const std::uint32_t* texels = nullptr;
   float width[kMaxLevels] = {}, height[kMaxLevels] = {};
   int offset[kMaxLevels] = {};  // index of the level's first texel

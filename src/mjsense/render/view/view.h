@@ -59,6 +59,7 @@ struct alignas(64) ViewGeom {
   // A plane seen from below: drawn as a faint veil, absent in depth and segmentation.
   bool behind;
   void* bvh;  // RTCScene of a mesh, a height field's surface, a flex or a skin; else null
+  void* shadow_bvh = nullptr;      // the same triangles, for shadow rays; null: bvh
   const rays::Clusters* clusters;  // the same triangles, for rasterising; null: use rays only
   const rays::Horizons* horizons;  // horizons of the mesh's faces; null without clusters
   const MeshSurface* mesh;

@@ -256,6 +256,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
       if (geom.bvh) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
       g.casts = geom.casts;
       g.bvh = geom.bvh;
+      g.shadow_bvh = geom.shadow_bvh;
       g.clusters = geom.clusters;
       g.horizons = geom.horizons;
       g.mesh = geom.mesh;

@@ -43,7 +43,7 @@ struct DrawnGeom {
   int object_id, object;    // for segmentation
   bool casts;               // casts shadows
   const MeshSurface* mesh;  // null unless the shape has triangles
-  void* bvh;                // as in ViewGeom
+  void *bvh, *shadow_bvh;   // as in ViewGeom
   const rays::Clusters* clusters;
   const rays::Horizons* horizons;
   const rays::HeightField* height_field;

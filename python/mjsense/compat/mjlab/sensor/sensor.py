@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 import mjsense
+from mjsense import _core
 from mjsense.compat.mjlab._data import Data
 from mjsense.compat.mjlab._tensors import HAS_TORCH, Cache, tensor
 from mjsense.compat.mjlab.entity import Entity
@@ -62,9 +63,9 @@ class Sensor(Generic[T]):
         """Called once the simulation exists: resolve names, allocate.
 
         Args:
-            mj_model, model: the compiled model, twice.
+            mj_model, model: the compiled model, twice; with ``backend="warp"`` the second is mujoco_warp's.
             data: fields of mjData as tensors ``[B, ...]``: ``data.qpos``.
-            device: "cpu".
+            device: "cpu", or that of ``backend="warp"``.
         """
 
     def update(self, dt: float) -> None:
@@ -152,7 +153,8 @@ class OwnSensor(mjsense.Sensor):
         self.original.edit_spec(spec, {name: Entity(e, self._entity_cfgs.get(name)) for name, e in entities.items()})
 
     def initialize(self, sim: mjsense.Simulation) -> None:
-        self.original.initialize(sim.model, sim.model, Data(sim), "cpu")
+        on_warp: Any = sim
+        self.original.initialize(sim.model, getattr(on_warp, "warp_model", sim.model), Data(sim), getattr(on_warp, "device", "cpu"))
 
     def compute(self, sim: mjsense.Simulation) -> Any:
         self.original._invalid = False
@@ -162,7 +164,10 @@ class OwnSensor(mjsense.Sensor):
         return tensor(value) if isinstance(value, np.ndarray) else value
 
     def recompute(self) -> Any:
-        self._mjs_compute_rows(list(range(self.simulation.num_worlds)))
+        if isinstance(self._mjs_core, _core.Simulation):
+            self._mjs_compute_rows(list(range(self.simulation.num_worlds)))
+        else:
+            self._mjs_core.refresh(self._mjs_handle, again=True)
         return self._mjs_value
 
     def update(self, dt: float) -> None:

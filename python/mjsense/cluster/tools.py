@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjsense verify``, ``inspect`` and ``repair`` of a recording with an index, or at an address.
+
+The C++ program checks and shows the files of the shards. This module adds the comparison of the index with them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from mjsense.cluster.index import write_index
+from mjsense.cluster.job import ShardResult
+from mjsense.cluster.storage import Storage
+from mjsense.dataset.files import INDEX, EpisodeEntry, entries_of, read_index
+from mjsense.dataset.remote import is_address, resolved
+
+TOOLS = ("inspect", "verify", "repair")
+_ATTRIBUTES = ("length", "number", "seed", "outcome")
+
+
+def path_of(words: list[str]) -> str | None:
+    """The path of a command with these words if it is a recording with an index or at an address."""
+    if words[:1] and words[0] in TOOLS and not {"-h", "--help"} & {*words}:
+        path = _parse(words[1:])[0].path or ""
+        if is_address(path) or Path(path).name == INDEX or any((Path(path) / name).exists() for name in (INDEX, "job.json")):
+            return path
+    return None
+
+
+def _parse(words: list[str]) -> tuple[argparse.Namespace, list[str]]:
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("path", nargs="?")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--sheet")
+    parser.add_argument("--ffmpeg")
+    return parser.parse_known_args(words)
+
+
+def run(words: list[str]) -> int:
+    """Runs the command. Returns its exit code: 0: done, 1: something is damaged, 2: wrong input."""
+    given, others = _parse(words[1:])
+    options = [*others, *(["--ffmpeg", given.ffmpeg] if given.ffmpeg else [])]
+    try:
+        if words[0] == "verify":
+            found = verify(given.path, *options)
+            print(json.dumps(found, indent=2) if given.json else _verify_text(found))
+            return 0 if found["ok"] else 1
+        if words[0] == "repair":
+            made = repair(given.path, *options)
+            lines = [*made["actions"], *(f"cannot repair {failure}" for failure in made["failures"])]
+            print(json.dumps(made, indent=2) if given.json else "\n".join(lines) or "nothing to repair")
+            return 1 if made["failures"] else 0
+        sheet = ["--sheet", given.sheet] if given.sheet else []
+        local, about = _summary(given.path)
+        done = _program("inspect", local, *options, *sheet, *(["--json"] if given.json else []))
+        print(json.dumps({"index": about, **json.loads(done)}, indent=2) if given.json else f"{_summary_text(about)}{done}", end="")
+        return 0
+    except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
+        print(f"mjsense {words[0]}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+
+
+def _program(command: str, path: Path, *options: str) -> str:
+    """Output of the C++ program, which knows no index."""
+    code = "import os, sys; from mjsense import _core; sys.exit(_core.run_program([b'mjsense', *map(os.fsencode, sys.argv[1:])], []))"
+    done = subprocess.run([sys.executable, "-c", code, command, str(path), *options], capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        raise RuntimeError(done.stderr.strip().removeprefix("mjsense: "))
+    return done.stdout
+
+
+def _fetched(path: str) -> tuple[Path, list[dict[str, Any]] | None]:
+    """The local folder of a recording with all files that its index names, and the rows of the index; None: it has none."""
+    local, remote = resolved(path)
+    if not (local / INDEX).exists():
+        return local, None
+    rows = read_index(local)
+    if remote is not None:
+        for folder in {(local / row["path"]).parent: None for row in rows}:
+            remote.fetch(folder)
+    return local, rows
+
+
+def _summary(path: str) -> tuple[Path, dict[str, Any]]:
+    local, rows = _fetched(path)
+    rows = rows or []
+    tasks = Counter(row["task"] for row in rows)
+    return local, {"episodes": len(rows), "successes": sum(row["success"] for row in rows), "observations": sum(row["length"] for row in rows),
+                   "files": len({row["path"] for row in rows}), "instructions": len(tasks)}  # fmt: skip
+
+
+def _summary_text(about: dict[str, Any]) -> str:
+    return (f"{INDEX}  {about['episodes']} episodes, {about['successes']} successes, {about['observations']} observations, "
+            f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n")  # fmt: skip
+
+
+def verify(path: str, *options: str) -> dict[str, Any]:
+    """The result of ``mjsense verify --json`` for the files that an index names, and the comparison of the index with them.
+
+    Args:
+        path: Folder, index or address of a recording.
+        options: Further options of ``mjsense verify``.
+    """
+    local, rows = _fetched(path)
+    found: dict[str, Any] = json.loads(_program("verify", local, "--json", *options))
+    if rows is None:
+        return found
+    shards = {row["path"].split("/")[0] for row in rows}
+    # A shard that no row names may be incomplete: its worker may have died while it copied the files.
+    findings = [f for f in found["findings"] if f["place"].split("/")[0].split(" ")[0] in shards or not f["place"].startswith("shard_")]
+    findings += [{"error": True, "place": f"{INDEX} row {row}", "text": text} for row, text in _differences(local, rows)]
+    return found | {"ok": not any(f["error"] for f in findings), "findings": findings, "indexed": len(rows)}
+
+
+def _verify_text(found: dict[str, Any]) -> str:
+    lines = [f"{'error' if f['error'] else 'note'}: {f['place']} {f['text']}" for f in found["findings"]]
+    counts = ", ".join(f"{found[name]} {name}" for name in ("files", "episodes", "steps", "videos"))
+    index = f"; {found['indexed']} episodes in {INDEX}" if "indexed" in found else f"; no {INDEX}: the recording is not complete"
+    return "\n".join([*lines, f"{'intact' if found['ok'] else 'NOT intact'}: {counts}{index}"])
+
+
+def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str]]:
+    """Rows of the index that differ from the files, and how."""
+    found: list[tuple[int, str]] = []
+    files: dict[str, dict[str, EpisodeEntry] | str] = {}
+    before: dict[str, int] = {}
+    for number, row in enumerate(rows):
+        if row["path"] not in files:
+            try:
+                files[row["path"]] = {entry.trajectory: entry for entry in entries_of(local / row["path"])[0]}
+            except (OSError, KeyError, ValueError) as error:
+                files[row["path"]] = " ".join(str(error).split())
+        file = files[row["path"]]
+        if isinstance(file, str):
+            found.append((number, f"{row['path']} cannot be read: {file}"))
+        elif (entry := file.get(row["trajectory"])) is None:
+            found.append((number, f"{row['path']} has no {row['trajectory']}"))
+        else:
+            ours = row | {"number": row["episode"]}
+            found += [(number, f"{name} is {ours[name]!r}, but {getattr(entry, name)!r} in {row['path']} {row['trajectory']}")
+                      for name in _ATTRIBUTES if ours[name] != getattr(entry, name)]  # fmt: skip
+        house = Path(row["path"]).parent.name
+        if row["episode"] <= before.get(house, -1):
+            found.append((number, f"episode {row['episode']} follows episode {before[house]}: the order is wrong, or one is there twice"))
+        before[house] = row["episode"]
+    return found
+
+
+def repair(path: str, *options: str) -> dict[str, list[str]]:
+    """Makes the index agree with the shards: a shard that is damaged is no longer marked as done, so that ``record --resume`` records it
+    again, and the index is written anew from the complete shards without a gap. Nothing is deleted but marks.
+
+    Returns:
+        ``actions`` and ``failures``: sentences.
+    """
+    address = path if is_address(path) else str(resolved(path)[0])
+    address = address.rstrip("/").removesuffix(f"/{INDEX}")
+    storage = Storage(address)
+    made: dict[str, list[str]] = {"actions": [], "failures": []}
+    if storage.read("job.json") is None:
+        return json.loads(_program("repair", _fetched(path)[0], "--json", *options))
+    local, rows = _fetched(path)
+    damaged: dict[str, str] = {}
+    if any(local.glob("shard_*/*/*.h5")):
+        for finding in json.loads(_program("verify", local, "--json", *options))["findings"]:
+            if finding["error"]:
+                damaged.setdefault(finding["place"].split("/")[0], f"{finding['place']} {finding['text']}")
+    done: dict[int, ShardResult] = {}
+    for name in storage.find("shard_*/done.json"):
+        folder = name.split("/")[0]
+        try:
+            result = ShardResult.parse(storage.read(name) or b"")
+            missing = next((row["path"] for row in result.episodes if not storage.exists(f"{folder}/{row['path']}")), None)
+            why = damaged.get(folder) or (f"{missing} does not exist" if missing else "")
+        except (ValueError, TypeError, KeyError) as error:
+            result, why = None, f"done.json cannot be read: {error}"
+        if result is None or why:
+            storage.remove(name)
+            made["actions"].append(f"{folder}: {why}. It is no longer marked as done; mjsense record --resume records it again")
+        else:
+            done[result.shard.number] = result
+    count = 0
+    while count in done:
+        count += 1
+    limit = len(rows) if rows is not None else sum(len(done[n].episodes) for n in range(count))
+    before = storage.read(INDEX)
+    kept = write_index(storage, [done[n] for n in range(count)], limit)
+    if storage.read(INDEX) != before:
+        made["actions"].append(f"{INDEX}: written with the {kept} episodes of {count} complete shards")
+    return made

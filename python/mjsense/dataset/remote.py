@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings at addresses of fsspec, such as ``s3://bucket/pick``: their files are copied to a local folder when they are first read."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mjsense.dataset.files import INDEX
+
+
+def is_address(root: str | Path) -> bool:
+    """Whether this is an address instead of a path."""
+    return "://" in str(root)
+
+
+def open_address(address: str) -> tuple[Any, str]:
+    """fsspec's file system of an address or a path, and the path there."""
+    try:
+        from fsspec.core import url_to_fs  # pyright: ignore[reportMissingImports]
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"{address} needs fsspec: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    return url_to_fs(address)
+
+
+@dataclass(frozen=True)
+class Remote:
+    """A recording at an address, and its local copy. A folder that exists in the copy is complete."""
+
+    address: str
+    local: Path
+
+    def fetch(self, folder: Path) -> None:
+        """Copies a folder of the recording, given by its place in the local copy, if it is not there yet."""
+        if folder.exists():
+            return
+        system, root = open_address(self.address)
+        source, part = f"{root}/{folder.relative_to(self.local)}", folder.with_name(f"{folder.name}.{os.getpid()}.part")
+        if not (found := system.find(source)):
+            raise FileNotFoundError(f"{self.address}/{folder.relative_to(self.local)} does not exist, but the index of the recording names it")
+        shutil.rmtree(part, ignore_errors=True)
+        for file in found:
+            target = part / str(file)[len(source) + 1 :]
+            target.parent.mkdir(parents=True, exist_ok=True)
+            system.get_file(file, str(target))
+        try:
+            part.rename(folder)
+        except OSError:  # another process was faster
+            shutil.rmtree(part, ignore_errors=True)
+            if not folder.exists():
+                raise
+
+
+def resolved(root: str | Path) -> tuple[Path, Remote | None]:
+    """The local folder or file of a recording: of an index the folder that contains it, of an address the local copy.
+
+    Of a recording with an index, only the index is copied here, and the folders of episodes when they are first read. Copies are in
+    ``$MJSENSE_CACHE``, by default ``~/.cache/mjsense``; a recording that has changed gets a new one.
+    """
+    if not is_address(root):
+        path = Path(root)
+        return (path.parent if path.name == INDEX else path), None
+    address = str(root).rstrip("/").removesuffix(f"/{INDEX}")
+    system, base = open_address(address)
+    if "file" in (protocol := (system.protocol,) if isinstance(system.protocol, str) else system.protocol) or "local" in protocol:
+        return Path(base), None
+    small = {name: system.cat_file(f"{base}/{name}") for name in (INDEX, "job.json") if system.exists(f"{base}/{name}")}
+    if INDEX in small:
+        version = small[INDEX]
+    elif not (files := system.find(base, detail=True)):
+        raise FileNotFoundError(f"{address} contains no recording")
+    else:
+        version = repr(sorted((name, about.get("size")) for name, about in files.items())).encode()
+    cache = Path(os.environ.get("MJSENSE_CACHE") or Path.home() / ".cache/mjsense")
+    local = cache / hashlib.sha256(address.encode() + b"\0" + version).hexdigest()[:16] / base.rsplit("/", 1)[-1]
+    remote = Remote(address, local)
+    if INDEX not in small:
+        local.parent.mkdir(parents=True, exist_ok=True)
+        remote.fetch(local)
+        return local, None
+    local.mkdir(parents=True, exist_ok=True)
+    for name, content in small.items():
+        part = local / f"{name}.{os.getpid()}.part"
+        part.write_bytes(content)
+        part.replace(local / name)
+    return local, remote

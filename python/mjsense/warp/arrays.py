@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays of the device as the user sees them: torch tensors on the same memory if torch is installed, otherwise ``wp.array``."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+
+@cache
+def torch() -> Any:
+    """The module torch, or None if it is not installed."""
+    try:
+        import torch  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        return None
+    return torch
+
+
+def share(array: wp.array) -> Any:
+    """The same memory as a tensor, or the array itself without torch."""
+    return array if torch() is None else wp.to_torch(array, requires_grad=False)
+
+
+def on_host(values: Any) -> np.ndarray:
+    """Values of any kind of array as a NumPy array."""
+    if isinstance(values, wp.array):
+        return values.numpy()
+    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
+
+
+def write(array: wp.array, values: Any, rows: Any = slice(None)) -> None:
+    """Writes values, which may broadcast, to these rows. The values of a tensor on the device stay there."""
+    if torch() is None:
+        host = array.numpy()
+        host[rows] = on_host(values)
+        array.assign(host)
+        return
+    target = wp.to_torch(array, requires_grad=False)
+    if isinstance(values, wp.array):
+        values = wp.to_torch(values, requires_grad=False)
+    index = rows if isinstance(rows, slice) else torch().as_tensor(rows, device=target.device)
+    target[index] = torch().as_tensor(values, dtype=target.dtype, device=target.device)

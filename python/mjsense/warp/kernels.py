@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kernels over the state of all worlds: invalid numbers, resets and clocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+STALE = 1 << 30
+"""Bit of the status: the state was written, and derived quantities were not computed again."""
+
+
+OVERFLOW = 1 << 29
+"""Bit of the status: contacts or constraints were left out."""
+
+
+@wp.kernel
+def flag_overflow(
+    errors: int,
+    njmax: int,
+    naconmax: int,
+    rows: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    contacts: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    pairs: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    overflow: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+    status: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
+):
+    world = wp.tid()
+    if rows[world] > njmax or contacts[0] > naconmax or pairs[0] > naconmax or (overflow[world] & errors) != 0:
+        status[world] = status[world] | wp.static(OVERFLOW)
+
+
+@wp.kernel
+def flag_invalid(values: wp.array2d(dtype=wp.float32), bit: int, status: wp.array(dtype=wp.int32)):  # type: ignore[valid-type]
+    """Sets the bit of worlds with NaN, infinity or a number beyond MuJoCo's limit of 1e10."""
+    world, i = wp.tid()
+    x = values[world, i]
+    if not (wp.abs(x) <= 1.0e10):
+        wp.atomic_or(status, world, bit)
+
+
+@wp.kernel
+def flag_changed(values: wp.array2d(dtype=wp.float32), known: wp.array2d(dtype=wp.float32), status: wp.array(dtype=wp.int32)):  # type: ignore[valid-type]
+    world, i = wp.tid()
+    if values[world, i] != known[world, i]:
+        wp.atomic_or(status, world, wp.static(STALE))
+
+
+@wp.kernel
+def failed_worlds(status: wp.array(dtype=wp.int32), mask: wp.array(dtype=wp.bool)):  # type: ignore[valid-type]
+    """The worlds whose state contains invalid numbers."""
+    world = wp.tid()
+    mask[world] = (status[world] & wp.static(OVERFLOW - 1)) != 0
+
+
+@wp.kernel
+def copy_rows(
+    mask: wp.array(dtype=wp.bool), row: wp.array(dtype=wp.int32), source: wp.array2d(dtype=Any), target: wp.array2d(dtype=Any)
+):  # type: ignore[valid-type]
+    """Row ``row[w]`` of the source, modulo its number of rows, for the worlds of the mask."""
+    world, i = wp.tid()
+    if mask[world]:
+        target[world, i] = source[row[world] % source.shape[0], i]
+
+
+@wp.kernel
+def copy_qpos0(
+    mask: wp.array(dtype=wp.bool),
+    row: wp.array(dtype=wp.int32),
+    qpos0: wp.array2d(dtype=wp.float32),
+    qpos: wp.array2d(dtype=wp.float32),
+):  # type: ignore[valid-type]
+    """The model's own pose, which may differ between worlds, for the worlds of the mask that start from it."""
+    world, i = wp.tid()
+    if mask[world] and row[world] == 0:
+        qpos[world, i] = qpos0[world % qpos0.shape[0], i]
+
+
+@wp.kernel
+def begin_episode(
+    mask: wp.array(dtype=wp.bool),  # type: ignore[valid-type]
+    substep: wp.array(dtype=wp.int64),  # type: ignore[valid-type]
+    episode: wp.array(dtype=wp.int64),  # type: ignore[valid-type]
+    first: wp.array(dtype=wp.bool),  # type: ignore[valid-type]
+    time: wp.array(dtype=wp.float32),  # type: ignore[valid-type]
+):
+    world = wp.tid()
+    if mask[world]:
+        substep[world] = wp.int64(0)
+        episode[world] = episode[world] + wp.int64(1)
+        first[world] = True
+        time[world] = 0.0
+
+
+@wp.kernel
+def advance_clocks(
+    dt: wp.float64,
+    substep: wp.array(dtype=wp.int64),  # type: ignore[valid-type]
+    tick: wp.array(dtype=wp.int64),  # type: ignore[valid-type]
+    first: wp.array(dtype=wp.bool),  # type: ignore[valid-type]
+    time: wp.array(dtype=wp.float32),  # type: ignore[valid-type]
+):
+    """Counts a physics step. The time is a multiple of the timestep and does not accumulate rounding errors."""
+    world = wp.tid()
+    substep[world] = substep[world] + wp.int64(1)
+    tick[world] = tick[world] + wp.int64(1)
+    first[world] = False
+    time[world] = wp.float32(wp.float64(substep[world]) * dt)
+
+
+@wp.kernel
+def times(dt: wp.float64, substep: wp.array(dtype=wp.int64), time: wp.array(dtype=wp.float64)):  # type: ignore[valid-type]
+    world = wp.tid()
+    time[world] = wp.float64(substep[world]) * dt

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of episodes: a policy that moves, waits and moves again; picks of the planner; the program."""
+
+import json
+
+import numpy as np
+import pytest
+from mjsense.commands import run as run_command
+
+import mjsense as mjs
+
+MOVES, WAITS = 5, 12
+
+
+class Waiting(mjs.Policy):
+    """Raises one joint, waits, and raises it again."""
+
+    observation = ("qpos",)
+
+    def initialize(self):
+        self.step = 0
+
+    def act(self, obs):
+        raised = min(self.step, MOVES) + max(0, self.step - MOVES - WAITS)
+        self.step += 1
+        arm = np.tile([0, -0.7853, 0, -2.35619, 0, 1.57079, 0], (self.num_worlds, 1))
+        arm[:, 3] += 0.05 * raised
+        return {"arm": arm, "gripper": np.zeros((self.num_worlds, 1))}
+
+
+@pytest.fixture(scope="module")
+def waiting(tmp_path_factory):
+    out = tmp_path_factory.mktemp("waiting")
+    mjs.record(
+        "pick", policy=Waiting, out=out, horizon=2 * MOVES + WAITS, worlds=1, keep_failures=True, cameras=[], action_noise=False
+    )
+    return out
+
+
+@pytest.fixture(scope="module")
+def picks(tmp_path_factory):
+    out = tmp_path_factory.mktemp("picks")
+    mjs.record("pick", policy="top_down_planner", out=out, episodes=2, worlds=2, width=32, height=24, shadows=False)
+    return out
+
+
+def test_a_wait_is_found(waiting):
+    (episode,) = mjs.Dataset(waiting).episodes
+    idle = np.flatnonzero(episode.idle)
+    # The servos need a few steps until they stand still.
+    assert set(range(MOVES + 6, MOVES + WAITS)) <= set(idle) and not set(range(2, MOVES)) & set(idle)
+    quality = episode.quality
+    assert quality.idle == pytest.approx(episode.idle[1:].mean()) and 0.2 < quality.idle < 0.7
+    assert quality.longest_wait == pytest.approx(
+        len(idle[(idle > MOVES) & (idle <= MOVES + WAITS + 1)]) / float(episode.fps), abs=0.07
+    )
+    assert np.isnan(quality.approach) and quality.visibility == {}
+
+
+def test_picks_from_above(picks):
+    for episode in mjs.Dataset(picks).episodes:
+        quality = episode.quality
+        assert quality.approach < 30 and quality.jerk > 0 and quality.idle < 0.3
+        seen = episode["obs/extra/object_image_points/pickup_obj/wrist_camera/num_points"] > 0
+        assert quality.visibility["wrist_camera"]["pickup_obj"] == pytest.approx(seen.mean())
+
+
+def test_episodes_are_chosen_by_a_function(waiting, picks):
+    assert len(mjs.Dataset(picks, where=lambda episode: episode.quality.idle < 0.3).episodes) == 2
+    assert not mjs.Dataset(waiting, where=lambda episode: episode.quality.idle < 0.1).episodes
+
+
+def test_program(picks, waiting, capsys):
+    assert run_command(["quality", str(picks), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["episode"] for row in rows] == [0, 1] and rows[0]["visibility"].keys() == {"wrist_camera", "exo_camera_1"}
+    assert run_command(["quality", str(waiting)]) == 0
+    assert "longest wait" in capsys.readouterr().out

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""record --format lerobot: equal to a recording that is exported, also after SIGKILL at any moment."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip("av")
+pytest.importorskip("pyarrow")
+
+from mjsense.export.record_lerobot import CompleteError
+
+import mjsense as mjs
+
+ARGUMENTS = {"horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5, "episodes": 6, "max_attempts": 6, "batches": 3}
+WORDS = ["record", "pick", "--horizon", "12", "--keep-failures", "--size", "32x24", "--worlds", "2", "--seed", "5", "--episodes", "6",
+         "--max-attempts", "6", "--batches", "3", "--format", "lerobot", "--resume", "-q"]  # fmt: skip
+KILLS = int(os.environ.get("MJSENSE_TEST_KILLS", "3"))
+
+
+def tree(root):
+    return {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exported")
+    mjs.record("pick", out=folder / "recording", **ARGUMENTS)
+    return tree(mjs.export_lerobot(folder / "recording", folder / "out", statistics_frames="key"))
+
+
+def test_it_equals_an_exported_recording(exported, tmp_path):
+    summary = mjs.record("pick", out=tmp_path / "out", format="lerobot", keep_recording=True, **ARGUMENTS)
+    assert summary.path == tmp_path / "out" and tree(tmp_path / "out") == exported
+    assert mjs.check_replay(tmp_path / "out.recording", episodes=[0]).ok
+    with pytest.raises(FileExistsError, match="exists; name another output"):
+        mjs.record("pick", out=tmp_path / "out", format="lerobot", **ARGUMENTS)
+    with pytest.raises(CompleteError):
+        mjs.record("pick", out=tmp_path / "out", format="lerobot", resume=True, **ARGUMENTS)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]  # without keep_recording
+    with pytest.raises(ValueError, match=r"append .*cannot be combined with format='lerobot'"):
+        mjs.record("pick", out=tmp_path / "more", format="lerobot", append=True, **ARGUMENTS)
+
+
+def test_kill_at_any_moment(exported, tmp_path, capsys):
+    """Each recording is killed once or twice at random times, and resumed."""
+    rng, rows, kills, took = random.Random(1), [], 0, 0.0
+    while kills < KILLS:
+        out = tmp_path / f"out_{len(rows)}"
+        command, row = [sys.executable, "-m", "mjsense", *WORDS, "--out", str(out)], []
+        while True:
+            begun = time.monotonic()
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            if took and len(row) < 2 and kills < KILLS:
+                try:
+                    process.wait(rng.uniform(0.2, took))
+                except subprocess.TimeoutExpired:
+                    process.send_signal(signal.SIGKILL)
+                    process.communicate()
+                    states = [name for name in (".recording", ".part", "", ".removed") if out.with_name(out.name + name).exists()]
+                    row.append(f"{time.monotonic() - begun:.2f} s: {' '.join(f'OUT{name}' for name in states) or 'nothing'}")
+                    kills += 1
+                    continue
+            error = process.communicate()[1]
+            assert process.returncode == 0, error
+            took = took or time.monotonic() - begun
+            break
+        assert tree(out) == exported, row
+        assert [path.name for path in tmp_path.glob(f"{out.name}*")] == [out.name]
+        rows.append(row)
+    with capsys.disabled():
+        print("", *(f"{i}: {'; '.join(row)}" for i, row in enumerate(rows) if row), sep="\n")

@@ -1,0 +1,435 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares simulations with ``backend="warp"`` with those on the CPU, measures their speed, and writes the tables of docs/warp.md.
+
+    python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 30] [--long 1000] [--write]
+
+Both simulations step from the same states with the same controls. Then the states of the CPU are copied, so that they are the same again,
+and every field of every sensor is compared. Forces and accelerations are compared in worlds in which mujoco_warp finds the same contacts
+as MuJoCo; the others are counted. The exit code is 1 if a field differs by more than its bound.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mjsense as mjs
+from mjsense import effects
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "warp.md"
+BEGIN, END = "<!-- table of tools/gpu_check.py -->", "<!-- end -->"
+STATE = ("qpos", "qvel", "act", "mocap_pos", "mocap_quat")
+
+ROBOT = """
+<mujoco>
+  <asset><texture name="grid" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".8 .8 .7" width="64" height="64"/>
+    <material name="grid" texture="grid" texrepeat="4 4"/></asset>
+  <worldbody>
+    <light pos="1 -1 3" dir="-.3 .3 -1"/>
+    <body name="trunk" pos="0 0 .25"><freejoint name="root"/>
+      <geom name="trunk" type="box" size=".2 .15 .1" mass="4" material="grid"/>
+      <site name="imu" pos=".1 0 .02" euler="5 10 15"/><site name="nose" pos=".25 0 0" size=".05"/>
+      <camera name="eye" pos=".1 0 .25" xyaxes="0 -1 0 .7 0 1"/>
+      <body name="left_wheel" pos="0 .2 -.1"><joint name="left" axis="0 1 0"/>
+        <geom name="left_wheel" type="sphere" size=".1" mass=".3"/></body>
+      <body name="right_wheel" pos="0 -.2 -.1"><joint name="right" axis="0 1 0"/>
+        <geom name="right_wheel" type="sphere" size=".1" mass=".3"/></body>
+      <body name="arm" pos=".2 0 .1"><joint name="arm" axis="0 1 0" damping=".2" range="-40 80" limited="true"/>
+        <geom name="arm" type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass=".4"/><site name="hand" pos=".3 0 0" size=".04"/></body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="difference"><joint joint="left" coef="1"/><joint joint="right" coef="-1"/></fixed></tendon>
+  <actuator><motor name="left" joint="left"/><motor name="right" joint="right"/><motor name="arm" joint="arm" gear="3"/></actuator>
+  <sensor>
+    <touch name="touch" site="hand"/><accelerometer name="accelerometer" site="imu"/><velocimeter name="velocimeter" site="imu"/>
+    <gyro name="gyro" site="imu"/><force name="force" site="hand"/><torque name="torque" site="hand"/>
+    <magnetometer name="magnetometer" site="imu"/><rangefinder name="rangefinder" site="nose"/>
+    <jointpos name="jointpos" joint="arm"/><jointvel name="jointvel" joint="arm"/>
+    <jointactuatorfrc name="jointactuatorfrc" joint="arm"/><jointlimitpos name="jointlimitpos" joint="arm"/>
+    <tendonpos name="tendonpos" tendon="difference"/><tendonvel name="tendonvel" tendon="difference"/>
+    <actuatorpos name="actuatorpos" actuator="arm"/><actuatorvel name="actuatorvel" actuator="arm"/>
+    <actuatorfrc name="actuatorfrc" actuator="arm"/>
+    <framepos name="framepos" objtype="site" objname="hand" reftype="body" refname="trunk"/>
+    <framequat name="framequat" objtype="site" objname="hand"/>
+    <framexaxis name="framexaxis" objtype="site" objname="hand"/><frameyaxis name="frameyaxis" objtype="site" objname="hand"/>
+    <framezaxis name="framezaxis" objtype="site" objname="hand"/><framelinvel name="framelinvel" objtype="site" objname="hand"/>
+    <frameangvel name="frameangvel" objtype="site" objname="hand"/><framelinacc name="framelinacc" objtype="site" objname="hand"/>
+    <frameangacc name="frameangacc" objtype="site" objname="hand"/><subtreecom name="subtreecom" body="trunk"/>
+    <subtreelinvel name="subtreelinvel" body="trunk"/><subtreeangmom name="subtreeangmom" body="trunk"/>
+    <e_potential name="e_potential"/><e_kinetic name="e_kinetic"/><clock name="clock"/>
+  </sensor>
+</mujoco>"""
+BOX = """
+<mujoco><worldbody><body name="box"><freejoint/>
+  <geom name="box" type="box" size=".1 .1 .1" mass=".2" rgba=".8 .3 .2 1"/></body></worldbody></mujoco>"""
+BALL = """
+<mujoco><worldbody><body name="ball"><freejoint/>
+  <geom name="ball" type="sphere" size=".1" mass=".2" rgba=".2 .7 .3 1"/></body></worldbody></mujoco>"""
+
+EVERY_FIELD = ("found", "force", "torque", "dist", "pos", "normal", "tangent")
+
+
+def quadruped_sensors() -> tuple[Any, ...]:
+    feet, ground = mjs.ContactMatch("geom", ".*_foot", "robot"), mjs.ContactMatch("body", "terrain")
+    base = mjs.ObjRef("site", "imu", "robot")
+    return (
+        mjs.ContactSensorCfg(
+            "feet", feet, ground, EVERY_FIELD, num_slots=2, track_air_time=True, history_length=3, track_events=True, latch=True,
+            friction_split=True, other_ids=True),
+        mjs.ContactSensorCfg("net", feet, ground, ("found", "force", "torque", "pos"), reduce="netforce", latch=True, other_ids=True),
+        mjs.ContactSensorCfg("deepest", feet, ground, ("found", "dist", "pos"), reduce="mindist", global_frame=False),
+        mjs.ContactSensorCfg("legs", mjs.ContactMatch("subtree", ".*_hip", "robot"), None, EVERY_FIELD, global_frame=True),
+        mjs.RayCastSensorCfg("scan", base, mjs.GridPatternCfg(size=(1.0, 0.6), resolution=0.1), ray_alignment="yaw"),
+        mjs.TerrainHeightSensorCfg("height", base, mjs.GridPatternCfg(size=(0.2, 0.2), resolution=0.1)),
+        mjs.LidarSensorCfg("lidar", base, scan=mjs.SpinningScanCfg(channels=4, samples=24), range_noise_std=0.01, dropout=0.05),
+        mjs.ImuSensorCfg("imu", base, "mpu6050", orientation=True),
+        mjs.EffectSensorCfg("noisy", "imu", effects=(effects.EpisodeBias(effects.Gaussian(0.05)), effects.Noise(effects.Gaussian(0.1)), effects.Delay(0.02))),
+    )  # fmt: skip
+
+
+def plane() -> mjs.SceneCfg:
+    robot = mjs.EntityCfg(model="embedded:robots/quadruped.xml")
+    return mjs.SceneCfg(entities={"robot": robot}, terrain=mjs.TerrainCfg(), sensors=quadruped_sensors())
+
+
+def feet_only() -> mjs.SceneCfg:
+    return mjs.SceneCfg(
+        entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")},
+        terrain=mjs.TerrainCfg(),
+        sensors=quadruped_sensors()[:1],
+    )
+
+
+def rough() -> mjs.SceneCfg:
+    rough = mjs.SubTerrainCfg("rough")
+    terrain = mjs.TerrainCfg("generator", {"rough": rough}, levels=1, tile_size=(4.0, 4.0), border=0.0)
+    robot = mjs.EntityCfg(model="embedded:robots/quadruped.xml")
+    return mjs.SceneCfg(entities={"robot": robot}, terrain=terrain, sensors=quadruped_sensors())
+
+
+def objects() -> mjs.SceneCfg:
+    """Objects that touch each other, every type of built-in sensor, and cameras."""
+    robot, box, ball = (
+        mjs.EntityCfg(ROBOT, pos=(0, 0, 0.2)),
+        mjs.EntityCfg(BOX, pos=(0.6, 0, 0.1)),
+        mjs.EntityCfg(BALL, pos=(0.62, 0.02, 0.295)),
+    )
+    things = {"robot": robot, "box": box, "ball": ball}
+    every = mjs.ContactMatch("body", ("box/box", "ball/ball", "robot/trunk", "robot/left_wheel", "robot/arm"))
+    return mjs.SceneCfg(
+        entities=things, terrain=mjs.TerrainCfg(), sensors=(
+            mjs.ContactSensorCfg("contacts", every, None, EVERY_FIELD, num_slots=6, other_ids=True),
+            mjs.ContactSensorCfg("pairs", every, every, ("found",), secondary_policy="each"),
+            mjs.ContactSensorCfg("any", mjs.ContactMatch("subtree", "trunk", "robot"), None, ("found", "dist"), reduce="none", num_slots=8),
+            mjs.CameraSensorCfg(
+                "eye", camera_name="robot/eye", width=32, height=24, data_types=("rgb", "depth", "segmentation")),
+        ))  # fmt: skip
+
+
+SCENES: dict[str, Callable[[], mjs.SceneCfg]] = {
+    "quadruped on a plane": plane,
+    "quadruped on rough terrain": rough,
+    "objects": objects,
+}
+
+FORCES = ("N", "N m", "m/s^2", "rad/s^2")
+"""Units of quantities that depend on the constraint solver, whose tolerance is larger than the rounding of float32."""
+EXACT = ("found", "found_history", "pair_found", "other_geom", "other_body", "geom_id", "body_id", "material_id", "segmentation")
+"""Fields that are compared for equality although some are floats."""
+DELAY_STEPS = 8
+"""Number of control steps that are longer than the delay of the effect."""
+OTHER_CONTACTS = {
+    False: ("contact", "(worlds with other contacts)"),
+    True: ("contact", "(worlds with other contacts, height field)"),
+}
+
+
+@dataclass
+class Field:
+    """Differences of one field over all scenes, sensors of its kind, worlds and steps."""
+
+    unit: str = ""
+    exact: bool = False
+    colours: bool = False
+    contacts: bool = False
+    values: int = 0
+    other: int = 0
+    """Number of values that are not equal (integers, bools, counts), or beyond the bound."""
+    largest: float = 0.0
+    difference: float = 0.0
+    differences: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, ours: np.ndarray, theirs: np.ndarray, rows: np.ndarray) -> None:
+        """``rows``: the worlds whose contacts, hits and so on are the same on both sides."""
+        self.values += ours.size
+        if self.exact:
+            self.other += int((ours != theirs).sum())
+            return
+        ours, theirs = ours[rows].astype(float), theirs[rows].astype(float)
+        both = np.isfinite(ours) & np.isfinite(theirs)
+        self.other += int((np.isfinite(ours) != np.isfinite(theirs)).sum())
+        if both.any():
+            difference = np.abs(ours - theirs)[both]
+            self.largest = max(self.largest, float(np.abs(theirs[both]).max()))
+            self.difference = max(self.difference, float(difference.max()))
+            self.differences.append(np.sort(difference.ravel())[-max(1, difference.size // 500) :])
+
+    @property
+    def bound(self) -> float:
+        """Of the difference that one value in a thousand may exceed: 0.5 % of the largest value for quantities that depend on forces,
+        100 of 255 for colours, because textures are filtered in another way at their edges, 0.05 % for contacts, and 0.005 % for all others."""
+        if self.colours:
+            return 100.0
+        share = 5e-3 if self.unit in FORCES else 5e-4 if self.contacts else 5e-5
+        return share * max(self.largest, 1.0)
+
+    def tail(self) -> float:
+        """The difference that one value in a thousand exceeds."""
+        found = np.sort(np.concatenate(self.differences)) if self.differences else np.zeros(1)
+        return float(found[-min(len(found), max(1, self.values // 1000))])
+
+
+def on_host(values: Any) -> np.ndarray:
+    return values.cpu().numpy() if hasattr(values, "cpu") else values.numpy() if hasattr(values, "device") else np.asarray(values)
+
+
+def pair(scene: Callable[[], mjs.SceneCfg], worlds: int, device: str, decimation: int = 2) -> tuple[Any, Any]:
+    """A simulation on the CPU and one on the device."""
+    ours = mjs.Simulation(
+        mjs.Scene(scene()), worlds, decimation=decimation, backend="warp", device=device, nconmax=100, njmax=400
+    )
+    return mjs.Simulation(mjs.Scene(scene()), worlds, decimation=decimation), ours
+
+
+def steps(reference: Any, ours: Any, count: int, seed: int = 0) -> Iterator[int]:
+    """Steps both from the same states under random controls."""
+    rng = np.random.default_rng(seed)
+    key = "init_state" if reference.model.nkey else None
+    reference.reset(key=key)
+    ours.reset(key=key)
+    start = reference.ctrl.copy()
+    velocity = 0.3 * rng.normal(size=reference.qvel.shape)
+    reference.set_state(qvel=velocity)
+    ours.set_state(qvel=velocity)
+    for step in range(count):
+        if step % 5 == 0:
+            push = rng.normal(size=reference.ctrl.shape) * 0.5
+        reference.ctrl[:] = start + push
+        ours.ctrl = reference.ctrl
+        reference.step()
+        ours.step()
+        ours.set_state(**{name: getattr(reference, name) for name in STATE})
+        yield step
+
+
+def same_contacts(reference: Any, ours: Any) -> np.ndarray:
+    """The worlds in which both find the same contacts, bool ``[B]``."""
+    same = np.ones(reference.num_worlds, bool)
+    for name, sensor in reference.scene.sensors.items():
+        if sensor.kind == "contact":
+            theirs, mine = sensor.fields, ours.scene[name].fields
+            for key, tolerance in {
+                "found": 0.0,
+                "found_history": 0.0,
+                "dist": 1e-5,
+                "dist_history": 1e-5,
+                "normal": 1e-3,
+            }.items():
+                if key in theirs:
+                    difference = np.abs(on_host(mine[key]) - theirs[key]).reshape(len(same), -1)
+                    same &= (difference <= tolerance).all(1)
+    return same
+
+
+def compare(found: dict[tuple[str, str], Field], reference: Any, ours: Any, past: list[np.ndarray]) -> None:
+    """Adds the differences of all sensors at the current state. ``past``: in which worlds earlier steps had the same contacts."""
+    same = same_contacts(reference, ours)
+    past.append(same)
+    delayed = np.all(past[-DELAY_STEPS:], axis=0)
+    on_height_field = reference.model.nhfield > 0
+    contacts = found[OTHER_CONTACTS[on_height_field]]
+    contacts.exact, contacts.values, contacts.other = True, contacts.values + len(same), contacts.other + int((~same).sum())
+    forces = {reference.model.sensor(i).name for i in np.flatnonzero(reference.model.sensor_needstage == 3)}
+    for name, sensor in reference.scene.sensors.items():
+        # mujoco_warp finds other contacts on height fields.
+        if name not in ours.scene.sensors or sensor.kind == "contact_field" or (sensor.kind == "contact" and on_height_field):
+            continue
+        theirs, mine = sensor.fields, ours.scene[name].fields
+        assert set(theirs) == set(mine), name
+        rows = np.ones(len(same), bool)
+        if sensor.kind in ("contact", "imu", "effect") or name in forces:
+            rows = (delayed if sensor.kind == "effect" else same).copy()
+        for key in theirs:
+            ids = on_host(mine[key]) if key in EXACT or theirs[key].dtype.kind in "bi" else None
+            if ids is not None:
+                rows &= (ids == theirs[key]).reshape(len(rows), -1).all(1)
+        for key, spec in sensor.specs.items():
+            label = (
+                sensor.cfg.sensor_type
+                if sensor.kind == "builtin" and sensor.cfg
+                else name.split("/")[-1]
+                if sensor.kind == "builtin"
+                else key
+            )
+            entry = found[sensor.kind, label]
+            entry.colours, entry.contacts = theirs[key].dtype == np.uint8, sensor.kind == "contact"
+            entry.unit, entry.exact = spec.unit, key in EXACT or theirs[key].dtype.kind in "bi"
+            assert on_host(mine[key]).shape == theirs[key].shape and on_host(mine[key]).dtype == theirs[key].dtype, (name, key)
+            entry.add(on_host(mine[key]), theirs[key], rows)
+
+
+def run(device: str, worlds: int, count: int, scenes: dict[str, Callable[[], mjs.SceneCfg]]) -> dict[tuple[str, str], Field]:
+    found: dict[tuple[str, str], Field] = defaultdict(Field)
+    for name, scene in scenes.items():
+        began = time.perf_counter()
+        reference, ours = pair(scene, worlds, device)
+        past: list[np.ndarray] = []
+        for _ in steps(reference, ours, count):
+            compare(found, reference, ours, past)
+        print(f"{name}: {time.perf_counter() - began:.0f} s", file=sys.stderr)
+    return found
+
+
+def beyond(found: dict[tuple[str, str], Field]) -> list[str]:
+    """Fields that differ by more than their bound, or, if they are compared for equality, in more than 1 % of the values."""
+    wrong = []
+    for (kind, name), entry in found.items():
+        if (kind, name) not in OTHER_CONTACTS.values() and entry.other > 0.01 * entry.values:
+            wrong.append(f"{kind} {name}: {entry.other} of {entry.values} are not equal")
+        if not entry.exact and entry.tail() > entry.bound:
+            wrong.append(f"{kind} {name}: {entry.tail():.2g} {entry.unit} in one of 1,000, the bound is {entry.bound:.2g}")
+    return wrong
+
+
+def table(found: dict[tuple[str, str], Field]) -> list[str]:
+    lines = [
+        "| sensor | field | unit | largest value | largest difference | exceeded by 1 in 1,000 | its bound | not equal |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for (kind, name), entry in sorted(found.items()):
+        share = f"{entry.other:,} of {entry.values:,}" if entry.exact or entry.other else ""
+        numbers = [""] * 4 if entry.exact else [f"{x:.2g}" for x in (entry.largest, entry.difference, entry.tail(), entry.bound)]
+        lines.append(f"| {' | '.join([kind, name, entry.unit, *numbers, share])} |")
+    return lines
+
+
+def long_run(device: str, worlds: int, count: int) -> list[str]:
+    """Differences of what a contact sensor remembers, over many steps without a reset."""
+    found: dict[tuple[str, str], Field] = defaultdict(Field)
+    reference, ours = pair(feet_only, worlds, device)
+    landings, past = 0, []
+    for _ in steps(reference, ours, count):
+        compare(found, reference, ours, past)
+        landings += int(reference.scene["feet"].data.touchdown.sum())
+    remembered = {
+        key: entry for key, entry in found.items() if key[1].endswith(("_time", "_history", "touchdown", "liftoff", "_peak"))
+    }
+    print("\n".join(beyond(remembered)), file=sys.stderr)
+    return [*table(remembered), "", f"{landings:,} touchdowns in {count:,} control steps of {worlds} worlds."]
+
+
+def speed(device: str, worlds: int, count: int = 20) -> list[str]:
+    """Control steps of the quadruped with all sensors, which are read after each step."""
+    lines = [
+        "| backend | device | worlds | control steps of a world per second | memory of a world |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    reference, ours = pair(plane, worlds, device)
+    for name, sim in {"cpu": reference, "warp": ours}.items():
+        sim.reset(key="init_state")
+        sensors = [sensor for sensor in sim.scene.sensors.values() if sensor.cfg is not None]
+        for step in range(count + 3):
+            if step == 3:
+                began = time.perf_counter()
+            sim.step()
+            for sensor in sensors:
+                sensor.data
+            if step in (2, count + 2) and name == "warp":
+                wait(device)
+        rate = count * worlds / (time.perf_counter() - began)
+        memory = f"{bytes_of(sim) / worlds / 1024:,.0f} KiB" if name == "warp" else ""
+        lines.append(
+            f"| {name} | {device if name == 'warp' else f'{sim.threads} threads'} | {worlds:,} | {rate:,.0f} | {memory} |"
+        )
+    return lines
+
+
+def wait(device: str) -> None:
+    import warp as wp
+
+    wp.synchronize_device(device)
+
+
+def bytes_of(sim: Any) -> int:
+    """Memory of mujoco_warp's Data and of the fields of all sensors."""
+    import warp as wp
+
+    def arrays(thing: Any) -> Iterator[Any]:
+        for value in vars(thing).values():
+            if isinstance(value, wp.array):
+                yield value
+            elif hasattr(value, "__dataclass_fields__"):
+                yield from arrays(value)
+
+    fields = [array for sensor in sim._sensors.values() for array in sensor.fields.values()]
+    return sum(array.capacity for array in [*arrays(sim.warp_data), *fields])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device", help="cpu, cuda:0 and so on; by default the first CUDA device, or the CPU without one.")
+    parser.add_argument("--worlds", type=int, default=64, help="Number of worlds.")
+    parser.add_argument("--steps", type=int, default=30, help="Number of control steps for each scene.")
+    parser.add_argument(
+        "--long", type=int, default=1000, help="Number of control steps of the comparison of air times and history; 0: none."
+    )
+    parser.add_argument(
+        "--speed-worlds", type=int, help="Number of worlds for the speed; by default 64 on the CPU and 4096 on CUDA devices."
+    )
+    parser.add_argument("--only", help="Name of the only scene to compare.")
+    parser.add_argument("--write", action="store_true", help="Write the tables into docs/warp.md.")
+    arguments = parser.parse_args()
+    import mujoco
+    import mujoco_warp as mjw
+    import warp as wp
+
+    wp.config.quiet = True
+    device = arguments.device or ("cuda:0" if wp.is_cuda_available() else "cpu")
+    scenes = {name: scene for name, scene in SCENES.items() if arguments.only in (None, name)}
+    found = run(device, arguments.worlds, arguments.steps, scenes)
+    name = platform.processor() or platform.machine() if device == "cpu" else wp.get_device(device).name
+    versions = f"mujoco_warp {mjw.__version__}, Warp {wp.__version__}, MuJoCo {mujoco.__version__}"
+    lines = [
+        f"Device `{device}` ({name}), {versions}: {arguments.worlds} worlds, {arguments.steps} control steps in each of {len(scenes)} scenes.",
+        "",
+    ]
+    lines += table(found)
+    if arguments.long:
+        lines += [
+            "",
+            "What contact sensors remember over many steps:",
+            "",
+            *long_run(device, min(arguments.worlds, 16), arguments.long),
+        ]
+    lines += ["", "Speed:", "", *speed(device, arguments.speed_worlds or (64 if device == "cpu" else 4096))]
+    print("\n".join(lines))
+    if arguments.write:
+        page = PAGE.read_text()
+        before, after = page.split(BEGIN)[0], page.split(END)[1]
+        PAGE.write_text(before + BEGIN + "\n" + "\n".join(lines) + "\n" + END + after)
+    wrong = beyond(found)
+    print("\n".join(wrong), file=sys.stderr)
+    return bool(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
