@@ -103,8 +103,13 @@ class Viewer:
     def _add_groups(self, gui: Any) -> None:
         boxes = [gui.add_checkbox(f"Group {k}", initial_value=k in self._stage.groups) for k in range(6)]
         sites = gui.add_checkbox("Sites", initial_value=self._stage.sites)
+
+        def show() -> None:
+            self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}, sites.value)
+            self._show()
+
         for box in (*boxes, sites):
-            self._later(box, lambda: (self._stage.show_groups({k for k, box in enumerate(boxes) if box.value}, sites.value), self._show())[1])
+            self._later(box, show)
 
     def _add_play(self, gui: Any) -> None:
         """Adds the button that starts and stops time."""

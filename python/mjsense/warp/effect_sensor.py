@@ -12,21 +12,10 @@ if TYPE_CHECKING:
     from mjsense.native_sensor import NativeSensor
 
 
-@implements("effect")
-class EffectSensor(WarpSensor):
-    needs = Stage.NONE
+class ChainSensor(WarpSensor):
+    """A sensor whose fields are those of other arrays with effects applied; a subclass makes ``chains``."""
 
-    def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
-        super().__init__(worlds, sensor)
-        cfg, clean = self.cfg, worlds.sensors[self.cfg.sensor]
-        self.inputs = (clean,)
-        self.fields = declared(worlds, sensor)
-        self.chains = []
-        for name, out in self.fields.items():
-            effects = [effect for effect in cfg.effects if not effect.fields or name in effect.fields]
-            stream = f"{self.name}/{name}" if name else self.name
-            self.chains.append(Chain(worlds, effects, stream, clean.fields[name], out, cfg.history_length))
-            self.every_step |= needs_every_step(effects, cfg.history_length)
+    chains: list[Chain]
 
     def update(self) -> None:
         for chain in self.chains:
@@ -40,3 +29,20 @@ class EffectSensor(WarpSensor):
         """Raises an error for values that a NanPolicy refuses. Reads from the device; update() must have run."""
         for chain in self.chains:
             chain.check()
+
+
+@implements("effect")
+class EffectSensor(ChainSensor):
+    needs = Stage.NONE
+
+    def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
+        super().__init__(worlds, sensor)
+        cfg, clean = self.cfg, worlds.sensors[self.cfg.sensor]
+        self.inputs = (clean,)
+        self.fields = declared(worlds, sensor)
+        self.chains = []
+        for name, out in self.fields.items():
+            effects = [effect for effect in cfg.effects if not effect.fields or name in effect.fields]
+            stream = f"{self.name}/{name}" if name else self.name
+            self.chains.append(Chain(worlds, effects, stream, clean.fields[name], out, cfg.history_length))
+            self.every_step |= needs_every_step(effects, cfg.history_length)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from mjsense import _mujoco, effects
 from mjsense.configs import ImuAxis, ImuModel
+from mjsense.warp.effect_sensor import ChainSensor
 from mjsense.warp.effects import Chain, needs_every_step
-from mjsense.warp.sensor import Stage, WarpSensor, Worlds, declared, implements
+from mjsense.warp.sensor import Stage, Worlds, declared, implements
 
 if TYPE_CHECKING:
     from mjsense.native_sensor import NativeSensor
@@ -48,7 +49,7 @@ def effects_of(axis: ImuAxis) -> list[Any]:
 
 
 @implements("imu")
-class Imu(WarpSensor):
+class Imu(ChainSensor):
     needs = Stage.ACC
 
     def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
@@ -63,15 +64,3 @@ class Imu(WarpSensor):
             clean = worlds.data.sensordata[:, begin : begin + out.shape[1]]
             self.chains.append(Chain(worlds, errors.get(part, []), f"{self.name}/{part}", clean, out))
         self.every_step = needs_every_step(errors["acc"]) or needs_every_step(errors["gyro"])
-
-    def update(self) -> None:
-        for chain in self.chains:
-            chain.apply()
-
-    def reset(self, mask: Any) -> None:
-        for chain in self.chains:
-            chain.reset(mask)
-
-    def check(self) -> None:
-        for chain in self.chains:
-            chain.check()
