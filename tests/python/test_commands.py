@@ -32,6 +32,15 @@ def test_help_lists_the_commands():
     assert all(f"  {name} " in text for name in ("record", *commands.COMMANDS))
 
 
+def test_a_closed_pipe_is_no_error():
+    code = ("import types; from mjsense import commands; "
+            "commands._module = lambda _: types.SimpleNamespace(run=lambda _: print('x' * 1000000), add_arguments=lambda _: None, EXAMPLES=[]); "
+            "raise SystemExit(commands.run(['quality']))")  # fmt: skip
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert (process.stderr.read(), process.wait()) == ("", 141)
+
+
 def test_errors_are_one_line(tmp_path):
     unknown = run("replai")
     assert unknown.returncode == 2 and "did you mean 'replay'" in unknown.stderr

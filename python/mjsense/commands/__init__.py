@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import shutil
 import sys
 import textwrap
@@ -30,6 +31,7 @@ COMMANDS = {
 FAILED = 1  # some episodes or checks failed
 WRONG_INPUT = 2
 _INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+_BROKEN_PIPE = 141  # as of a program that SIGPIPE ends
 
 
 def _width() -> int:
@@ -74,7 +76,7 @@ def run(words: list[str]) -> int:
     """Runs the command ``words[0]`` with the other words as its arguments. Errors are printed on stderr.
 
     Returns:
-        0: done; 1: some episodes or checks failed; 2: wrong usage or input; 130: interrupted.
+        0: done; 1: some episodes or checks failed; 2: wrong usage or input; 130: interrupted; 141: the reader of the output has ended.
     """
     try:
         arguments = parser_of(words[0]).parse_args(words[1:])
@@ -83,6 +85,9 @@ def run(words: list[str]) -> int:
         return code
     except KeyboardInterrupt:
         return _INTERRUPTED
+    except BrokenPipeError:  # the reader of the output, such as head, has ended
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush when Python ends
+        return _BROKEN_PIPE
     except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
         print(f"mjsense {words[0]}: {_message(error)}", file=sys.stderr)
         return WRONG_INPUT
