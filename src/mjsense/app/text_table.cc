@@ -22,7 +22,7 @@ void add_tree(const std::filesystem::path& folder, const std::string& indent, st
   for (std::size_t i = 0; i < shown; ++i) {
     const bool last = i + 1 == entries.size();
     const std::string name = entries[i].path().filename().string();
-    out += indent + (last ? "└── " : "├── ") + name;
+    out += fmt::format("{}{}{}", indent, last ? "└── " : "├── ", name);
     if (entries[i].is_directory()) {
       out += "/\n";
       add_tree(entries[i].path(), indent + (last ? "    " : "│   "), maximum, out);

@@ -19,7 +19,7 @@ void DebugShapes::add_line(Vec3 from, Vec3 to, double pixels, const Rgba& rgba, 
 }
 
 void DebugShapes::add_frame(Vec3 origin, const double mat[9], double length, double width,
-                            std::string label) {
+                            const std::string& label) {
   static constexpr Rgba kColors[3] = {{0.9f, 0, 0, 1}, {0, 0.9f, 0, 1}, {0, 0, 0.9f, 1}};
   for (int k = 0; k < 3; ++k) {
     const Vec3 axis{mat[k], mat[3 + k], mat[6 + k]};

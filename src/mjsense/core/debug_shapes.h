@@ -36,7 +36,8 @@ class DebugShapes {
   void add_arrow(Vec3 from, Vec3 to, double width, const Rgba& rgba, std::string label);
   void add_line(Vec3 from, Vec3 to, double pixels, const Rgba& rgba, std::string label);
   // Three arrows, red x, green y, blue z, labelled "<label>_x" etc. `mat`: row-major R_WF.
-  void add_frame(Vec3 origin, const double mat[9], double length, double width, std::string label);
+  void add_frame(Vec3 origin, const double mat[9], double length, double width,
+                 const std::string& label);
 
   // Appends geoms to an mjvScene. MuJoCo draws labels as text and truncates them to 99 characters.
   // Returns the number of shapes that did not fit.

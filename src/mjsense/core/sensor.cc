@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 
 namespace mjsense {
 
@@ -20,12 +21,7 @@ void Sensor::draw(const World& /*world*/, DebugShapes& /*shapes*/) {
 }
 
 const Field& Sensor::field(std::string_view name) const {
-  std::vector<std::string> names;
-  for (const Field& f : fields_) {
-    if (f.name == name) return f;
-    names.push_back(f.name);
-  }
-  throw_unknown(fmt::format("sensor '{}'", name_), "field", name, names);
+  return find_named(fields_, &Field::name, name, fmt::format("sensor '{}'", name_), "field");
 }
 
 std::size_t Sensor::bytes_per_world() const {

@@ -10,6 +10,7 @@
 #include "mjsense/core/fields/config_checks.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/sensor_fields.h"
+#include "mjsense/core/named.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense::effects {
@@ -50,15 +51,11 @@ void EffectSensor::initialize(const SensorInit& init) {
   if (!inner_ || inner_ == this) {
     throw ValueError(fmt::format("sensor '{}': does not name another sensor to read", name()));
   }
-  std::vector<std::string> names;
-  for (const Field& f : inner_->fields()) names.push_back(f.name);
+  const std::string context = fmt::format("sensor '{}'", name()),
+                    kind = fmt::format("field of '{}'", inner_->name());
   const auto check = [&](const std::vector<std::string>& fields) {
-    for (const std::string& f : fields) {
-      if (!contains(names, f)) {
-        throw_unknown(fmt::format("sensor '{}'", name()),
-                      fmt::format("field of '{}'", inner_->name()), f, names);
-      }
-    }
+    for (const std::string& f : fields)
+      find_named(inner_->fields(), &Field::name, f, context, kind);
   };
   check(cfg_.fields);
   for (const auto& effect : cfg_.effects) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/robots/grasp_state.h"
@@ -13,12 +14,10 @@ namespace mjsense::episode {
 namespace {
 
 std::size_t index_of(const Task& task, const std::string& role) {
-  std::vector<std::string> roles;
-  for (const TaskObject& object : task.objects(0)) {
-    if (object.role == role) return roles.size();
-    roles.push_back(object.role);
-  }
-  throw_unknown("task '" + std::string(task.name()) + "'", "role", role, roles);
+  const std::span<const TaskObject> objects = task.objects(0);
+  const TaskObject& object = find_named(objects, &TaskObject::role, role,
+                                        "task '" + std::string(task.name()) + "'", "role");
+  return static_cast<std::size_t>(&object - objects.data());
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "mjsense/observe/shared_field.h"
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 
 namespace mjsense::observe {
 namespace {
@@ -29,17 +30,11 @@ void SharedSensor::initialize(const SensorInit& /*init*/) {
 
 void SharedField::initialize(const SensorInit& /*init*/) {
   clear_fields();
-  std::vector<std::string> names;
-  for (Field& field : source_->fields()) {
-    names.push_back(field.name);
-    if (field.name != field_) continue;
-    SensorSpec spec = field.spec;
-    if (adapt_) adapt_(spec);
-    share_field("", std::move(spec), field);
-    return;
-  }
-  throw_unknown("sensor '" + name() + "', which shows '" + source_->name() + "'", "field", field_,
-                names);
+  const std::string context = "sensor '" + name() + "', which shows '" + source_->name() + "'";
+  Field& field = find_named(source_->fields(), &Field::name, field_, context, "field");
+  SensorSpec spec = field.spec;
+  if (adapt_) adapt_(spec);
+  share_field("", std::move(spec), field);
 }
 
 std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::string field) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::observe {
@@ -50,9 +51,7 @@ int SensorSuite::index(std::string_view name) const {
 }
 
 std::vector<std::string> SensorSuite::names() const {
-  std::vector<std::string> names;
-  for (const auto& sensor : sensors_) names.push_back(sensor->name());
-  return names;
+  return names_of(sensors_, [](const auto& sensor) { return sensor->name(); });
 }
 
 Sensor* SensorSuite::find(std::string_view name) const {
@@ -97,12 +96,10 @@ std::vector<const Field*> SensorSuite::streams() const {
 }
 
 const Field& SensorSuite::stream(std::string_view name) const {
-  std::vector<std::string> names;
-  for (const Field* field : streams()) {
-    if (field->spec.name == name) return *field;
-    names.push_back(field->spec.name);
-  }
-  throw_unknown("suite", "stream", name, names);
+  const auto stream_name = [](const Field* field) -> const std::string& {
+    return field->spec.name;
+  };
+  return *find_named(streams(), stream_name, name, "suite", "stream");
 }
 
 }  // namespace mjsense::observe

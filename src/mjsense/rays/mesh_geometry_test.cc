@@ -79,6 +79,7 @@ TEST(MeshGeometry, IsThreadSafe) {
   std::vector<std::shared_ptr<const MeshGeometry>> made(8);
   {
     std::vector<std::jthread> threads;
+    threads.reserve(made.size());
     for (auto& one : made)
       threads.emplace_back([&one] { one = mesh_geometry(kVertices, kFaces, true); });
   }

@@ -289,8 +289,8 @@ std::int64_t Batches::first(int batch) const {
 
 std::vector<int> batch_sizes(int episodes, int batches) {
   const Batches all = batches_of(episodes, batches);
-  std::vector<int> sizes;
-  for (int b = 0; b < all.count; ++b) sizes.push_back(all.size(b));
+  std::vector<int> sizes(static_cast<std::size_t>(all.count));
+  for (int b = 0; b < all.count; ++b) sizes[b] = all.size(b);
   return sizes;
 }
 

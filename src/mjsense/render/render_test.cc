@@ -23,6 +23,8 @@ using testing::kMatte;
 using testing::Pixel;
 using testing::TestRenderer;
 
+int rounded(double value) { return static_cast<int>(std::lround(value)); }
+
 TEST(Shading, HeadlightIsAmbientPlusDiffuseTimesCosine) {
   TestRenderer s(std::string(kMatte) +
                  R"(<worldbody><geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
@@ -31,7 +33,7 @@ TEST(Shading, HeadlightIsAmbientPlusDiffuseTimesCosine) {
   // From 45 degrees the headlight meets the floor at 45 degrees.
   const double h = std::sqrt(0.5), v = 255 * (0.1 + 0.4 * h);
   expect_pixel(s.center({0, -2, 2}, {1, 0, 0}, {0, h, h}, 1),
-               {int(v + .5), int(v / 2 + .5), int(v / 5 + .5)});
+               {rounded(v), rounded(v / 2), rounded(v / 5)});
 }
 
 TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
@@ -43,7 +45,7 @@ TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
   const double d = std::sqrt(5.0), cosine = 2 / d;     // one metre to the side
   const double value = cosine * cosine * cosine / (0.5 * d + 0.25 * d * d);
   expect_pixel(s.from_above(1, 0, 5),
-               {int(255 * value + .5), int(127.5 * value + .5), int(51 * value + .5)});
+               {rounded(255 * value), rounded(127.5 * value), rounded(51 * value)});
   expect_pixel(s.from_above(1.3, 0, 5), {0, 0, 0});  // 33 degrees: outside the cone
 }
 
@@ -58,7 +60,7 @@ TEST(Shading, SpecularHighlightFollowsTheHalfVector) {
   const double v = 0.5 * std::pow(std::cos(M_PI / 6), 32) * 255;
   const double c = 0.5, sn = std::sqrt(0.75);
   expect_pixel(s.center({0, -2 * sn, 2 * c}, {1, 0, 0}, {0, c, sn}, 1),
-               {int(v + .5), int(v + .5), int(v + .5)});
+               {rounded(v), rounded(v), rounded(v)});
 }
 
 TEST(Shading, ShadowsHaveSharpEdges) {
@@ -153,10 +155,10 @@ TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {
   const double inside = 255 * (1 - 1.2 / 1.36) * 1.3 / 0.3;
   expect_pixel(falling(2, 0, -1), {255, 0, 0});
   expect_pixel(falling(1.45, 0, -1), {255, 0, 0});
-  expect_pixel(falling(1.2, 0, -1), {int(255.5 - inside), 0, int(inside + .5)});
+  expect_pixel(falling(1.2, 0, -1), {rounded(255 - inside), 0, rounded(inside)});
   expect_pixel(falling(1.0001, 0, -1), {0, 0, 255});
   const double outside = 255 * (0.5 / 1.15) / (1 - 0.3 / 1.3);
-  expect_pixel(falling(0.5, 0, -1), {0, int(255.5 - outside), int(outside + .5)});
+  expect_pixel(falling(0.5, 0, -1), {0, rounded(255 - outside), rounded(outside)});
   expect_pixel(falling(-0.1, 0, -1), {0, 255, 0});
   expect_pixel(falling(1, 0, 1), {255, 255, 255});   // a ball in front of the haze
   expect_pixel(falling(1, -1, 0), {255, 255, 255});  // another one, just nearer than the haze

@@ -212,7 +212,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
 
   // The images are read first, because the label above a depth strip depends on their values.
   std::vector<std::vector<std::uint8_t>> pictures;
-  const std::string title = fmt::format("{} of {} episodes", std::min(episodes, all), all);
+  std::string title = fmt::format("{} of {} episodes", std::min(episodes, all), all);
   int tile_width = 0, width = label_width(title), height = kGap + kLine;
   for (std::size_t s = 0; s < strips.size(); ++s) {
     Strip& strip = strips[s];

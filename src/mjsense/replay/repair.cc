@@ -98,7 +98,7 @@ void add_file_name(hid_t sensor_data, const std::string& key, const std::string&
                                     hdf5::dataset_properties(), H5P_DEFAULT),
                          H5Dclose, key);
   char bytes[record::kFileNameBytes] = {};
-  std::memcpy(bytes, name.data(), std::min(name.size(), record::kFileNameBytes));
+  name.copy(bytes, sizeof bytes);
   hdf5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes), key);
 }
 
@@ -114,8 +114,8 @@ std::string missing_names(const fs::path& path, int batch, int batches) {
         hdf5::int_attribute(hdf5::open_group(file, trajectory), "episode", -1);
     for (const std::string& camera : hdf5::children(hdf5::open_group(file, params))) {
       for (const std::string& key : {camera, camera + "_depth"}) {
-        const std::string context = trajectory + "/obs/sensor_data";
-        if (hdf5::exists(file, context + "/" + key)) continue;
+        const std::string context = fmt::format("{}/obs/sensor_data", trajectory);
+        if (hdf5::exists(file, fmt::format("{}/{}", context, key))) continue;
         // Files that have no episode numbers name videos by their position in the file.
         const std::string name =
             number >= 0 ? record::video_file(number, key + ".mp4")

@@ -200,7 +200,7 @@ TEST_F(RepairNames, AreAddedAtomically) {
   for (const int more : {-1000, 10, 1000, 3000}) {
     const pid_t pid = fork();
     if (pid == 0) {
-      const auto maximum = static_cast<rlim_t>(static_cast<int>(bytes.size()) + more);
+      const auto maximum = bytes.size() + static_cast<rlim_t>(more);
       const rlimit limit{maximum, maximum};
       setrlimit(RLIMIT_FSIZE, &limit);
       const RepairResult result = repair(dir.path);

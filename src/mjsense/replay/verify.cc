@@ -236,7 +236,7 @@ class FileVerifier {
       const hdf5::Id group = hdf5::open_group(trajectory, "obs/sensor_data");
       for (const std::string& key : hdf5::children(group)) {
         named.insert(key);
-        const std::string video_place = context + "/obs/sensor_data/" + key;
+        const std::string video_place = fmt::format("{}/obs/sensor_data/{}", context, key);
         try {
           const hdf5::Id dataset = hdf5::open_dataset(group, key);
           const std::string crc = hdf5::text_attribute(dataset, record::kChecksumAttribute);
@@ -293,10 +293,10 @@ class Verifier {
   }
 
  private:
-  void error(const std::string& context, std::string text) {
+  void error(const std::string& context, const std::string& text) {
     result_.findings.push_back({true, printable(context), printable(text)});
   }
-  void note(const std::string& context, std::string text) {
+  void note(const std::string& context, const std::string& text) {
     result_.findings.push_back({false, printable(context), printable(text)});
   }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/robots/action_noise.h"
 #include "mjsense/scene/resolve.h"
 
@@ -76,12 +77,9 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
 }
 
 int Robot::group_index(std::string_view name) const {
-  std::vector<std::string> names;
-  for (int g = 0; g < static_cast<int>(groups_.size()); ++g) {
-    if (groups_[g].name == name) return g;
-    names.push_back(groups_[g].name);
-  }
-  throw_unknown("robot '" + cfg_.name + "'", "move group", name, names);
+  const auto& group =
+      find_named(groups_, &MoveGroup::name, name, "robot '" + cfg_.name + "'", "move group");
+  return static_cast<int>(&group - groups_.data());
 }
 
 Pose Robot::base_pose(const World& world) const {

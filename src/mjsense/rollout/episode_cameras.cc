@@ -8,6 +8,7 @@
 
 #include "mjsense/cameras/load_cameras.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/rollout/rollout.h"
 
 namespace mjsense::rollout {
@@ -51,20 +52,18 @@ cameras::CameraSystem choose_cameras(const episode::Task& task, const RolloutCfg
     system.cameras.push_back(of_model(mount, true));
 
   if (cfg.cameras) {
-    std::vector<std::string> names;
-    for (const cameras::CameraMountCfg& camera : system.cameras) names.push_back(camera.name);
+    const std::string owner = !cfg.camera_system.empty()
+                                  ? fmt::format("camera system '{}'", system.name)
+                              : robot.name.empty() ? fmt::format("task '{}'", task.name())
+                                                   : fmt::format("robot '{}'", robot.name);
     std::vector<cameras::CameraMountCfg> chosen;
     for (const std::string& name : *cfg.cameras) {
-      const auto mount = std::ranges::find(system.cameras, name, &cameras::CameraMountCfg::name);
-      if (mount == system.cameras.end()) {
-        throw_unknown(!cfg.camera_system.empty() ? fmt::format("camera system '{}'", system.name)
-                      : robot.name.empty()       ? fmt::format("task '{}'", task.name())
-                                                 : fmt::format("robot '{}'", robot.name),
-                      "camera", name, names);
-      }
-      if (std::ranges::find(chosen, name, &cameras::CameraMountCfg::name) != chosen.end())
+      constexpr auto kName = &cameras::CameraMountCfg::name;
+      const cameras::CameraMountCfg& mount =
+          find_named(system.cameras, kName, name, owner, "camera");
+      if (std::ranges::find(chosen, name, kName) != chosen.end())
         throw ValueError(fmt::format("camera '{}' is given twice", name));
-      chosen.push_back(*mount);
+      chosen.push_back(mount);
     }
     system.cameras = std::move(chosen);
   }

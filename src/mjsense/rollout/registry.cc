@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/rollout/planners.h"
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
@@ -31,14 +32,11 @@ class Registry {
 
   std::vector<std::string> names() const {
     const std::lock_guard lock(mutex_);
-    return names_of(entries_);
+    return names_of(entries_, &Entry::name);
   }
   Factory at(std::string_view name) const {
     const std::lock_guard lock(mutex_);
-    for (const Entry& entry : entries_) {
-      if (name == entry.name) return entry.make;
-    }
-    throw_unknown(group_, kind_, name, names_of(entries_));
+    return find_named(entries_, &Entry::name, name, group_, kind_).make;
   }
   void add(std::string name, Factory make) {
     if (name.empty()) throw ValueError(fmt::format("a {} needs a name", kind_));
@@ -51,12 +49,6 @@ class Registry {
   }
 
  private:
-  static std::vector<std::string> names_of(const std::vector<Entry>& entries) {
-    std::vector<std::string> names;
-    for (const Entry& entry : entries) names.push_back(entry.name);
-    return names;
-  }
-
   const char *group_, *kind_;
   mutable std::mutex mutex_;
   std::vector<Entry> entries_;

@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/embedded_files.h"
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/core/named.h"
 #include "mjsense/scene/resolve.h"
 
 // Exported for MuJoCo's own Python bindings: number of significant digits in saved XML.
@@ -180,9 +181,7 @@ std::vector<mjsElement*> spec_elements(const mjSpec* spec, mjtObj type) {
 }
 
 std::vector<std::string> spec_names(const mjSpec* spec, mjtObj type) {
-  std::vector<std::string> names;
-  for (const mjsElement* e : spec_elements(spec, type)) names.push_back(element_name(e));
-  return names;
+  return names_of(spec_elements(spec, type), element_name);
 }
 
 mjsElement* find_in_spec(const mjSpec* spec, mjtObj type, const std::string& name,

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense::scene {
@@ -13,12 +14,7 @@ namespace {
 
 void check_entity(const Scene* scene, std::string_view entity, std::string_view context) {
   if (!scene || entity.empty()) return;
-  std::vector<std::string> names;
-  for (const Entity& e : scene->entities()) {
-    if (e.name == entity) return;
-    names.push_back(e.name);
-  }
-  throw_unknown(context, "entity", entity, names);
+  find_named(scene->entities(), &Entity::name, entity, context, "entity");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
+#include "mjsense/core/named.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/default_lighting.h"
@@ -243,9 +244,9 @@ Sensor* Scene::find_sensor(std::string_view key) const {
 
 Sensor& Scene::sensor(std::string_view key) const {
   if (Sensor* sensor = find_sensor(key)) return *sensor;
-  std::vector<std::string> names;
-  for (const auto& sensor : impl_->sensors) names.push_back(sensor->name());
-  throw KeyError(fmt::format("scene: sensor '{}' not found{}", key, suggest(key, names)));
+  const auto name = [](const auto& sensor) { return sensor->name(); };
+  throw KeyError(fmt::format("scene: sensor '{}' not found{}", key,
+                             suggest(key, names_of(impl_->sensors, name))));
 }
 
 const Entity& Scene::entity(std::string_view name) const {

@@ -9,6 +9,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/toml_fields.h"
 #include "mjsense/core/files/data_file.h"
+#include "mjsense/core/named.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scenes/entity_model.h"
@@ -54,9 +55,7 @@ std::vector<int> denoted(const std::string& entry, std::string_view context) {
       found.push_back(static_cast<int>(i));
   }
   if (!found.empty()) return found;
-  std::vector<std::string> names;
-  for (const CatalogueObjectCfg& object : objects) names.push_back(object.name);
-  throw_unknown(std::string(context), "object", entry, names);
+  throw_unknown(context, "object", entry, names_of(objects, &CatalogueObjectCfg::name));
 }
 
 }  // namespace
@@ -81,12 +80,8 @@ const ObjectCatalogue& object_catalogue() {
 }
 
 const ObjectSourceCfg& source_of(const CatalogueObjectCfg& object) {
-  const std::vector<ObjectSourceCfg>& sources = object_catalogue().sources;
-  const auto found = std::ranges::find(sources, object.source, &ObjectSourceCfg::name);
-  if (found != sources.end()) return *found;
-  std::vector<std::string> names;
-  for (const ObjectSourceCfg& source : sources) names.push_back(source.name);
-  throw_unknown(fmt::format("object '{}'", object.name), "source", object.source, names);
+  return find_named(object_catalogue().sources, &ObjectSourceCfg::name, object.source,
+                    fmt::format("object '{}'", object.name), "source");
 }
 
 bool is_installed(const CatalogueObjectCfg& object) {

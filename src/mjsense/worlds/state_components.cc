@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/worlds/worlds.h"
 
 namespace mjsense::worlds {
@@ -55,19 +56,15 @@ ArrayView Worlds::state() {
 }
 
 ArrayView Worlds::state_component(std::string_view name) {
-  std::vector<std::string> names;
-  for (const Component& c : kComponents) {
-    names.emplace_back(c.name);
-    if (c.name != name) continue;
-    int size = 0;
-    mjtNum* data = mjb_stateComponent(batch_, c.bit, &size);
-    ArrayView v = c.width > 0 ? ArrayView::dense(data, DType::kFloat64,
-                                                 {num_worlds_, size / c.width, c.width})
-                              : ArrayView::dense(data, DType::kFloat64, {num_worlds_, size});
-    v.strides[0] = static_cast<std::int64_t>(num_state_ * sizeof(mjtNum));
-    return v;
-  }
-  throw_unknown("simulation", "state component", name, names);
+  const Component& c =
+      find_named(kComponents, &Component::name, name, "simulation", "state component");
+  int size = 0;
+  mjtNum* data = mjb_stateComponent(batch_, c.bit, &size);
+  ArrayView v =
+      c.width > 0 ? ArrayView::dense(data, DType::kFloat64, {num_worlds_, size / c.width, c.width})
+                  : ArrayView::dense(data, DType::kFloat64, {num_worlds_, size});
+  v.strides[0] = static_cast<std::int64_t>(num_state_ * sizeof(mjtNum));
+  return v;
 }
 
 }  // namespace mjsense::worlds

@@ -16,7 +16,9 @@ class WorldIds {
  public:
   WorldIds(AllWorlds) : all_(true) {}
   template <class List>
-  requires std::convertible_to<List&&, std::span<const int>> WorldIds(List&& ids) : ids_(ids) {}
+  requires(std::convertible_to<List&&, std::span<const int>> &&
+           !std::same_as<std::remove_cvref_t<List>, WorldIds>) WorldIds(List&& ids)
+      : ids_(ids) {}
 
   bool all() const { return all_; }
   std::span<const int> list() const { return ids_; }  // empty if all()

@@ -144,6 +144,7 @@ TEST_P(Integrators, EqualTheNaiveLoop) {
     hooks.every = every;
     worlds.reset(all_worlds, -1, hooks);
     std::vector<DataPtr> naive;
+    naive.reserve(kWorlds);
     for (int w = 0; w < kWorlds; ++w) naive.push_back(make_data(m.get()));
     const DataPtr fresh = make_data(m.get());
     for (int k = 0; k < kSteps; ++k) {

@@ -5,16 +5,12 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 
 namespace mjsense {
 
 std::string_view embedded_file(std::string_view name) {
-  std::vector<std::string> names;
-  for (const EmbeddedFile& file : embedded_files()) {
-    if (file.name == name) return file.text;
-    names.emplace_back(file.name);
-  }
-  throw_unknown("models", "embedded file", name, names);
+  return find_named(embedded_files(), &EmbeddedFile::name, name, "models", "embedded file").text;
 }
 
 }  // namespace mjsense

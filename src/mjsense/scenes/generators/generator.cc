@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/scenes/generators/dining.h"
 #include "mjsense/scenes/generators/floor.h"
 #include "mjsense/scenes/generators/kitchen.h"
@@ -23,30 +24,23 @@ std::span<const Generator> generators() {
 
 scene::ModelSource generate(SceneFileCfg& cfg) {
   const std::string context = fmt::format("scene '{}'", cfg.name);
-  const auto all = generators();
-  const auto one = std::ranges::find(all, cfg.generator, &Generator::name);
-  if (one == all.end()) {
-    std::vector<std::string> names;
-    for (const Generator& g : all) names.emplace_back(g.name);
-    throw_unknown(context, "generator", cfg.generator, names);
-  }
+  const Generator& one =
+      find_named(generators(), &Generator::name, cfg.generator, context, "generator");
   const auto number = static_cast<std::uint64_t>(cfg.house);
-  GeneratorInput input{
-      number, Rng(0, 0, stream_of(fmt::format("house/{}", one->name)), number), {}};
+  GeneratorInput input{number, Rng(0, 0, stream_of(fmt::format("house/{}", one.name)), number), {}};
   std::vector<std::string> known;
-  for (const GeneratorParameter& parameter : one->parameters) {
+  for (const GeneratorParameter& parameter : one.parameters) {
     known.emplace_back(parameter.name);
     input.parameters.push_back(parameter.value);
   }
   for (const auto& [name, value] : cfg.parameters) {
     const auto at = std::ranges::find(known, name);
     if (at == known.end()) {
-      throw_unknown(fmt::format("{}, generator '{}'", context, one->name), "parameter", name,
-                    known);
+      throw_unknown(fmt::format("{}, generator '{}'", context, one.name), "parameter", name, known);
     }
     input.parameters[at - known.begin()] = value;
   }
-  return one->make(input, cfg);
+  return one.make(input, cfg);
 }
 
 }  // namespace mjsense::scenes

@@ -11,6 +11,7 @@
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/scene/resolve.h"
 #include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/depth_noise.h"
 
@@ -81,12 +82,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   model_ = init.model;
   const std::string& camera = cfg_.camera_name.empty() ? name() : cfg_.camera_name;
   camera_ = mj_name2id(model_, mjOBJ_CAMERA, camera.c_str());
-  if (camera_ < 0) {
-    std::vector<std::string> names;
-    for (int i = 0; i < model_->ncam; ++i)
-      names.emplace_back(model_->names + model_->name_camadr[i]);
-    throw_unknown(context, "camera", camera, names);
-  }
+  if (camera_ < 0)
+    throw_unknown(context, "camera", camera, scene::model_names(model_, mjOBJ_CAMERA));
   near_ =
       cfg_.clip_near == ClipNear::kModel ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
   if (cfg_.far > 0 && cfg_.far <= near_)

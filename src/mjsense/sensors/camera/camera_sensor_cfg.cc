@@ -12,6 +12,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/sensor_fields.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
@@ -92,17 +93,6 @@ void validate(const CameraSensorCfg& cfg) {
                     cfg.camera_name));
 }
 
-namespace {
-
-std::vector<std::string> names_of(const mjSpec* spec, mjtObj type) {
-  std::vector<std::string> names;
-  for (mjsElement* e = mjs_firstElement(spec, type); e; e = mjs_nextElement(spec, e))
-    names.emplace_back(mjs_getString(mjs_getName(e)));
-  return names;
-}
-
-}  // namespace
-
 SensorKind camera_kind() { return sensor_kind<CameraSensorCfg>(&kCameraData); }
 
 std::unique_ptr<Sensor> CameraSensorCfg::build() const {
@@ -113,11 +103,12 @@ void CameraSensor::edit_spec(mjSpec* spec) {
   const std::string context = fmt::format("camera '{}'", name());
   if (!cfg_.camera_name.empty()) {
     mjsElement* element = mjs_findElement(spec, mjOBJ_CAMERA, cfg_.camera_name.c_str());
-    if (!element) throw_unknown(context, "camera", cfg_.camera_name, names_of(spec, mjOBJ_CAMERA));
+    if (!element)
+      throw_unknown(context, "camera", cfg_.camera_name, scene::spec_names(spec, mjOBJ_CAMERA));
     return;  // this sensor's changes to the camera do not affect other sensors
   }
   mjsBody* body = mjs_findBody(spec, cfg_.parent_body.empty() ? "world" : cfg_.parent_body.c_str());
-  if (!body) throw_unknown(context, "body", cfg_.parent_body, names_of(spec, mjOBJ_BODY));
+  if (!body) throw_unknown(context, "body", cfg_.parent_body, scene::spec_names(spec, mjOBJ_BODY));
   if (mjs_findElement(spec, mjOBJ_CAMERA, name().c_str()))
     throw ValueError(fmt::format(
         "{}: repeated name: the model has a camera of this name; set camera_name to use it",

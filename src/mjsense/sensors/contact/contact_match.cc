@@ -7,16 +7,11 @@
 #include <unordered_map>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/core/text/name_matching.h"
 
 namespace mjsense::sensors {
 namespace {
-
-std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
-  std::vector<std::string> labels;
-  for (const ContactObject& o : objects) labels.push_back(o.label);
-  return labels;
-}
 
 std::string_view kind_of(const ContactMatch& match) {
   return match.mode == ContactMode::kGeom ? "geom" : "body";
@@ -24,7 +19,7 @@ std::string_view kind_of(const ContactMatch& match) {
 
 void drop_excluded(std::string_view context, const ContactMatch& match,
                    std::vector<ContactObject>& objects) {
-  const std::vector<std::string> before = labels_of(objects);
+  const std::vector<std::string> before = names_of(objects, &ContactObject::label);
   const Exclude exclude(match.exclude, context);
   std::erase_if(objects, [&](const ContactObject& o) { return exclude.drops(o.label); });
   if (objects.empty()) {
@@ -160,7 +155,8 @@ std::vector<ContactObject> ContactNames::by_regex(std::string_view context,
                                                   const ContactMatch& match) const {
   const std::vector<ContactObject> all = of_entity(context, match);
   std::vector<ContactObject> result;
-  for (int i : match_names(match.pattern, labels_of(all), context)) result.push_back(all[i]);
+  for (int i : match_names(match.pattern, names_of(all, &ContactObject::label), context))
+    result.push_back(all[i]);
   drop_excluded(context, match, result);
   return result;
 }
@@ -188,14 +184,16 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
     for (const ContactObject& o : all) {
       if (o.label == match.pattern[0]) result = {o};
     }
-    if (result.empty()) throw_unknown(context, "body", match.pattern[0], labels_of(all));
+    if (result.empty())
+      throw_unknown(context, "body", match.pattern[0], names_of(all, &ContactObject::label));
     drop_excluded(context, match, result);
     return result;
   }
   std::vector<ContactObject> result = by_regex(context, match);
   if (result.size() > 1 && policy == ContactPolicy::kError) {
     throw ValueError(fmt::format("{}: '{}' matches {} names: {}", context, match.pattern[0],
-                                 result.size(), fmt::join(labels_of(result), ", ")));
+                                 result.size(),
+                                 fmt::join(names_of(result, &ContactObject::label), ", ")));
   }
   result.resize(1);
   return result;

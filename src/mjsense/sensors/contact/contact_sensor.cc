@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 #include "mjsense/core/system/print_stderr.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/contact/contact_data.h"
@@ -22,12 +23,6 @@ namespace {
 
 bool contains(const std::vector<std::string>& list, std::string_view x) {
   return std::find(list.begin(), list.end(), x) != list.end();
-}
-
-std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
-  std::vector<std::string> labels;
-  for (const ContactObject& o : objects) labels.push_back(o.label);
-  return labels;
 }
 
 }  // namespace
@@ -58,10 +53,11 @@ mjtStage ContactSensor::needs() const {
 
 void ContactSensor::edit_spec(mjSpec* spec) {
   const ContactNames names(spec);
-  primary_names_ = labels_of(names.primaries(name(), cfg_.primary));
+  primary_names_ = names_of(names.primaries(name(), cfg_.primary), &ContactObject::label);
   secondary_names_.clear();
   if (cfg_.secondary && cfg_.secondary_policy != ContactPolicy::kAny) {
-    secondary_names_ = labels_of(names.secondaries(name(), *cfg_.secondary, cfg_.secondary_policy));
+    secondary_names_ = names_of(names.secondaries(name(), *cfg_.secondary, cfg_.secondary_policy),
+                                &ContactObject::label);
   }
 }
 
@@ -91,8 +87,8 @@ void ContactSensor::initialize(const SensorInit& init) {
   config.num_slots = cfg_.num_slots;
   config.keep_peak = cfg_.latch;
   config.keep_pairs = cfg_.secondary_policy == ContactPolicy::kEach;
-  primary_names_ = labels_of(config.primaries);
-  secondary_names_ = labels_of(config.secondaries);
+  primary_names_ = names_of(config.primaries, &ContactObject::label);
+  secondary_names_ = names_of(config.secondaries, &ContactObject::label);
   reducer_ = ContactReducer(init.model, init.num_worlds, config);
 
   // The pass belongs to the first contact sensor of the scene that is read at the same times and

@@ -5,6 +5,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/config_checks.h"
+#include "mjsense/core/named.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/noise.h"
 #include "mjsense/sensors/imu/imu_sensor.h"
@@ -40,11 +41,8 @@ ImuModel icm42688p() {
 ImuModel imu_preset(const std::string& name) {
   static const std::map<std::string, ImuModel> kPresets = {
       {"ideal", {}}, {"mpu6050", mpu6050()}, {"icm42688p", icm42688p()}};
-  const auto found = kPresets.find(name);
-  if (found != kPresets.end()) return found->second;
-  std::vector<std::string> names;
-  for (const auto& [key, model] : kPresets) names.push_back(key);
-  throw_unknown("imu", "preset", name, names);
+  using Preset = std::pair<const std::string, ImuModel>;
+  return find_named(kPresets, &Preset::first, name, "imu", "preset").second;
 }
 
 void validate(const ImuModel::Axis& a, std::string_view context) {

@@ -9,6 +9,7 @@
 #include "mjsense/core/fields/config_checks.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/sensor_fields.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_sensors/builtin_draw.h"
 #include "mjsense/sensors/imu/imu_data.h"
 
@@ -23,14 +24,6 @@ mjsSensor* add_sensor(mjSpec* spec, mjtSensor type, mjtObj object, const std::st
   s->objtype = object;
   mjs_setString(s->objname, site.c_str());
   return s;
-}
-
-std::vector<std::string> site_names(mjSpec* spec) {
-  std::vector<std::string> names;
-  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_SITE); e; e = mjs_nextElement(spec, e)) {
-    names.push_back(mjs_getString(mjs_getName(e)));
-  }
-  return names;
 }
 
 }  // namespace
@@ -58,7 +51,8 @@ ImuSensor::ImuSensor(ImuSensorCfg cfg) : Sensor(cfg.name), cfg_(std::move(cfg)) 
 void ImuSensor::edit_spec(mjSpec* spec) {
   const std::string site = cfg_.site.full_name();
   if (!mjs_findElement(spec, mjOBJ_SITE, site.c_str())) {
-    throw_unknown(fmt::format("sensor '{}'", name()), "site", site, site_names(spec));
+    throw_unknown(fmt::format("sensor '{}'", name()), "site", site,
+                  scene::spec_names(spec, mjOBJ_SITE));
   }
   add_sensor(spec, mjSENS_ACCELEROMETER, mjOBJ_SITE, site, mujoco_name("acc"));
   add_sensor(spec, mjSENS_GYRO, mjOBJ_SITE, site, mujoco_name("gyro"));

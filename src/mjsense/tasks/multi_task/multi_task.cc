@@ -7,6 +7,7 @@
 #include <array>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/named.h"
 
 namespace mjsense::tasks {
 namespace {
@@ -156,9 +157,8 @@ const episode::Task& MultiTask::with_role(std::string_view role) const {
   for (const auto& child : children_) {
     if (std::ranges::count(child->objects(0), role, &episode::TaskObject::role) > 0) return *child;
   }
-  std::vector<std::string> roles;
-  for (const episode::TaskObject& object : objects_[0]) roles.push_back(object.role);
-  throw_unknown(fmt::format("task '{}'", name_), "role", role, roles);
+  throw_unknown(fmt::format("task '{}'", name_), "role", role,
+                names_of(objects_[0], &episode::TaskObject::role));
 }
 
 Pose MultiTask::start_pose(int world, std::string_view role) const {
