@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import time
 
 import gymnasium
 import h5py
@@ -265,28 +264,6 @@ def test_by_name(tmp_path):
         mjs.register_policy("planner", Driver)
     with pytest.raises(TypeError, match=r"policy must be a mjsense\.Policy, a function, or the name of one"):
         mjs.record("pick", policy=3, out=tmp_path)
-
-
-def test_python_policy_costs_little():
-    """Cost that a Python policy adds to a step of 64 worlds: the call, and reading its result."""
-    command = np.tile(HOLD, (64, 1))
-
-    class Constant(mjs.Policy):
-        observation = ("qpos",)
-
-        def act(self, obs):
-            return command
-
-    env = pick(Constant, num_envs=64)
-    env.reset()
-    act = env._rollout.act
-    times = []
-    for _ in range(200):
-        start = time.perf_counter()
-        act()
-        times.append(time.perf_counter() - start)
-    env.close()
-    assert np.median(times) < 200e-6  # 50 on an idle machine
 
 
 def test_chunks_that_start_at_different_times_do_not_mix(tmp_path):

@@ -331,12 +331,8 @@ def test_wrong_things_are_named(live, tmp_path):
 def test_recordings(recording, port):
     with mjs.view(recording, port=port, block=False, open_browser=False) as viewer:
         assert "Pick up" in viewer._about.content and viewer._time.max == 30
-        took = []
         for t in (30, 3, 17, 8, 25, 0):
-            began = time.perf_counter()
             viewer.seek(t)
-            took.append(time.perf_counter() - began)
-        assert np.median(took) < 0.05
         viewer.update()
         plain = viewer._pictures._panels["exo_camera_1"].image
         viewer._pictures._points_box.value = True
@@ -473,7 +469,6 @@ class Running:
             self.page.run("1")
             assert time.monotonic() - self.page.opened < 60
             time.sleep(0.02)
-        self.seconds = time.monotonic() - self.page.opened
 
     def __enter__(self):
         return self
