@@ -6,13 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <charconv>
-#include <cstdio>
 #include <cstring>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
@@ -29,7 +24,6 @@ namespace mjsense::record {
 namespace {
 
 constexpr const char* kEndingFile = "ending";  // publish_all() has begun
-constexpr const char* kDescription = "recording.json";
 
 void make_dir(const fs::path& path) {
   std::error_code error;
@@ -37,44 +31,7 @@ void make_dir(const fs::path& path) {
   if (error) throw_file("create the directory", path, error.value());
 }
 
-// Reads a small file of the recording; "" if it cannot be read.
-std::string read_whole(const Folder& folder, const char* name) {
-  constexpr std::int64_t kMaxBytes = 1 << 24;
-  try {
-    const Fd file = open_plain(folder.fd(), name);
-    std::string text(static_cast<std::size_t>(std::min(size_of(file), kMaxBytes)), '\0');
-    const ssize_t n = pread(file.get(), text.data(), text.size(), 0);
-    text.resize(std::max<ssize_t>(0, n));
-    return text;
-  } catch (const Error&) {
-    return "";
-  }
-}
-
-// True if `text` describes a recording completely enough to publish it.
-bool is_description(const std::string& text) {
-  const nlohmann::json json = parse_description(text);
-  const auto number = [&](const char* name) {
-    return json.contains(name) && json[name].is_number_integer() && json[name] > 0 &&
-           json[name] <= std::numeric_limits<int>::max();
-  };
-  return json.is_object() && number("episodes") && number("batches") &&
-         json["batches"] <= json["episodes"];
-}
-
 std::string episode_name(std::int64_t episode) { return fmt::format("episode_{:08d}", episode); }
-
-// "episode_00000007" + suffix -> 7
-std::optional<std::int64_t> episode_number(const std::string& name, std::string_view suffix) {
-  constexpr std::string_view kPrefix = "episode_";
-  if (!name.starts_with(kPrefix) || !name.ends_with(suffix)) return {};
-  const char* first = name.data() + kPrefix.size();
-  const char* last = name.data() + name.size() - suffix.size();
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(first, last, number);
-  if (error != std::errc{} || end != last) return {};
-  return number;
-}
 
 std::string part_name(std::int64_t episode) {
   // The process id prevents conflicts with the files of an encoder that outlives a killed recording
@@ -82,79 +39,10 @@ std::string part_name(std::int64_t episode) {
   return fmt::format("{}.part.{}", episode_name(episode), getpid());
 }
 
-std::vector<std::string> published_files(const Folder& house) {
-  std::vector<std::string> files = house.names();
-  std::erase_if(files, [](const std::string& name) {
-    return !name.starts_with("trajectories_batch_") || !name.ends_with(".h5");
-  });
-  return files;
-}
-
 // A video to be moved from an episode's folder to the house.
 struct Move {
   std::string episode, name, final_name;
 };
-
-// Describes a published file: {"recording": text, "episodes": [0, 1 ...]}.
-std::string describe_published(const Fd& published, const std::string& shown) {
-  const hdf5::H5Lock lock;
-  const hdf5::Id file = hdf5::open_file(os::path_of(published.get()), false, shown);
-  nlohmann::json out{{"recording", hdf5::text_attribute(file, "recording")},
-                     {"episodes", nlohmann::json::array()}};
-  for (const std::string& trajectory : hdf5::children(file)) {
-    if (trajectory.starts_with("traj_"))
-      out["episodes"].push_back(
-          hdf5::int_attribute(hdf5::open_group(file, trajectory), "episode", -1));
-  }
-  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-// "trajectories_batch_2_of_3.h5" -> 2; 0 for other names.
-int batch_in(const std::string& name) {
-  int batch = 0, batches = 0;
-  const bool numbers =
-      std::sscanf(name.c_str(), "trajectories_batch_%9d_of_%9d.h5", &batch, &batches) == 2;
-  return numbers && batch >= 1 && name == batch_file(batch - 1, batches) ? batch : 0;
-}
-
-// A published HDF5 file.
-struct Published {
-  int batch = 0;
-  std::string recording;  // "" if it was not recorded by mjsense
-  std::vector<std::int64_t> episodes;
-};
-
-Published read_published(const Folder& house, const std::string& name) {
-  const Fd file = open_plain(house.fd(), name);
-  const std::string shown = house.display_path(name);
-  const auto found =
-      nlohmann::json::parse(hdf5::in_child(
-                                shown, static_cast<std::uint64_t>(size_of(file)),
-                                [&] { return describe_published(file, shown); }, 0, file.get()),
-                            nullptr, false);
-  Published published{.batch = batch_in(name)};
-  if (found.is_object()) {
-    published.recording = found.at("recording").get<std::string>();
-    published.episodes = found.at("episodes").get<std::vector<std::int64_t>>();
-  }
-  return published;
-}
-
-// A number of a description, which may come from an untrusted file.
-std::int64_t number_of(const nlohmann::json& description, const char* name) {
-  constexpr std::int64_t kMaximum = std::int64_t{1} << 53;
-  const bool valid = description.is_object() && description.contains(name) &&
-                     description[name].is_number_integer() && description[name] >= 0 &&
-                     description[name] <= kMaximum;
-  return valid ? description[name].get<std::int64_t>() : 0;
-}
-
-RecordingStart start_in(const std::string& description) {
-  const nlohmann::json json = parse_description(description);
-  constexpr std::int64_t kMaxBatches = 1 << 30;
-  return {number_of(json, "first_attempt"),
-          static_cast<int>(std::min(number_of(json, "first_batch"), kMaxBatches))};
-}
 
 // A description without the numbers in which recordings of the same settings may differ.
 std::string settings_of(const std::string& description) {
@@ -184,23 +72,6 @@ void name_videos(hid_t trajectory, std::int64_t number, std::vector<Move>& moves
 }
 
 }  // namespace
-
-void Decisions::add(std::int64_t episode, bool kept) {
-  if (!kept_by_episode_.emplace(episode, kept).second) return;
-  kept_ += kept;
-  for (auto at = kept_by_episode_.find(next_); at != kept_by_episode_.end() && at->first == next_;
-       ++at, ++next_) {
-    if (at->second) settled_.push_back(next_);
-  }
-}
-
-std::vector<std::int64_t> Decisions::all_kept() const {
-  std::vector<std::int64_t> episodes;
-  for (const auto& [episode, is_kept] : kept_by_episode_) {
-    if (is_kept) episodes.push_back(episode);
-  }
-  return episodes;
-}
 
 RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerprint, bool resume)
     : fingerprint_(fingerprint) {
@@ -514,98 +385,6 @@ bool RecordingFolder::end() {
 
 void RecordingFolder::end_or_throw() {
   if (!end()) throw_moved(dir_.is_at_its_path() ? staging_.path() : dir_.path());
-}
-
-namespace {
-
-std::vector<std::string> finished_names(const Folder& staging) {
-  std::vector<std::string> names = staging.names();
-  std::erase_if(names, [](const std::string& name) { return !episode_number(name, ""); });
-  return names;
-}
-
-}  // namespace
-
-std::string unfinished_recording(const Folder& staging) {
-  const std::string text = read_whole(staging, kDescription);
-  const bool sound = is_description(text);
-  // Every finished episode carries the same text with a checksum. If none agrees with
-  // recording.json, that file was lost or changed.
-  std::map<std::string, int> said;
-  for (const std::string& episode : finished_names(staging)) {
-    try {
-      const std::string recording = read_staged(staging.open_dir(episode)).recording;
-      if (!is_description(recording)) continue;
-      if (sound && fingerprint_difference(recording, text).empty()) return text;
-      ++said[recording];
-    } catch (const Error&) {
-      continue;
-    }
-  }
-  if (said.empty()) return sound ? text : "";
-  return std::ranges::max_element(said, {}, [](const auto& s) { return s.second; })->first;
-}
-
-std::vector<fs::path> finished_episodes(const fs::path& house) {
-  std::vector<fs::path> found;
-  if (!is_plain_folder(house / kStagingDir)) return found;
-  const Folder staging = Folder::open(house / kStagingDir);
-  for (const std::string& name : finished_names(staging)) found.push_back(staging.path() / name);
-  return found;
-}
-
-RecordingStart start_after(const fs::path& house) {
-  RecordingStart start;
-  if (!fs::is_directory(house)) return start;
-  const Folder folder = Folder::open(house);
-  if (folder.find_dir(kStagingDir)) {
-    throw ValueError(
-        fmt::format("'{}' contains an unfinished recording; resume it before you append to it",
-                    house.string()));
-  }
-  for (const std::string& name : published_files(folder)) {
-    const Published file = read_published(folder, name);
-    start.batch = std::max(start.batch, file.batch);
-    for (const std::int64_t episode : file.episodes)
-      start.attempt = std::max(start.attempt, episode + 1);
-    const nlohmann::json description = parse_description(file.recording);
-    start.attempt = std::max(start.attempt, number_of(description, "first_attempt") +
-                                                number_of(description, "num_attempts"));
-  }
-  return start;
-}
-
-RecordingStart start_of_last(const fs::path& house) {
-  if (!fs::is_directory(house)) return {};
-  const Folder folder = Folder::open(house);
-  if (const Folder staging = folder.find_dir(kStagingDir)) {
-    const std::string unfinished = unfinished_recording(staging);
-    if (!unfinished.empty()) return start_in(unfinished);
-  }
-  Published last;
-  for (const std::string& name : published_files(folder)) {
-    Published file = read_published(folder, name);
-    if (file.batch > last.batch) last = std::move(file);
-  }
-  return start_in(last.recording);
-}
-
-void remove_recordings(const fs::path& house) {
-  if (!fs::is_directory(house)) return;
-  const Folder folder = Folder::open(house);
-  const Fd lock = lock_recording(folder, false);
-  // First the HDF5 files, so that none of them names a video that is gone.
-  std::vector<std::string> names = published_files(folder);
-  for (const std::string& name : folder.names()) {
-    const bool video = name.ends_with(".mp4") || name.ends_with(".mkv");
-    if ((name.starts_with("episode_") && video) ||
-        (name.starts_with("model_") && name.ends_with(".zip")))
-      names.push_back(name);
-  }
-  for (const std::string& name : names) folder.remove(name);
-  folder.remove(kDamagedDir);
-  folder.remove(kStagingDir);
-  folder.sync();
 }
 
 }  // namespace mjsense::record

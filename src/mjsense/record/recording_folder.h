@@ -26,33 +26,13 @@
 #include <vector>
 
 #include "mjsense/core/files/file_descriptor.h"
+#include "mjsense/record/decisions.h"
 #include "mjsense/record/folder.h"
+#include "mjsense/record/recorded_house.h"
 #include "mjsense/record/recording_plan.h"
 #include "mjsense/record/staged_episode.h"
 
 namespace mjsense::record {
-
-// Set of the attempts that were kept or discarded.
-class Decisions {
- public:
-  // `first`: the first attempt of the recording.
-  explicit Decisions(std::int64_t first = 0) : next_(first) {}
-
-  void add(std::int64_t episode, bool kept);  // call once per episode
-
-  bool contains(std::int64_t episode) const { return kept_by_episode_.contains(episode); }
-  int kept() const { return kept_; }
-  int discarded() const { return static_cast<int>(kept_by_episode_.size()) - kept_; }
-  // Kept episodes, in order, that no undecided attempt can precede any more.
-  const std::vector<std::int64_t>& settled() const { return settled_; }
-  std::vector<std::int64_t> all_kept() const;
-
- private:
-  std::map<std::int64_t, bool> kept_by_episode_;
-  std::vector<std::int64_t> settled_;
-  std::int64_t next_;  // lowest undecided episode
-  int kept_ = 0;
-};
 
 class RecordingFolder {
  public:
@@ -118,33 +98,5 @@ class RecordingFolder {
   std::string stored_;  // name of the file that store() has written
   Fd lock_;
 };
-
-// Where a recording begins in a house that contains completed recordings: the number of its first
-// attempt, and the number of their HDF5 files.
-struct RecordingStart {
-  std::int64_t attempt = 0;
-  int batch = 0;
-};
-// Start of a recording that continues those of this house. Throws ValueError if one of them is
-// unfinished.
-RecordingStart start_after(const std::filesystem::path& house);
-// Start of the unfinished recording or, if there is none, of the last completed one.
-RecordingStart start_of_last(const std::filesystem::path& house);
-
-// Removes the recordings of a house and nothing else. Throws ValueError if another process records
-// into it.
-void remove_recordings(const std::filesystem::path& house);
-
-// Names that a house uses for unpublished files.
-inline constexpr const char* kStagingDir = ".recording";
-inline constexpr const char* kEpisodeFile = "traj.h5";
-inline constexpr const char* kDamagedDir = "damaged";
-
-// Description of the unfinished recording in the folder `staging` (kStagingDir): the text of
-// recording.json. If that file is lost or no finished episode agrees with it, it is the text that
-// most finished episodes carry. "" if there is no unfinished recording.
-std::string unfinished_recording(const Folder& staging);
-// Directories of finished, unpublished episodes, in order.
-std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);
 
 }  // namespace mjsense::record

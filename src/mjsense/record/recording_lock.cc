@@ -11,7 +11,7 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recorded_house.h"
 
 namespace fs = std::filesystem;
 

@@ -11,7 +11,7 @@
 #include "mjsense/hdf5/chunk_checks.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recorded_house.h"
 #include "mjsense/record/recording_plan.h"
 #include "mjsense/record/video_file.h"
 

@@ -10,7 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/chunk_checks.h"
-#include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recorded_house.h"
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/json_text.h"
 
