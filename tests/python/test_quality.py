@@ -2,6 +2,8 @@
 """Figures of episodes: a policy that moves, waits and moves again; picks of the planner; the program."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -139,3 +141,16 @@ def test_program(picks, waiting, capsys):
     assert [row["episode"] for row in rows] == [0, 1] and rows[0]["visibility"].keys() == {"wrist_camera", "exo_camera_1"}
     assert run_command(["quality", str(waiting)]) == 0
     assert "longest wait" in capsys.readouterr().out
+
+
+def test_inspect_with_quality(picks):
+    def inspect(*options):
+        done = subprocess.run(
+            [sys.executable, "-m", "mjsense", "inspect", str(picks), "--quality", *options], capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "longest wait" in (text := inspect()) and "2 episodes" in text
+    shown = json.loads(inspect("--json"))
+    assert shown["streams"] and [row["episode"] for row in shown["quality"]] == [0, 1]
