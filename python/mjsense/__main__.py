@@ -12,7 +12,7 @@ from mjsense import _core, commands
 from mjsense.assets import use_installed_meshes
 from mjsense.cluster import program as cluster
 from mjsense.cluster import tools
-from mjsense.commands import record_format
+from mjsense.commands import quality, record_format
 from mjsense.ffmpeg import use_installed_ffmpeg
 
 
@@ -26,6 +26,8 @@ def main() -> int:
         return commands.run(words)
     if record_format.is_wanted(words):
         return record_format.run(words)
+    if quality.is_wanted(words):
+        return quality.inspect(words)
     if cluster.is_wanted(words):
         signal.signal(signal.SIGINT, signal.default_int_handler)
         return cluster.run(words)

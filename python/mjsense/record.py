@@ -79,6 +79,7 @@ def record(
     scene: Scenes = "",
     # options of a recording
     arm_controller: str = "",
+    split: Literal["", "train", "test"] = "",
     worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
@@ -141,6 +142,8 @@ def record(
         Options:
         arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
             ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
+        split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
+            or ``@test`` after the scene's name.
         worlds: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.

@@ -325,6 +325,7 @@ def make_vec(
     sensors: Iterable[Any] = (),
     # options of a recording
     arm_controller: str = "",
+    split: Literal["", "train", "test"] = "",
     num_envs: int = 1,
     threads: int = 0,
     seed: Seed = 0,
@@ -364,6 +365,8 @@ def make_vec(
         Options:
         arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
             ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
+        split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
+            or ``@test`` after the scene's name.
         num_envs: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.

@@ -135,3 +135,14 @@ def test_every_built_in_task_accepts_the_scene(task):
     empty = mjs.SceneFileCfg(name="nothing_there", models=lambda: mjs.SceneCfg(entities={"bench": mjs.EntityCfg(model=BENCH)}))
     with pytest.raises(Exception, match="nothing_there"):
         mjs.make_vec(task, "rby1", scene=empty, cameras=[])
+
+
+def test_split_is_a_part_of_a_named_scene(tmp_path):
+    env = mjs.make_vec("pick", scene="table", split="test", cameras=[])
+    names = set(env.scene.entities)
+    env.close()
+    assert {"pear", "soup_can"} <= names and not {"mug", "marker"} & names
+    mjs.record("pick", out=tmp_path / "data", split="train", horizon=2, worlds=1, keep_failures=True, cameras=[])
+    assert mjs.Dataset(tmp_path / "data").episodes[0].settings["scene"] == "varied_table@train"
+    with pytest.raises(ValueError, match="split is 'train', but the scene is an object"):
+        mjs.make_vec("pick", scene=mjs.SceneFileCfg(name="made"), split="train")

@@ -2,6 +2,8 @@
 """Figures of episodes: a policy that moves, waits and moves again; picks of the planner; the program."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -70,9 +72,85 @@ def test_episodes_are_chosen_by_a_function(waiting, picks):
     assert not mjs.Dataset(waiting, where=lambda episode: episode.quality.idle < 0.1).episodes
 
 
+def test_trimmed_episodes(waiting):
+    (episode,) = mjs.Dataset(waiting).episodes
+    trimmed = mjs.Dataset(waiting, trim_idle=True, delta_timestamps={"obs/agent/qpos": [0, float(1 / episode.fps)]})
+    (short,) = trimmed.episodes
+    kept = [t for t in range(episode.length) if any((short.states == episode.states[t]).all(1))]
+    left_out = sorted(set(range(episode.length)) - set(kept))
+    assert len(trimmed) == short.length == len(kept) and 3 < len(left_out) < WAITS
+    assert episode.idle[left_out].all() and left_out == list(range(left_out[0], left_out[-1] + 1))
+    assert (short["actions/joint_pos/arm"] == episode["actions/joint_pos/arm"][kept]).all()
+    arm, before, after = episode["obs/agent/qpos/arm"], left_out[0] - 1, left_out[-1] + 1
+    assert np.ptp(arm[before:after], axis=0).max() <= 0.01
+    assert (trimmed[before]["obs/agent/qpos/arm"] == arm[[before, after]]).all()
+    assert len(list(short.replay())) == short.length
+    with pytest.raises(ValueError, match="is trimmed; only the complete episode"):
+        short.replay("actions")
+
+
+def test_moving_objects_and_idle_steps_at_the_end_stay(tmp_path):
+    class Still(mjs.Policy):
+        """Commands the initial position while an object falls."""
+
+        observation = ("qpos",)
+
+        def act(self, obs):
+            arm = np.tile([0, -0.7853, 0, -2.35619, 0, 1.57079, 0], (self.num_worlds, 1))
+            return {"arm": arm, "gripper": np.zeros((self.num_worlds, 1))}
+
+    mjs.record(
+        "pick", policy=Still, out=tmp_path / "data", horizon=20, worlds=1, keep_failures=True, cameras=[], action_noise=False
+    )
+    (episode,) = mjs.Dataset(tmp_path / "data").episodes
+    assert episode.idle[-8:].all() and episode.trimmed().length >= 8
+    rows = {"env_states/actors/" + name: values.copy() for name, values in episode["env_states/actors"].items()}
+    falling = next(name for name, values in rows.items() if np.isfinite(values).all())
+    rows[falling][:, 2] += np.linspace(0, 1, episode.length)
+    episode._store.rows.add((episode.index, falling), rows[falling], 0)
+    assert episode.trimmed().length == episode.length
+
+
+def test_trimmed_export_has_the_frames_that_are_left(tmp_path):
+    av = pytest.importorskip("av")
+    data, out = tmp_path / "data", tmp_path / "lerobot"
+    mjs.record(
+        "pick",
+        policy=Waiting,
+        out=data,
+        horizon=2 * MOVES + WAITS,
+        worlds=1,
+        keep_failures=True,
+        width=64,
+        height=48,
+        shadows=False,
+    )
+    mjs.export_lerobot(data, out, trim_idle=True)
+    (episode,) = mjs.Dataset(data, trim_idle=True).episodes
+    info = json.loads((out / "meta/info.json").read_text())
+    assert info["total_frames"] == episode.length - 1 < mjs.Dataset(data).episodes[0].length - 1
+    with av.open(str(out / "videos/observation.images.wrist_camera/chunk-000/file-000.mp4")) as video:
+        frames = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
+    wanted = episode.video("wrist_camera")[:]
+    assert len(frames) == len(wanted) == episode.length and np.abs(np.array(frames, int) - wanted).mean() < 6
+
+
 def test_program(picks, waiting, capsys):
     assert run_command(["quality", str(picks), "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [row["episode"] for row in rows] == [0, 1] and rows[0]["visibility"].keys() == {"wrist_camera", "exo_camera_1"}
     assert run_command(["quality", str(waiting)]) == 0
     assert "longest wait" in capsys.readouterr().out
+
+
+def test_inspect_with_quality(picks):
+    def inspect(*options):
+        done = subprocess.run(
+            [sys.executable, "-m", "mjsense", "inspect", str(picks), "--quality", *options], capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "longest wait" in (text := inspect()) and "2 episodes" in text
+    shown = json.loads(inspect("--json"))
+    assert shown["streams"] and [row["episode"] for row in shown["quality"]] == [0, 1]

@@ -143,10 +143,12 @@ def export_on_ray(
         options: Further arguments of ``export_FORMAT``.
 
     Raises:
-        ValueError: The format is one file, which one process writes: ``robomimic``, ``rlds``, ``zarr``.
+        ValueError: The format is one file, which one process writes: ``robomimic``, ``rlds``, ``zarr``; or ``trim_idle`` is True.
     """
     if format not in ("lerobot", "lerobot21", "mcap", "rerun"):
         raise ValueError(f"export on Ray writes lerobot, lerobot21, mcap and rerun; {format} is written by one process: leave out --ray")
+    if options.get("trim_idle"):
+        raise ValueError("export on Ray does not trim episodes; leave out --ray, or trim_idle (--trim-idle)")
     options["map"] = Mapping.of(options.get("map"))  # a file need not be on the workers
     check_pickle("export", options)
     chosen = {name: options[name] for name in ("map", "episodes", "success") if name in options}

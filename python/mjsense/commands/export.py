@@ -25,6 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
+    parser.add_argument("--trim-idle", action="store_true",
+                        help="Leave out the steps in which nothing moves. Formats: lerobot, lerobot21, robomimic, rlds, zarr.")  # fmt: skip
     parser.add_argument("--statistics", choices=("all", "key"), default="all",
                         help="lerobot, lerobot21: frames that the statistics of images use; key: the key frames, which takes a tenth of the time.")  # fmt: skip
     add_ray(parser)
@@ -44,6 +46,10 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.format not in ("lerobot", "lerobot21"):
             raise ValueError("--statistics is an option of the formats lerobot and lerobot21")
         options["statistics_frames"] = arguments.statistics
+    if arguments.trim_idle:
+        if arguments.format in ("mcap", "rerun"):
+            raise ValueError(f"--trim-idle is an option of lerobot, lerobot21, robomimic, rlds and zarr; {arguments.format} shows episodes with their times")
+        options["trim_idle"] = True
     options |= {"map": arguments.map, "episodes": arguments.episodes, "success": arguments.success or None}
     report = counter("episodes", False if arguments.quiet else None)
     if arguments.ray:

@@ -46,6 +46,8 @@ class Dataset:
         success: Only successful (True) or only failed (False) episodes.
         houses: Only episodes of these houses.
         where: Only episodes for which this function is true: ``lambda episode: episode.quality.idle < 0.1``.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`Episode.trimmed`). Numbers of observations, times and windows count
+            what is left.
         tolerance_s: Maximum difference between an entry of ``delta_timestamps`` and a multiple of the period. [s]
         cache_mb: Memory for decoded rows and frames of one process, half for each. [MB]
     """
@@ -61,6 +63,7 @@ class Dataset:
         success: bool | None = None,
         houses: Iterable[int] | None = None,
         where: Callable[[Episode], bool] | None = None,
+        trim_idle: bool = False,
         tolerance_s: float = 1e-4,
         cache_mb: float = 512,
     ) -> None:
@@ -83,6 +86,8 @@ class Dataset:
             chosen = [episode for episode in chosen if episode.house in numbers]
         if where is not None:
             chosen = [episode for episode in chosen if where(episode)]
+        if trim_idle:
+            chosen = [episode.trimmed() for episode in chosen]
         self.episodes: list[Episode] = chosen
         """The episodes, in the order of houses, files and positions in the file."""
         self._ends = list(itertools.accumulate(episode.length for episode in chosen))
@@ -132,7 +137,7 @@ class Dataset:
             raise IndexError(f"index {index} is out of range: {self.root} has {len(self)} observations")
         episode, t = self._place(i)
         sample: dict[str, Any] = {}
-        arrays = episode._load(self._arrays)
+        arrays = episode._load_recorded(self._arrays)
         for name in self._arrays:
             rows, _ = self._rows(name, episode, t)
             sample[name] = self._values(name, arrays.get(name), rows)
@@ -253,11 +258,12 @@ class Dataset:
         return stream.kind != "video" and _row_bytes(stream) < LARGE_ROW
 
     def _rows(self, name: str, episode: Episode, t: int) -> tuple[Any, bool]:
-        """Row ``t`` and True, or the rows of its window, inside the episode, and False."""
+        """The row in the recording of observation ``t`` and True, or the rows of its window, inside the episode, and False."""
         steps = self._windows.get(name)
+        kept = range(episode.length) if episode._kept is None else episode._kept
         if steps is None:
-            return t, True
-        return [min(max(t + step, 0), episode.length - 1) for step in steps], False
+            return int(kept[t]), True
+        return [int(kept[min(max(t + step, 0), episode.length - 1)]) for step in steps], False
 
     def _values(self, name: str, array: np.ndarray | None, rows: Any) -> Any:
         stream = self.streams[name]

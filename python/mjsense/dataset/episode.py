@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -19,7 +19,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import json_rows, playback
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
-from mjsense.dataset.quality import EpisodeQuality, idle_steps, quality_of
+from mjsense.dataset.quality import EpisodeQuality, idle_steps, kept_rows, quality_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
 from mjsense.errors import UnknownNameError
 
@@ -100,8 +100,9 @@ class Store:
 class Episode:
     """An episode of a recording: its attributes, whole arrays (``episode["obs/extra/tcp_pose"]``), videos, and replay."""
 
-    def __init__(self, entry: EpisodeEntry, index: int, store: Store) -> None:
+    def __init__(self, entry: EpisodeEntry, index: int, store: Store, kept: Sequence[int] | None = None) -> None:
         self._entry, self._store = entry, store
+        self._kept = None if kept is None else np.asarray(kept)  # rows of the recording; None: all
         self.index = index
         """Position in the whole recording, whatever the filters of the data set are."""
 
@@ -132,8 +133,8 @@ class Episode:
 
     @property
     def length(self) -> int:
-        """Number of observations: one after the reset and one after each step."""
-        return self._entry.length
+        """Number of observations: one after the reset and one after each step; of a trimmed episode those that are left."""
+        return self._entry.length if self._kept is None else len(self._kept)
 
     @property
     def outcome(self) -> str:
@@ -154,6 +155,15 @@ class Episode:
     def idle(self) -> np.ndarray:
         """Whether neither joints nor commands moved in the step that led to an observation: bool ``[T]``."""
         return idle_steps(self)
+
+    def trimmed(self) -> Episode:
+        """This episode without idle steps: a view, whose rows, frames and length are those that are left. The recording stays complete.
+
+        A step is left out if it is idle, no free object moves faster than 0.03 m/s in it, and nothing has moved by more than 0.01 (rad or
+        m) since the last observation that is left. The first observation and the idle steps at the end stay. A trimmed episode can set
+        states, but not simulate its actions.
+        """
+        return self if self._kept is not None else Episode(self._entry, self.index, self._store, kept_rows(self))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -227,7 +237,7 @@ class Episode:
 
     def video(self, camera: str) -> Video:
         """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
-        return Video(self._video(camera), self._store.frames)
+        return Video(self._video(camera), self._store.frames, None if self._kept is None else self._kept.tolist())
 
     # The next functions are for this package.
 
@@ -240,7 +250,7 @@ class Episode:
         return info
 
     def _frames(self, cameras: list[str], rows: list[list[int]]) -> list[list[np.ndarray]]:
-        """Images of each camera at its rows."""
+        """Images of each camera at its rows of the recording."""
         return self._store.frames.frames([(self._video(camera), at) for camera, at in zip(cameras, rows)])
 
     @property
@@ -263,7 +273,7 @@ class Episode:
             for key, dataset in file[self.trajectory].get(VIDEOS, {}).items():
                 name, at = text_of(dataset[:].tobytes()), dataset.attrs
                 if name and "width" in at:
-                    videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self.length, int(at["width"]), int(at["height"]),
+                    videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, int(at["width"]), int(at["height"]),
                                                      text_of(at["encoding"]), float(at.get("metres_per_unit", 0)),
                                                      Fraction(text_of(at["fps"])))  # fmt: skip
         return videos, 500 * len(videos)
@@ -327,6 +337,11 @@ class Episode:
 
     def _load(self, names: list[str]) -> dict[str, np.ndarray]:
         """Whole arrays of streams that are not videos. Streams that this episode does not have are left out."""
+        found = self._load_recorded(names)
+        return found if self._kept is None else {name: rows[self._kept] for name, rows in found.items()}
+
+    def _load_recorded(self, names: list[str]) -> dict[str, np.ndarray]:
+        """As :meth:`_load`, with all rows of the recording."""
         cache, found = self._store.rows, {}
         for name in names:
             if (values := cache.find((self.index, name))) is not None:
@@ -350,12 +365,12 @@ class Episode:
                         found[name] = values
                 elif place.removeprefix(NUMBERS) == name:
                     found[name] = dataset[:]
-                    if found[name].nbytes < LARGE_ROW * max(1, self.length):
+                    if found[name].nbytes < LARGE_ROW * max(1, self._entry.length):
                         cache.add((self.index, name), found[name], found[name].nbytes)
         return {name: found[name] for name in names if name in found}
 
     def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:
-        """Rows of a stream whose rows are too large to keep all of them."""
+        """Rows of the recording, of a stream whose rows are too large to keep all of them."""
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
             dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name]
@@ -366,7 +381,8 @@ class Episode:
     @property
     def states(self) -> np.ndarray:
         """float64 [T, nstate]: MuJoCo's state at every observation, in the order of ``mjSTATE_INTEGRATION``."""
-        return playback.inputs_of(self).state.copy()
+        states = playback.inputs_of(self).state
+        return states.copy() if self._kept is None else states[self._kept]
 
     def model(self) -> mujoco.MjModel:
         """The model that was simulated: the archived one with this episode's sizes, masses, colours and so on. A new object."""
@@ -376,7 +392,7 @@ class Episode:
         """Sets ``data`` to the state at observation ``t`` and computes everything that depends on it. Does not step."""
         if not -self.length <= t < self.length:
             raise ValueError(f"t is {t}; episode {self.index} has {self.length} observations")
-        playback.set_state(model, data, playback.inputs_of(self).state[t])
+        playback.set_state(model, data, self.states[t])
 
     def replay(
         self,

@@ -190,7 +190,9 @@ def replay_episode(
 ) -> Iterator[tuple[int, mujoco.MjData]]:
     if from_ not in ("states", "actions"):
         raise ValueError(f"from_ is {from_!r}; it must be 'states' or 'actions'")
-    states = inputs_of(episode).state
+    if from_ == "actions" and episode._kept is not None:
+        raise ValueError(f"{where(episode)} is trimmed; only the complete episode can be simulated from its actions")
+    states = episode.states
     model = model_of(episode) if model is None else model
     data = mujoco.MjData(model) if data is None else data
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 _SLOW = 0.03  # rad/s or m/s; slower joints do not move
 _SMALL = 0.01  # smaller changes of a command, as a share of its largest value in the episode, are none
+_DRIFT = 0.01  # rad or m; leaving out steps hides no larger motion
 _POINTS = "obs/extra/object_image_points/"
 
 
@@ -46,6 +47,24 @@ def idle_steps(episode: Episode) -> np.ndarray:
         change[0] = np.where(name in limits, change[0], 0)  # the first observation has no action
         still &= (change <= limits.get(name, _SMALL * np.abs(values).max())).all(1)
     return np.concatenate([[False], still])
+
+
+def kept_rows(episode: Episode) -> list[int]:
+    """Rows of the observations that :meth:`Episode.trimmed` leaves."""
+    actors = [name for name in episode.streams if name.startswith("env_states/actors/")]
+    joints = [name for name in episode.streams if name.startswith("obs/agent/qpos/")]
+    poses = [np.nan_to_num(episode[name].reshape(episode.length, -1)[:, :7].astype(float)) for name in actors]  # NaN: the object is absent
+    slow = _SLOW / float(episode.fps)
+    still = idle_steps(episode)
+    for pose in poses:
+        still[1:] &= (np.abs(np.diff(pose, axis=0)) <= slow).all(1)
+    moving = np.flatnonzero(~still)
+    positions = np.concatenate([*poses, *(episode[name].reshape(episode.length, -1) for name in joints)], 1) if joints else np.zeros((episode.length, 0))
+    kept = [0]
+    for t in range(1, episode.length):
+        if not still[t] or t > moving[-1] or np.abs(positions[t] - positions[kept[-1]]).max() > _DRIFT:
+            kept.append(t)
+    return kept
 
 
 def quality_of(episode: Episode) -> EpisodeQuality:

@@ -179,8 +179,9 @@ class Video:
     In depth images 0 means no measurement, and the largest value (13.107 m by default) that far or farther.
     """
 
-    def __init__(self, info: VideoInfo, reader: FrameReader) -> None:
+    def __init__(self, info: VideoInfo, reader: FrameReader, kept: Sequence[int] | None = None) -> None:
         self._info, self._reader = info, reader
+        self._kept = range(info.frames) if kept is None else kept  # frames of the file
 
     @property
     def path(self) -> Path:
@@ -188,9 +189,14 @@ class Video:
         return self._info.path
 
     @property
+    def trimmed(self) -> bool:
+        """Whether frames of the file are left out, because the episode is trimmed."""
+        return len(self) != self._info.frames
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Shape of ``video[:]``."""
-        return (self._info.frames, *self._info.shape)
+        return (len(self), *self._info.shape)
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -203,18 +209,18 @@ class Video:
         return self._info.fps
 
     def __len__(self) -> int:
-        return self._info.frames
+        return len(self._kept)
 
     def __getitem__(self, index: int | slice) -> np.ndarray:
         if isinstance(index, slice):
             frames = np.empty((len(range(*index.indices(len(self)))), *self._info.shape), self.dtype)
             for i, t in enumerate(range(*index.indices(len(self)))):
-                frames[i] = self._reader.frame(self._info, t)
+                frames[i] = self._reader.frame(self._info, self._kept[t])
             return frames
         t = index + len(self) if index < 0 else index
         if not 0 <= t < len(self):
             raise IndexError(f"{self._info.path} has {len(self)} frames, not {index}")
-        return self._reader.frame(self._info, int(t))
+        return self._reader.frame(self._info, self._kept[int(t)])
 
     def __repr__(self) -> str:
         return f"Video({self._info.path.name!r}, {self.dtype} {list(self.shape)})"

@@ -3,12 +3,21 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
 from mjsense.dataset import Episode, Video
 from mjsense.errors import UnknownNameError
 from mjsense.export.mapping import Source
+from mjsense.export.output import needs
 
+CRF = 18
+"""Quality of videos that are encoded again, better than the recording's own."""
+_OPTIONS = {"preset": "veryfast", "tune": "fastdecode", "crf": str(CRF), "bf": "0", "g": "20"}  # as the recorder's, but for crf
 FLAGS = ("reward", "success", "terminated", "truncated")
 """Features that every export has."""
 
@@ -32,3 +41,32 @@ def depth_unit(video: Video) -> float:
 def to_uint16(depth: np.ndarray, unit: float) -> np.ndarray:
     """Depth in units instead of metres."""
     return np.clip(np.rint(depth / unit), 0, 65535).astype(np.uint16)
+
+
+def padded(image: np.ndarray) -> Any:
+    """A frame for an encoder of videos with an even width and height."""
+    height, width = image.shape[:2]
+    return needs("av").VideoFrame.from_ndarray(np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), "edge"), format="rgb24")
+
+
+@contextlib.contextmanager
+def video_file(video: Video, folder: Path) -> Iterator[Path]:
+    """The file of a colour video. That of a trimmed episode is encoded again, into ``folder``, and deleted at the end of the block."""
+    if not video.trimmed:
+        yield video.path
+        return
+    path = folder / "trimmed.mp4"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with needs("av").open(str(path), "w", format="mp4") as file:
+        stream = file.add_stream("libx264", rate=video.fps, options=_OPTIONS)
+        height, width = video.shape[1:3]
+        stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
+        for t in range(len(video)):
+            frame = padded(video[t])
+            frame.pts = t
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())
+    try:
+        yield path
+    finally:
+        path.unlink()

@@ -16,6 +16,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import Episode, statistics
 from mjsense.export import lerobot_depth
 from mjsense.export.frame_statistics import check_frames, frame_histograms
+from mjsense.export.images import video_file
 from mjsense.export.mapping import Feature, Mapping, Source
 from mjsense.export.output import needs, new_output
 from mjsense.export.remux import Concatenation
@@ -36,6 +37,7 @@ def export_lerobot(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
+    trim_idle: bool = False,
     statistics_frames: int | Literal["key"] = 0,
     histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
@@ -48,6 +50,7 @@ def export_lerobot(
         map: Features and cameras: a :class:`mjsense.export.Mapping`, a TOML file, or a dict of the same form.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). Their videos are encoded again.
         statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
             by default every 20th, which takes a tenth of the time.
         histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
@@ -57,7 +60,7 @@ def export_lerobot(
         ``out``.
     """
     check_frames(statistics_frames)
-    source = Source(root, map=map, episodes=episodes, success=success)
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
     with new_output(out) as path:
         writer = Writer(source, path, statistics_frames, histograms)
         for n, episode in enumerate(source.episodes, 1):
@@ -284,10 +287,10 @@ class Writer:
             if is_depth(self._source, camera):
                 place, first, histograms[key] = self._add_depth(episode, camera, videos)
             else:
-                path = self._source.video(episode, camera).path
-                self._codec = self._codec or codec_of(path)
-                place, first = videos.add(path, length)
-                histograms[key] = self._histograms(path, length, self._statistics_frames)
+                with video_file(self._source.video(episode, camera), self._path) as path:
+                    self._codec = self._codec or codec_of(path)
+                    place, first = videos.add(path, length)
+                    histograms[key] = self._histograms(path, length, self._statistics_frames)
             entry |= {f"videos/{key}/{name}": value for name, value in place.items()}
             entry |= {f"videos/{key}/from_timestamp": first, f"videos/{key}/to_timestamp": first + length / float(self._source.fps)}
         for name, found in self._statistics.add(columns, histograms).items():
@@ -298,11 +301,12 @@ class Writer:
         self._frames += length
 
     def _add_depth(self, episode: Episode, camera: str, videos: _Videos) -> tuple[dict[str, int], float, tuple[np.ndarray, int]]:
-        """Encodes a depth video as LeRobot expects it, and copies the exact one to ``extras``."""
+        """Encodes a depth video as LeRobot expects it, and copies the exact one to ``extras`` unless the episode is trimmed."""
         video = self._source.video(episode, camera)
-        exact = self._path / f"extras/depth/{camera}/episode_{self._count:06d}{video.path.suffix}"
-        exact.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(video.path, exact)
+        if not video.trimmed:
+            exact = self._path / f"extras/depth/{camera}/episode_{self._count:06d}{video.path.suffix}"
+            exact.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(video.path, exact)
         encoded = self._path / "depth.mp4"
         histogram = lerobot_depth.encode_depth(video, encoded, self._source.fps, episode.length - 1)
         place, first = videos.add(encoded, episode.length - 1)

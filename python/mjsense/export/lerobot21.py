@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from mjsense._arguments import checked
 from mjsense.export.frame_statistics import check_frames, frame_histograms
+from mjsense.export.images import video_file
 from mjsense.export.lerobot import (
     FILES_PER_CHUNK,
     Histograms,
@@ -42,6 +43,7 @@ def export_lerobot21(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
+    trim_idle: bool = False,
     statistics_frames: int | Literal["key"] = 0,
     histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
@@ -54,6 +56,7 @@ def export_lerobot21(
         map: Features and cameras: a :class:`mjsense.export.Mapping`, a TOML file, or a dict of the same form.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). Their videos are encoded again.
         statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
             by default every 20th, which takes a tenth of the time.
         histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
@@ -63,7 +66,7 @@ def export_lerobot21(
         ``out``.
     """
     check_frames(statistics_frames)
-    source = Source(root, map=map, episodes=episodes, success=success)
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
     if depth := [camera for camera in source.cameras if is_depth(source, camera)]:
         raise ValueError(f"LeRobot v2.1 has no depth images; leave '{depth[0]}' out of the map, or export to LeRobot v3.0")
     with new_output(out) as path:
@@ -85,10 +88,10 @@ def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], 
         needs("pyarrow.parquet").write_table(table_of(columns), file)
         histograms = {}
         for camera in source.cameras:
-            video = source.video(episode, camera).path
-            codec = codec or codec_of(video)
-            histograms[image_key(camera)] = histograms_of(video, episode.length - 1, statistics_frames)
-            shutil.copyfile(video, _made(path / _VIDEO.format(video_key=image_key(camera), **place)))
+            with video_file(source.video(episode, camera), path) as video:
+                codec = codec or codec_of(video)
+                histograms[image_key(camera)] = histograms_of(video, episode.length - 1, statistics_frames)
+                shutil.copyfile(video, _made(path / _VIDEO.format(video_key=image_key(camera), **place)))
         entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1})
         stats = {name: lists(value) for name, value in statistics.add(columns, histograms).items()}
         found.append({"episode_index": position, "stats": stats})

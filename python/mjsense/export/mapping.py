@@ -109,6 +109,7 @@ class Source:
         map: A :class:`Mapping`, a TOML file, or a dict of the same form; by default :class:`Mapping`'s defaults.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
     """
 
     def __init__(
@@ -118,9 +119,10 @@ class Source:
         map: Mapping | str | Path | dict[str, Any] | None = None,
         episodes: Iterable[int] | None = None,
         success: bool | None = None,
+        trim_idle: bool = False,
     ) -> None:
         mapping = Mapping.of(map)
-        chosen = Dataset(root, episodes=episodes, success=success)
+        chosen = Dataset(root, episodes=episodes, success=success, trim_idle=trim_idle)
         self._chosen = chosen
         self.episodes: list[Episode] = [episode for episode in chosen.episodes if episode.length > 1]
         """The episodes that have at least one step."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense._rotations import quaternions_of
-from mjsense.export.images import depth_videos
+from mjsense.export.images import CRF, depth_videos, padded
 from mjsense.export.mapping import Source
 from mjsense.export.output import needs, new_output
 from mjsense.export.scene import Body, Shape, bodies
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 _NS = 1_000_000_000
 _WORLD = "world"
-_CRF = 18  # of videos that are encoded again, better than the recording's own
 _Message = tuple[int, str, Any]
 """Observation, topic, and a protobuf message or a dict of numbers."""
 
@@ -158,14 +157,12 @@ def _encoded(video: Video) -> Iterator[bytes]:
     import av  # pyright: ignore[reportMissingImports]
 
     height, width = video.shape[1:3]
-    pad: Any = ((0, height % 2), (0, width % 2), (0, 0))
     encoder: Any = av.CodecContext.create("libx264", "w")
     encoder.width, encoder.height, encoder.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
     encoder.framerate = video.fps
-    encoder.options = {"preset": "veryfast", "tune": "zerolatency", "crf": str(_CRF)}  # zerolatency: no B-frames, one packet for each frame
+    encoder.options = {"preset": "veryfast", "tune": "zerolatency", "crf": str(CRF)}  # zerolatency: no B-frames, one packet for each frame
     for t in range(len(video)):
-        frame = av.VideoFrame.from_ndarray(np.pad(video[t], pad, "edge"), format="rgb24")
-        yield b"".join(bytes(packet) for packet in encoder.encode(frame))
+        yield b"".join(bytes(packet) for packet in encoder.encode(padded(video[t])))
 
 
 def _depth(name: str, video: Video) -> Iterator[_Message]:

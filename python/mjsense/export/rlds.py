@@ -35,6 +35,7 @@ def export_rlds(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
+    trim_idle: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG.
@@ -45,6 +46,7 @@ def export_rlds(
         map: Which streams become which features: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
@@ -55,7 +57,7 @@ def export_rlds(
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         valid = re.sub(r"\W+", "_", name.lower())
         raise ValueError(f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'")
-    source = Source(root, map=map, episodes=episodes, success=success)
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
     with new_output(out) as path:
         folder = path / _VERSION
         folder.mkdir(parents=True)

@@ -33,6 +33,7 @@ def export_robomimic(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
+    trim_idle: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
@@ -44,13 +45,14 @@ def export_robomimic(
         map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
     h5py = needs("h5py", "robomimic")
-    source = Source(root, map=map, episodes=episodes, success=success)
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
     with new_output(out) as path, h5py.File(path, "w") as file:
         data = file.create_group("data")
         total = 0

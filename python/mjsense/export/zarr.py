@@ -29,6 +29,7 @@ def export_zarr(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
+    trim_idle: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion
@@ -40,6 +41,7 @@ def export_zarr(
         map: Which streams become which arrays: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
@@ -48,7 +50,7 @@ def export_zarr(
     zarr = needs("zarr", "zarr")
     if not zarr.__version__.startswith("2."):
         raise RuntimeError(f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip install 'mjsense[zarr]'")
-    source = Source(root, map=map, episodes=episodes, success=success)
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
     ends = np.cumsum([episode.length - 1 for episode in source.episodes], dtype=np.int64)
     steps = int(ends[-1]) if len(ends) else 0
     with new_output(out) as path:

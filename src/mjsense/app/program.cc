@@ -254,6 +254,11 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
       ->type_name("FILE.png");
   inspect_app.add_option("--ffmpeg", inspect_options.ffmpeg, "Path of the ffmpeg program.")
       ->type_name("PATH");
+  // The Python package handles a command with this option itself.
+  inspect_app.add_flag_callback(
+      "--quality",
+      [] { throw ValueError("--quality needs the Python package: run python -m mjsense inspect"); },
+      "Show how each episode was performed too: idle share, jerk, approach, visibility.");
   CLI::App& verify_app = add_path_command(
       program, "verify", "Check that a recording is complete and undamaged.", verify_options);
   verify_app.add_flag("--decode", verify_options.decode, "Decode every frame of the videos.");
@@ -263,9 +268,10 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
   CLI::App& repair_app = add_path_command(
       program, "repair", "Publish the finished episodes of an interrupted recording.",
       repair_options);
-  add_examples(inspect_app, {{"mjsense inspect data", "Show what a recording contains."},
-                             {"mjsense inspect data --sheet sheet.png",
-                              "Write a picture of every camera too."}});
+  add_examples(inspect_app,
+               {{"mjsense inspect data", "Show what a recording contains."},
+                {"mjsense inspect data --sheet sheet.png", "Write a picture of every camera too."},
+                {"mjsense inspect data --quality", "Show how each episode was performed too."}});
   add_examples(verify_app, {{"mjsense verify data", "Check all checksums."},
                             {"mjsense verify --decode data", "Decode every video frame too."}});
   add_examples(repair_app, {{"mjsense repair data",

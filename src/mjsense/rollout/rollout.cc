@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
@@ -12,6 +13,7 @@
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/rollout/replay_sensor.h"
 #include "mjsense/rollout/task_defaults.h"
+#include "mjsense/scenes/scene_split.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense::rollout {
@@ -85,6 +87,14 @@ RolloutCfg resolved(RolloutCfg cfg) {
   if (cfg.robot == kTaskRobot) cfg.robot = cfg.make_task ? "" : default_robot(cfg.task);
   if (cfg.scene.empty() && !cfg.make_scene && !cfg.make_task)
     cfg.scene = default_scene(task_components(cfg.task)[0]);
+  if (!cfg.split.empty()) {
+    check_fields(cfg, "");
+    if (cfg.make_scene || cfg.scene.empty())
+      throw ValueError(fmt::format(
+          "split is '{}', but {}; only scenes with a name or a file have splits", cfg.split,
+          cfg.make_scene ? "the scene is an object" : "the task has no named scene"));
+    cfg.scene = scenes::name_of_split(cfg.scene, std::exchange(cfg.split, ""));
+  }
   return cfg;
 }
 

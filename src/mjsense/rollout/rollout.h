@@ -44,6 +44,9 @@ class Rollout;
 // or real meshes if they are available ("auto").
 inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real"};
 
+// Part of the scene for tests of generalisation; "": all of it.
+inline constexpr std::array<std::string_view, 3> kSplits{"", "train", "test"};
+
 // A camera next to the robot that looks at the workspace in front of it. In a scene that contains
 // its own robot, it is at the origin until its pose is set.
 inline constexpr std::string_view kDefaultView = "default_view";
@@ -56,6 +59,7 @@ struct RolloutCfg {
   std::string robot{kTaskRobot};
   std::string arm_controller;
   std::string scene;
+  std::string split;  // one of kSplits
   std::string policy = "planner";
   int num_worlds = 1;
   int threads = 0;
@@ -111,6 +115,10 @@ void visit_fields(V& v, RolloutCfg& c) {
     "``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.")
       .decides_data();
   v("scene", c.scene, "Name or file of the scene; by default the task's.").decides_data();
+  v("split", c.split,
+    "Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as "
+    "``@train`` or ``@test`` after the scene's name.")
+      .one_of(kSplits);
   v("policy", c.policy, "Name of the policy.").decides_data();
   v("num_worlds", c.num_worlds, "Number of worlds that run in parallel.")
       .option("worlds")

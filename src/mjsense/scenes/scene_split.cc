@@ -40,10 +40,13 @@ bool is_of_other_split(const std::string& entity, const SceneFileCfg& cfg, Scene
   return !has_kind(split, known ? known->kind : entity);
 }
 
+// Position of the '@' before the name of a split; folders may contain others.
+std::size_t split_mark(std::string_view name) { return name.find('@', name.rfind('/') + 1); }
+
 }  // namespace
 
 std::optional<SceneSplit> cut_split(std::string_view& name) {
-  const std::size_t at = name.rfind('@');
+  const std::size_t at = split_mark(name);
   if (at == std::string_view::npos) return {};
   const std::string_view word = name.substr(at + 1);
   for (SceneSplit split : {SceneSplit::kTrain, SceneSplit::kTest}) {
@@ -53,6 +56,17 @@ std::optional<SceneSplit> cut_split(std::string_view& name) {
   }
   throw_unknown(fmt::format("scene '{}'", name), "split", std::string(word),
                 std::vector<std::string>{"train", "test"});
+}
+
+std::string name_of_split(std::string_view scene, std::string_view split) {
+  if (split_mark(scene) != std::string_view::npos)
+    throw ValueError(fmt::format(
+        "scene '{}' already names a split, but split is '{}'; give one of them", scene, split));
+  const std::size_t colon = scene.rfind(':');
+  const bool house = colon != std::string_view::npos && colon + 1 < scene.size() &&
+                     scene.find_first_not_of("0123456789", colon + 1) == std::string_view::npos;
+  const std::size_t end = house ? colon : scene.size();
+  return fmt::format("{}@{}{}", scene.substr(0, end), split, scene.substr(end));
 }
 
 bool has_kind(SceneSplit split, std::string_view kind) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "mjsense/core/fields/named_enum.h"
@@ -18,6 +19,10 @@ constexpr std::array<std::string_view, 2> enum_names(SceneSplit) { return {"trai
 // Removes the suffix "@train" or "@test" and returns it; empty if there is no '@'. Throws KeyError
 // for another suffix.
 std::optional<SceneSplit> cut_split(std::string_view& name);
+
+// The name of a part of a scene: "kitchen@train:3" of "kitchen:3". Throws ValueError if `scene` is
+// already the name of a part.
+std::string name_of_split(std::string_view scene, std::string_view split);
 
 // Whether a split has objects of this kind. The choice depends only on the kind: a quarter of all
 // kinds is in kTest.

@@ -84,5 +84,16 @@ TEST(SceneSplit, UnknownAndEmptySplitsAreErrors) {
               HasSubstr("has no objects in its split 'train'"));
 }
 
+TEST(SceneSplit, NamesOfSplits) {
+  EXPECT_EQ(name_of_split("varied_table", "train"), "varied_table@train");
+  EXPECT_EQ(name_of_split("kitchen:12", "test"), "kitchen@test:12");
+  EXPECT_EQ(name_of_split("a@b/scene.toml", "test"), "a@b/scene.toml@test");
+  EXPECT_THAT(error_of<ValueError>([] { name_of_split("kitchen@train:3", "test"); }),
+              HasSubstr("scene 'kitchen@train:3' already names a split, but split is 'test'"));
+  std::string_view path = "a@b/scene.toml";
+  EXPECT_FALSE(cut_split(path));
+  EXPECT_EQ(path, "a@b/scene.toml");
+}
+
 }  // namespace
 }  // namespace mjsense::scenes
