@@ -26,7 +26,8 @@ class MeshNormals:
 
 @wp.func
 def _triangle_normal(surfaces: Surfaces, meshes: MeshNormals, kind: int, shape: int, o: wp.vec3, d: wp.vec3) -> wp.vec3:
-    """Interpolated between the corners of a mesh's triangle; that of the triangle itself for a height field."""
+    """Interpolated between the corners of a mesh's triangle; that of the triangle itself for a height field. The ray begins near the
+    surface, where numbers are small."""
     tree = wp.uint64(0)
     if kind == HFIELD:
         tree = surfaces.height_fields[shape]
@@ -66,12 +67,14 @@ def _find_normals(
     to_geom = wp.transpose(mat) @ camera_mat[w, camera]
     o = wp.transpose(mat) @ (camera_pos[w, camera] - surfaces.pos[w, geom]) + to_geom @ offset[i]
     d = to_geom @ direction[i]
+    distance = planar[w, i] / -direction[i][2]
     kind = surfaces.type[geom]
     n = wp.vec3(0.0, 0.0, 1.0)
     if kind == HFIELD or kind == MESH:
-        n = _triangle_normal(surfaces, meshes, kind, surfaces.data_id[w % surfaces.data_id.shape[0], geom], o, d)
+        n = _triangle_normal(
+            surfaces, meshes, kind, surfaces.data_id[w % surfaces.data_id.shape[0], geom], o + 0.99 * distance * d, d
+        )
     else:
-        distance = planar[w, i] / -direction[i][2]
         n = primitive_normal(kind, surfaces.size[w % surfaces.size.shape[0], geom], o + distance * d)
     normals[w, i] = wp.transpose(to_geom) @ n
 
