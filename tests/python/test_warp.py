@@ -72,7 +72,9 @@ def test_warp_is_imported_only_if_asked_for():
 
 
 @needs_warp
-@pytest.mark.parametrize("scene", ["quadruped on a plane", "quadruped on rough terrain", "objects"])
+@pytest.mark.parametrize(
+    "scene", ["quadruped on a plane", "quadruped on rough terrain", "objects", "stones", "table with a Franka", "kitchen"]
+)
 def test_every_field_equals_that_of_the_cpu(scene):
     import gpu_check
 
@@ -84,7 +86,7 @@ def test_every_field_equals_that_of_the_cpu(scene):
 def test_air_time_and_history_over_many_steps():
     import gpu_check
 
-    reference, ours = gpu_check.pair(gpu_check.feet_only, 2, "cpu")
+    reference, ours = gpu_check.pair(gpu_check.SceneOfCheck(gpu_check.feet_only), 2, "cpu")
     for _ in gpu_check.steps(reference, ours, 150):
         for name, field in reference.scene["feet"].fields.items():
             if not name.startswith(("force", "torque", "friction", "normal_force")):

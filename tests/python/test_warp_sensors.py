@@ -318,7 +318,7 @@ def test_effect_sensors_and_imus():
 @pytest.mark.parametrize("scene", SCENES)
 def test_cameras(scene):
     view = {"parent_body": "robot/trunk", "pos": (0, 0, 0.3), "quat": (0.8, 0.4, 0.3, 0.2), "width": 40, "height": 30}
-    types = ("rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "point_cloud")
+    types = ("rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "point_cloud", "normals")
     cameras = [
         mjs.CameraSensorCfg("all", data_types=types, enabled_geom_groups=(0, 1, 2, 3), **view),
         mjs.CameraSensorCfg(
@@ -348,6 +348,8 @@ def test_cameras(scene):
     near = (all_cpu["depth"][..., 0] < 100) & (all_cpu["depth"][..., 0] > 0)
     assert np.abs(all_cpu["point_cloud"] - all_warp["point_cloud"])[near].max() < 1e-3
     assert np.abs(all_cpu["rgb"].astype(int) - all_warp["rgb"])[near].mean() < 2
+    other = np.abs(all_cpu["normals"] - all_warp["normals"]).max(-1) > 1e-3
+    assert (other & near).sum() <= 3 and np.abs(all_cpu["normals"]).max(-1)[near].min() > 0.5
 
 
 def test_cameras_with_a_period_and_a_delay():
@@ -425,7 +427,21 @@ def test_a_nan_policy_raises():
 
 
 @pytest.mark.parametrize(
-    "module", ["camera", "contact", "contact_lists", "contact_memory", "effects", "kernels", "lidar", "pose_history", "rays"]
+    "module",
+    [
+        "camera",
+        "camera_normals",
+        "contact",
+        "contact_lists",
+        "contact_memory",
+        "effect_errors",
+        "effect_timing",
+        "effects",
+        "kernels",
+        "lidar",
+        "pose_history",
+        "rays",
+    ],
 )
 def test_kernels_compile_for_cuda_devices(module, tmp_path):
     """Warp contains the compiler for CUDA devices, which needs no such device."""

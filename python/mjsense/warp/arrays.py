@@ -44,3 +44,14 @@ def write(array: wp.array, values: Any, rows: Any = slice(None)) -> None:
         values = wp.to_torch(values, requires_grad=False)
     index = rows if isinstance(rows, slice) else torch().as_tensor(rows, device=target.device)
     target[index] = torch().as_tensor(values, dtype=target.dtype, device=target.device)
+
+
+def device_of(name: str | None) -> Any:
+    """The device of this name; by default the first CUDA device, or the CPU without one."""
+    if name is None:
+        return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
+    try:
+        return wp.get_device(name)
+    except Exception:
+        known = ", ".join(str(device) for device in wp.get_devices())
+        raise ValueError(f"device '{name}': there is no such device; there are {known}") from None

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+from mujoco_warp._src import types
 
 from mjsense import _mujoco
 from mjsense.warp.sensor import Stage, WarpSensor, Worlds, implements, unsupported
@@ -24,3 +27,15 @@ class Builtin(WarpSensor):
         begin, dim = int(model.sensor_adr[index]), int(model.sensor_dim[index])
         (name,) = sensor.specs
         self.fields = {name: worlds.data.sensordata[:, begin : begin + dim]}
+
+
+def check_types(model: Any) -> None:
+    """Raises ValueError with all sensors whose types mujoco_warp lacks."""
+    known = {int(kind) for kind in types.SensorType}
+    missing = [
+        f"'{model.sensor(i).name}' ({mujoco.mjtSensor(kind).name.removeprefix('mjSENS_').lower()})"
+        for i, kind in enumerate(model.sensor_type)
+        if int(kind) not in known
+    ]
+    if missing:
+        raise ValueError(f"sensors whose types are not available with backend='warp': {', '.join(missing)}; use backend='cpu'")

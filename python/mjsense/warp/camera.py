@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from mjsense import _mujoco
+from mjsense.warp.camera_normals import CameraNormals
 from mjsense.warp.sensor import WarpSensor, Worlds, declared, implements, unsupported
 
 if TYPE_CHECKING:
@@ -143,6 +144,7 @@ class Camera(WarpSensor):
             self._pixels_of("body_segmentation"),
             self._pixels_of("entity_segmentation"),
         )
+        self.normals = CameraNormals(worlds, self.camera, self.fields["normals"]) if "normals" in self.fields else None
         self.every_step = cfg.update_period > 0
         self.due = wp.full(worlds.num_worlds, True, dtype=bool, device=worlds.device)
         self.number = wp.full(worlds.num_worlds, -1, dtype=wp.int64, device=worlds.device)
@@ -161,7 +163,7 @@ class Camera(WarpSensor):
             "enabled_tendon_groups": bool(cfg.enabled_tendon_groups),
             "orthographic with camera_name": cfg.orthographic and bool(cfg.camera_name),
         }
-        missing |= {f"data type '{name}'": name in cfg.data_types for name in ("normals", "flow")}
+        missing["data type 'flow'"] = "flow" in cfg.data_types
         for option, used in missing.items():
             if used:
                 raise unsupported(self.name, option)
@@ -174,8 +176,8 @@ class Camera(WarpSensor):
                 worlds.num_worlds,
                 (cfg.width, cfg.height),
                 "rgb" in types,
-                "depth" in types or "point_cloud" in types,
-                any(name.endswith("segmentation") for name in types),
+                any(name in types for name in ("depth", "point_cloud", "normals")),
+                any(name.endswith("segmentation") or name == "normals" for name in types),
                 use_textures=cfg.use_textures,
                 use_shadows=cfg.use_shadows,
                 use_fast_math=False,
@@ -234,3 +236,5 @@ class Camera(WarpSensor):
             self.launch(_copy_depth, due, *inputs)
         if any(name.endswith("segmentation") for name in self.fields):
             self.launch(_copy_segmentation, due, context.seg_data, worlds.model.geom_bodyid, self.geom_entity, *self.id_targets)
+        if self.normals:
+            self.normals.update(due, context)

@@ -35,6 +35,7 @@ CAPSULE = wp.constant(int(mjw.GeomType.CAPSULE))
 ELLIPSOID = wp.constant(int(mjw.GeomType.ELLIPSOID))
 CYLINDER = wp.constant(int(mjw.GeomType.CYLINDER))
 BOX = wp.constant(int(mjw.GeomType.BOX))
+MESH = wp.constant(int(mjw.GeomType.MESH))
 
 
 @wp.struct
@@ -93,6 +94,22 @@ def _hit_triangles(tree: wp.uint64, o: wp.vec3, d: wp.vec3, start: float, limit:
 
 
 @wp.func
+def primitive_normal(kind: int, size: wp.vec3, p: wp.vec3) -> wp.vec3:
+    """Outward, at a point of the surface; that of a plane for meshes and height fields."""
+    if kind == SPHERE:
+        return normal_sphere(p)
+    if kind == CAPSULE:
+        return normal_capsule(size, p)
+    if kind == ELLIPSOID:
+        return normal_ellipsoid(size, p)
+    if kind == CYLINDER:
+        return normal_cylinder(size, p)
+    if kind == BOX:
+        return normal_box(size, p)
+    return wp.vec3(0.0, 0.0, 1.0)
+
+
+@wp.func
 def _nearer(surfaces: Surfaces, hit: Hit, w: int, geom: int, origin: wp.vec3, direction: wp.vec3, reach: float) -> Hit:
     """The nearer one of a hit and that of a geom, within reach. Distances within rounding are a tie: the lower geom id wins."""
     pos = surfaces.pos[w, geom]
@@ -147,18 +164,8 @@ def _nearer(surfaces: Surfaces, hit: Hit, w: int, geom: int, origin: wp.vec3, di
     if not is_nearer:
         return hit
     p = o + t * d
-    n = wp.vec3(0.0, 0.0, 1.0)
-    if kind == SPHERE:
-        n = normal_sphere(p)
-    elif kind == CAPSULE:
-        n = normal_capsule(size, p)
-    elif kind == ELLIPSOID:
-        n = normal_ellipsoid(size, p)
-    elif kind == CYLINDER:
-        n = normal_cylinder(size, p)
-    elif kind == BOX:
-        n = normal_box(size, p)
-    elif kind != PLANE:
+    n = primitive_normal(kind, size, p)
+    if kind == HFIELD or kind == MESH:
         n = wp.normalize(wp.vec3(found[1], found[2], found[3]))
     best = Hit()
     best.t = t
