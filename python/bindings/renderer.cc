@@ -119,6 +119,11 @@ struct BoundRenderer {
                  soft_arrays(soft)),
         memory(memory_of(scene)) {}
 
+  static void set_rgb(nb::handle from, float* rgb) {
+    const auto values = nb::cast<nb::tuple>(from);
+    for (int i = 0; i < 3; ++i) rgb[i] = nb::cast<float>(values[i]);
+  }
+
   static render::SceneSettings settings_of(const nb::dict& from) {
     render::SceneSettings out;
     out.samples = nb::cast<int>(from["samples"]);
@@ -127,8 +132,10 @@ struct BoundRenderer {
     out.shadow_scale = nb::cast<float>(from["shadow_scale"]);
     out.shadow_near = nb::cast<float>(from["shadow_near"]);
     out.haze_width = nb::cast<float>(from["haze"]);
-    const auto rgb = nb::cast<nb::tuple>(from["haze_rgb"]);
-    for (int i = 0; i < 3; ++i) out.haze_rgb[i] = nb::cast<float>(rgb[i]);
+    set_rgb(from["haze_rgb"], out.haze_rgb);
+    out.fog.start = nb::cast<float>(from["fog_start"]);
+    out.fog.slope = nb::cast<float>(from["fog_slope"]);
+    set_rgb(from["fog_rgb"], out.fog.rgb);
     out.line_width = nb::cast<float>(from["line_width"]);
     out.projected_textures = nb::cast<bool>(from["projected_textures"]);
     return out;
@@ -139,8 +146,8 @@ struct BoundRenderer {
     render::SceneMemory scene = memory;
     scene.num_geoms = num_geoms;
     scene.num_lights = num_lights;
-    bool* const all[] = {&scene.shadow,        &scene.reflection, &scene.skybox,   &scene.haze,
-                         &scene.flex_vertices, &scene.flex_edges, &scene.flex_skin};
+    bool* const all[] = {&scene.shadow, &scene.reflection,    &scene.skybox,     &scene.haze,
+                         &scene.fog,    &scene.flex_vertices, &scene.flex_edges, &scene.flex_skin};
     for (std::size_t i = 0; i < std::size(all); ++i) *all[i] = nb::cast<bool>(flags[i]);
     render::ImageTargets targets;
     targets.rgb = reinterpret_cast<std::uint8_t*>(rgb);

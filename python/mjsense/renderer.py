@@ -56,7 +56,7 @@ _SIZES = (
 )
 
 # Flags of renderer.scene.flags (mjtRndFlag) by their effect here.
-_REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_FOG", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
+_REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
 _REFUSED_IF_CLEAR = ("mjRND_CULL_FACE",)
 
 
@@ -149,15 +149,18 @@ class Renderer:
             arrays["tex_adr"] = arrays["tex_adr"].astype(np.int64)
         soft = {name: getattr(scene, name) for name in _SCENE_ARRAYS}
         self._alive = (arrays, soft)  # the native renderer reads their memory
-        quality, haze = model.vis.quality, model.vis.rgba.haze
+        quality, map_, rgba, extent = model.vis.quality, model.vis.map, model.vis.rgba, float(model.stat.extent)
         settings = {
             "samples": max(1, int(quality.offsamples)),
             "shadows": bool(quality.shadowsize > 0),
-            "shadow_clip": float(model.stat.extent * model.vis.map.shadowclip),
-            "shadow_scale": float(model.vis.map.shadowscale),
-            "shadow_near": float(model.stat.extent * model.vis.map.znear),
-            "haze": float(model.vis.map.haze),
-            "haze_rgb": tuple(float(x) for x in haze[:3]),
+            "shadow_clip": float(extent * map_.shadowclip),
+            "shadow_scale": float(map_.shadowscale),
+            "shadow_near": float(extent * map_.znear),
+            "haze": float(map_.haze),
+            "haze_rgb": tuple(float(x) for x in rgba.haze[:3]),
+            "fog_start": extent * map_.fogstart,
+            "fog_slope": 1 / (extent * max(map_.fogend - map_.fogstart, 1e-6)),
+            "fog_rgb": tuple(float(x) for x in rgba.fog[:3]),
             "line_width": float(model.vis.global_.linewidth),
             # 3.12 wraps 2D textures around spheres, cylinders and so on; earlier versions project them along z.
             "projected_textures": tuple(int(x) for x in self._mujoco.mj_versionString().split(".")[:2]) < (3, 12),
@@ -405,7 +408,9 @@ class Renderer:
         flags = scene.flags
         if rgb is not None:
             self._check_scene()
-        shown = [bool(flags[i]) for i in (flag.mjRND_SHADOW, flag.mjRND_REFLECTION, flag.mjRND_SKYBOX, flag.mjRND_HAZE)]
+        shown = [
+            bool(flags[i]) for i in (flag.mjRND_SHADOW, flag.mjRND_REFLECTION, flag.mjRND_SKYBOX, flag.mjRND_HAZE, flag.mjRND_FOG)
+        ]
         shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
         images = [image for image in (rgb, depth, segmentation) if image is not None]
         height, width = images[0].shape[:2] if images else (self._height, self._width)

@@ -197,16 +197,29 @@ def test_a_pose_that_is_not_finite_is_named():
         renderer.render()
 
 
-@pytest.mark.parametrize(
-    ("flag", "value"),
-    [("WIREFRAME", 1), ("ADDITIVE", 1), ("FOG", 1), ("DEPTH", 1), ("SEGMENT", 1), ("IDCOLOR", 1), ("CULL_FACE", 0)],
-)
-def test_flags_without_support_are_refused(flag, value):
+REFUSED = ("WIREFRAME", "ADDITIVE", "DEPTH", "SEGMENT", "IDCOLOR", "CULL_FACE")
+
+
+@pytest.mark.parametrize("flag", REFUSED)
+def test_flags_without_support_are_refused(flag):
+    if not hasattr(mujoco.mjtRndFlag, f"mjRND_{flag}"):
+        pytest.skip(f"MuJoCo {mujoco.__version__} has no mjRND_{flag}")
     model, data = load(BALL)
     renderer = mjs.Renderer(model, 20, 30)
     renderer.update_scene(data)
-    renderer.scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = value
+    index = getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")
+    value = renderer.scene.flags[index] = 1 - renderer.scene.flags[index]
     with pytest.raises(ValueError, match=rf"scene.flags\[mjRND_{flag}\] = {value} is not supported"):
+        renderer.render()
+
+
+@pytest.mark.parametrize("name", ["stereo", "enabletransform", "framewidth"])
+def test_settings_of_the_scene_without_support_are_refused(name):
+    model, data = load(BALL)
+    renderer = mjs.Renderer(model, 20, 30)
+    renderer.update_scene(data)
+    setattr(renderer.scene, name, 1)
+    with pytest.raises(ValueError, match=f"scene.{name} = (1|True) is not supported"):
         renderer.render()
 
 
@@ -457,6 +470,42 @@ def test_shapes_look_as_in_opengl(opengl, camera):
     compare(images, 34)
 
 
+@pytest.mark.parametrize(
+    "flag", [i for i in range(int(mujoco.mjtRndFlag.mjNRNDFLAG)) if mujoco.mjtRndFlag(i).name[6:] not in REFUSED]
+)
+def test_all_other_flags_of_the_scene_do_what_they_do_in_opengl(opengl, flag):
+    model, data = load(SHAPES, 60)
+    images = []
+    for Renderer in (mujoco.Renderer, mjs.Renderer):
+        with Renderer(model, 240, 320) as renderer:
+            for _ in range(2):
+                renderer.update_scene(data, "view")
+            renderer.scene.flags[flag] = 1 - renderer.scene.flags[flag]
+            images.append(renderer.render().astype(float))
+    assert 10 * np.log10(255**2 / np.mean((images[0] - images[1]) ** 2)) > 34
+
+
+@pytest.mark.parametrize(("tilt", "fog", "haze"), [(1, (0.3, 1.5), 0.3), (0.2, (5, 40), 0.8)], ids=["surfaces", "sky and haze"])
+def test_fog_is_that_of_opengl(opengl, tilt, fog, haze):
+    model, data = (
+        load(f"""<mujoco><visual><map zfar="30" fogstart="{fog[0]}" fogend="{fog[1]}" haze="{haze}"/><rgba fog=".9 .2 .5 1"/></visual>
+        <statistic extent="2" center="0 0 .4"/><asset><material name="floor" reflectance=".4"/>
+        <texture type="skybox" builtin="gradient" rgb1=".2 .6 .8" rgb2="0 0 .2" width="64" height="384"/></asset>
+        <worldbody><light pos="0 0 6"/><camera name="view" pos="0 -2 2.5" xyaxes="1 0 0 0 {tilt} 1"/><geom type="plane" size="0 0 .1" material="floor"/>
+        <geom size=".3" pos="0 0 .4" rgba="0 1 0 1"/><geom type="box" size=".2 .02 .2" pos="-.5 -.6 .5" rgba="1 1 0 .5"/></worldbody></mujoco>""")
+    )
+    images = []
+    for Renderer in (mujoco.Renderer, mjs.Renderer):
+        with Renderer(model, 120, 160) as renderer:
+            for _ in range(2):
+                renderer.update_scene(data, "view")
+            without = renderer.render()
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
+            images.append(renderer.render().astype(float))
+            assert (np.abs(images[-1] - without).max(-1) > 10).mean() > 0.3
+    assert 10 * np.log10(255**2 / np.mean((images[0] - images[1]) ** 2)) > 40
+
+
 @pytest.mark.parametrize("flag", range(int(mujoco.mjtVisFlag.mjNVISFLAG)))
 def test_visual_flags_do_what_they_do_in_opengl(opengl, flag):
     option = mujoco.MjvOption()
@@ -488,9 +537,11 @@ def test_shadows_end_where_they_end_in_opengl(opengl, light, region):
 @pytest.mark.parametrize("distance", [0.05, 0.15, -0.05])
 def test_geoms_near_a_light_cast_shadows_as_in_opengl(opengl, light, distance):
     # light (o) above a box (=), above the floor; the near plane of the light's shadow map is 0.1 m below it
-    model, data = load(f"""<mujoco><visual><map znear=".05"/><headlight diffuse=".1 .1 .1"/></visual><statistic extent="2" center="0 0 0"/>
+    model, data = (
+        load(f"""<mujoco><visual><map znear=".05"/><headlight diffuse=".1 .1 .1"/></visual><statistic extent="2" center="0 0 0"/>
         <worldbody><light pos="0 0 1" dir="0 0 -1" {light}/><camera pos="0 -1 1" xyaxes="1 0 0 0 .7 .7"/>
         <geom type="plane" size="2 2 .1"/><geom type="box" size=".2 .2 .005" pos="0 0 {1 - distance}"/></worldbody></mujoco>""")
+    )
     theirs, ours = both(model, data, 0)[0]
     assert 10 * np.log10(255**2 / np.mean((theirs.astype(float) - ours) ** 2)) > 30
 

@@ -101,6 +101,7 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                             settings_.haze_width,
                             {settings_.haze_rgb[0], settings_.haze_rgb[1], settings_.haze_rgb[2]}},
                     .haze = scene.haze,
+                    .fog = scene.fog ? settings_.fog : Fog{},
                     .projected_textures = settings_.projected_textures};
     const View& built = builder_->build(view, position_, rotation_, grid_);
     tiles_(built, images, 0, (height + kTileSize - 1) / kTileSize, memory_->scratch());

@@ -23,6 +23,7 @@ struct SceneSettings {
   float shadow_clip = 0, shadow_scale = 0;  // m; relative to a spot light's cutoff
   float shadow_near = 0;                    // m
   float haze_width = 0, haze_rgb[3] = {};
+  Fog fog;
   float line_width = 1;             // pixels
   bool projected_textures = false;  // DrawnScene::projected_textures
 };
@@ -47,7 +48,7 @@ struct SceneMemory {
   std::ptrdiff_t light_stride;
   int num_lights;
   const char* cameras[2];
-  bool shadow, reflection, skybox, haze;  // flags mjRND_*
+  bool shadow, reflection, skybox, haze, fog;  // flags mjRND_*
   bool flex_vertices, flex_edges, flex_skin;
 };
 

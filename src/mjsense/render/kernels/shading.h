@@ -17,6 +17,13 @@ struct alignas(64) Colors {
   float rgb[3][kLanes];
 };
 
+// The colour `under` at planar depth t behind the view's fog.
+inline Float behind_fog(const Fog& fog, Float t, Float under, int channel) {
+  const Float density =
+      min(max((t - splat(fog.start)) * splat(fog.slope), splat(0.0f)), splat(1.0f));
+  return fma(density, splat(fog.rgb[channel]) - under, under);
+}
+
 // x^n for x in [0, 1]; the error is below 0.002 in the range that is visible in 8 bits.
 inline Float power(Float x, Float n) {
   const Float zero = splat(0.0f), one = splat(1.0f), minimum = splat(0.3f);
@@ -213,6 +220,10 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
       if (shadows) sum = sum + load(separate.rgb[c] + k);
       store(out.rgb[c] + k, min(sum * load(s.texture[c] + k), splat(1.0f)));
     }
+  if (view.fog.slope == 0) return;
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < kLanes; k += kWidth)
+      store(out.rgb[c] + k, behind_fog(view.fog, load(hits.t + k), load(out.rgb[c] + k), c));
 }
 
 }  // namespace

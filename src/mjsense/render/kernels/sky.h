@@ -7,6 +7,11 @@
 namespace mjsense::render {
 namespace {
 
+// How far the sky's cylinder is in the direction `w` (world frame), as a divisor of its radius.
+inline Float cylinder_reach(const Vec3f& w) {
+  return max(sqrt(fma(w.x, w.x, w.y * w.y)), abs(w.z));
+}
+
 inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
                              Colors& out) {
   const bool ortho = view.grid.orthographic;
@@ -25,9 +30,13 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
       color = sample_cube(*view.skybox, m, {w.x, w.z, -w.y},
                           splat(0.5f * step * view.skybox->width[0]));
     const Float scale = splat(1.0f / 255);
-    store(out.rgb[0] + k, select(m, color.r * scale, load(out.rgb[0] + k)));
-    store(out.rgb[1] + k, select(m, color.g * scale, load(out.rgb[1] + k)));
-    store(out.rgb[2] + k, select(m, color.b * scale, load(out.rgb[2] + k)));
+    const Float parts[3] = {color.r * scale, color.g * scale, color.b * scale};
+    for (int c = 0; c < 3; ++c) {
+      Float part = parts[c];
+      if (view.skybox && view.fog.slope != 0)
+        part = behind_fog(view.fog, splat(view.sky_radius) / cylinder_reach(w), part, c);
+      store(out.rgb[c] + k, select(m, part, load(out.rgb[c] + k)));
+    }
   }
 }
 
@@ -43,8 +52,7 @@ inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, C
     if (!any(splat(view.sky_from) < t)) continue;
     const Vec3f d{load(pixels.x + k), load(pixels.y + k), splat(-1.0f)};
     const Vec3f w = from_geom(view.r_wc, d);
-    const Float reach = max(sqrt(fma(w.x, w.x, w.y * w.y)), abs(w.z));
-    const Mask hidden = less(int_of(-1), load(hits.geom + k)) & (distance < t * reach);
+    const Mask hidden = less(int_of(-1), load(hits.geom + k)) & (distance < t * cylinder_reach(w));
     if (any(hidden)) {
       shade_background(view, pixels, bits(hidden) << k, out);
       t = select(hidden, splat(kInfinity), t);
@@ -64,7 +72,9 @@ inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, C
         zero);
     for (int c = 0; c < 3; ++c) {
       const Float under = load(out.rgb[c] + k);
-      store(out.rgb[c] + k, fma(alpha, splat(haze.rgb[c]) - under, under));
+      Float over = splat(haze.rgb[c]);
+      if (view.fog.slope != 0) over = behind_fog(view.fog, radius * distance / level, over, c);
+      store(out.rgb[c] + k, fma(alpha, over - under, under));
     }
   }
 }

@@ -121,6 +121,12 @@ struct LightSides {
 
 struct FixedTile;
 
+// OpenGL's linear fog: its density is 0 at planar depth `start` and grows with `slope` (1/m) to 1.
+struct Fog {
+  float start = 0, slope = 0;  // slope 0: no fog
+  float rgb[3] = {};
+};
+
 struct View {
   static constexpr int kMaxLights = 32;
   PixelGrid grid;
@@ -152,7 +158,9 @@ struct View {
     float width;           // relative to sky_distance
     float rgb[3];
   } haze;
-  float sky_from = 0;  // planar depth, m; nearer points are neither hidden nor hazy
+  float sky_from = 0;    // planar depth, m; nearer points are neither hidden nor hazy
+  Fog fog;               // over surfaces, haze and skybox
+  float sky_radius = 0;  // m; the skybox is as deep in the fog as a cylinder of this radius
   // The first geom that reflects, visible or not; -1 if there is none. The reflected view is that
   // of the camera mirrored in its plane; it is added to the geom's own colour.
   int mirror = -1;  // geom id

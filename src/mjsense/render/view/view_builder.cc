@@ -282,6 +282,8 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   }
   if (view_.shadows) light_space_.fill(view_);
   view_.sky_distance = 0;
+  view_.sky_radius = scene.sky.distance;
+  view_.fog = scene.fog;
   if (view_.skybox) set_sky(scene.haze ? endless : nullptr, scene.sky, position, rotation);
   view_.mirror = -1;
   view_.reflection = nullptr;

@@ -57,6 +57,7 @@ struct DrawnScene {
   const Texture* skybox;  // null: none
   Sky sky;
   bool haze;
+  Fog fog;
   // 2D textures are projected along z onto all shapes, as MuJoCo did before 3.12.
   bool projected_textures;
 };
