@@ -99,19 +99,16 @@ inline void find_edges(const PixelGrid& grid, const Hits* hits, int across, int 
   }
 }
 
-// Adds packets with geoms that are so thin that they may be between the centres of pixels.
-inline void find_thin(const View& view, const int* list, int count, const Tile& tile,
-                      std::uint32_t* edges) {
-  const PixelGrid& grid = view.grid;
+// If the geom is so thin that it may be between the centres of pixels, adds all lanes of the packets
+// that may see it.
+inline void add_thin(const PixelGrid& grid, const ViewGeom& g, const Tile& tile,
+                     std::uint32_t* edges) {
   const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
-  for (int i = 0; i < count; ++i) {
-    const ViewGeom& g = view.geoms[list[i]];
-    const float* w = g.window;
-    if (w[1] - w[0] > thin && w[3] - w[2] > thin) continue;
-    const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
-    for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
-      edges[__builtin_ctz(near)] = 0xffffu;
-  }
+  const float* w = g.window;
+  if (w[1] - w[0] > thin && w[3] - w[2] > thin) return;
+  const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
+  for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
+    edges[__builtin_ctz(near)] = 0xffffu;
 }
 
 // Pixels of a tile, each of which has `samples` lanes in a tile of samples.

@@ -152,10 +152,11 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
 }
 
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
-// the surface of its centre keeps its colour, unless its packet is in `always`.
+// the surface of its centre keeps its colour, unless it is among the lanes `always` of its packet.
 inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
-                          const SampledPixels& pixels, PacketMask always, TileScratch& scratch,
-                          Tile& tile, Reflection& reflection, Colors* colors) {
+                          const SampledPixels& pixels, const std::uint32_t* always,
+                          TileScratch& scratch, Tile& tile, Reflection& reflection,
+                          Colors* colors) {
   start_samples(view, centers, pixels, tile);
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
   const int packets = pixels.packets(), samples = pixels.samples;
@@ -164,8 +165,11 @@ inline void shade_samples(const View& view, const TileLists& lists, const Tile& 
   for (int q = 0; q < packets; ++q) {
     Hits& hits = tile.hits[q];
     lanes[q] = differing(view, centers, pixels, q, hits);
-    for (int k = 0; k < kLanes; k += samples)
-      if (always >> pixels.packet[pixels.pixel(q, k)] & 1u) lanes[q] |= ((1u << samples) - 1) << k;
+    for (int k = 0; k < kLanes; k += samples) {
+      const int pixel = pixels.pixel(q, k);
+      if (always[pixels.packet[pixel]] >> pixels.lane[pixel] & 1u)
+        lanes[q] |= ((1u << samples) - 1) << k;
+    }
     if (lanes[q]) shaded |= 1u << q;
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(lanes[q] >> k & kAllLanes);
@@ -194,6 +198,15 @@ inline void shade_samples(const View& view, const TileLists& lists, const Tile& 
   }
 }
 
+// Adds the lanes of each packet that show an edge in the mirror.
+inline void find_reflected_edges(const View& beyond, const Reflection& reflection, int across,
+                                 int down, std::uint32_t* edges) {
+  find_edges(beyond.grid, reflection.tile.hits, across, down, edges);
+  for (int i = 0; i < beyond.num_opaque; ++i)
+    add_thin(beyond.grid, beyond.geoms[i], reflection.tile, edges);
+  for (int q = 0; q < across * down; ++q) edges[q] &= reflection.lanes[q];
+}
+
 // Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
 // samples see different surfaces.
 inline void render_multisampled(const View& view, const ImageTargets& targets, int x0, int y0,
@@ -213,20 +226,20 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
-  if (view.reflection) trace_reflection(view, packets, tile, reflection);
   std::uint32_t edges[kTilePackets] = {};
   find_edges(grid, tile.hits, across, down, edges);
-  find_thin(view, scratch.opaque, lists.opaque, tile, edges);
-  PacketMask always = 0;
+  for (int i = 0; i < lists.opaque; ++i) add_thin(grid, view.geoms[scratch.opaque[i]], tile, edges);
+  std::uint32_t always[kTilePackets] = {};
+  if (view.reflection && trace_reflection(view, packets, tile, reflection))
+    find_reflected_edges(*view.reflection, reflection, across, down, always);
+  PacketMask veiled = 0;
   for (int i = 0; i < lists.transparent; ++i)
-    always |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
+    veiled |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
   Colors colors[kTilePackets];
   for (int q = 0; q < packets; ++q) {
     shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, colors[q]);
-    // Edges of what is reflected.
-    if (view.reflection && reflection.lanes[q] && hit_lanes(reflection.tile.hits[q]))
-      always |= 1u << q;
-    if (always >> q & 1u) edges[q] = 0xffffu;
+    if (veiled >> q & 1u) always[q] = 0xffffu;
+    edges[q] |= always[q];
   }
   SampledPixels pixels{.samples = targets.samples};
   for (int q = 0; q < packets; ++q) {
