@@ -94,14 +94,17 @@ inline PacketMask trace_reflection(const View& view, int packets, const Tile& ti
   if (!through) return 0;
   for (int q = packets; q < kTilePackets; ++q) out.tile.farthest[q] = -kInfinity;
   out.tile.regular = tile.regular;
+  out.tile.shaded = true;
+  out.tile.depth = kInfinity;
   __builtin_memcpy(out.tile.window, tile.window, sizeof tile.window);
+  __builtin_memcpy(out.tile.around, tile.around, sizeof tile.around);
   const View& beyond = *view.reflection;
   for (int i = 0; i < beyond.num_opaque; ++i) {
     const ViewGeom& g = beyond.geoms[i];
     if (!overlap(g.window, tile.around)) continue;
     const PacketMask some = packets_in_reach(g.window, g.nearest, out.tile);
     if (!some) continue;
-    const PacketMask changed = trace_geom(beyond, i, out.tile.pixels, out.tile.hits, some);
+    const PacketMask changed = draw_or_trace(beyond, i, some, out.tile);
     if (changed) update_farthest(out.tile, changed);
   }
   return through;
