@@ -29,6 +29,10 @@ inline void store(float (*p)[rays::kClusterSize], int k, Vec3f v) {
   store(p[2] + k, v.z);
 }
 
+inline Vec3f scaled(Vec3f v, float by) {
+  return {v.x * splat(by), v.y * splat(by), v.z * splat(by)};
+}
+
 // Lanes where the interval [low, high] contains a pixel centre first + i * step.
 inline Mask holds_center(Float low, Float high, float first, float step) {
   constexpr float kSlack = 1e-3f;  // pixels
@@ -37,10 +41,18 @@ inline Mask holds_center(Float low, Float high, float first, float step) {
   return -floor(-(min(a, b) - splat(kSlack))) <= floor(max(a, b) + splat(kSlack));
 }
 
+// 1, or -1 if the camera's frame is left-handed, as that of a mirrored camera.
+inline float handedness(const ViewGeom& g) {
+  const float* r = g.rot;
+  const float determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
+                            r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]);
+  return determinant < 0 ? -1.0f : 1.0f;
+}
+
 // Sets up the triangles that may be visible in the tile: they face the camera and cover a pixel
-// centre.
-inline std::uint32_t set_up(const View& view, const ViewGeom& g, const rays::TriangleBlock& block,
-                            const Tile& tile, Drawn& out) {
+// centre. `side`: see handedness().
+inline std::uint32_t set_up(const View& view, const ViewGeom& g, float side,
+                            const rays::TriangleBlock& block, const Tile& tile, Drawn& out) {
   const PixelGrid& grid = view.grid;
   std::uint32_t drawn = 0;
   for (int k = 0; k < rays::kClusterSize; k += kWidth) {
@@ -50,7 +62,7 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, const rays::Tri
                     load(block.corners[i][2] + k)};
       c[i] = splat(g.pos) + from_geom(g.rot, v);
     }
-    const Vec3f n = cross(c[1] - c[0], c[2] - c[0]);
+    const Vec3f n = scaled(cross(c[1] - c[0], c[2] - c[0]), side);
     const Float volume = dot(n, c[0]);
     Mask shown = volume < splat(-1e-30f);
     if (!any(shown)) continue;
@@ -79,7 +91,7 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, const rays::Tri
     drawn |= lanes << k;
     for (int i = 0; i < 3; ++i) {
       const Vec3f a = c[(i + 1) % 3], b = c[(i + 2) % 3];
-      store(out.edges[i], k, cross(b - a, b + a));
+      store(out.edges[i], k, scaled(cross(b - a, b + a), side));
     }
     const Float inverse = splat(1.0f) / volume;
     store(out.inverse_t, k, {n.x * inverse, n.y * inverse, n.z * inverse});
@@ -221,11 +233,13 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
   int blocks[kMaxBlocks];
   const int count = find_blocks(clusters, TileFrustum(g, tile), maximum, blocks);
   if (count < 0) return false;
+  const float side = handedness(g);
   Drawn drawn;
   for (int i = 0; i < count; ++i) {
     const rays::TriangleBlock& block = clusters.blocks[blocks[i]];
     if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
-    for (std::uint32_t lanes = set_up(view, g, block, tile, drawn); lanes; lanes &= lanes - 1) {
+    for (std::uint32_t lanes = set_up(view, g, side, block, tile, drawn); lanes;
+         lanes &= lanes - 1) {
       const int lane = __builtin_ctz(lanes);
       const float window[4] = {drawn.window[0][lane], drawn.window[1][lane], drawn.window[2][lane],
                                drawn.window[3][lane]};

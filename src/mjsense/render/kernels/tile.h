@@ -3,6 +3,7 @@
 // Renders a tile of 16 x 16 pixels: finds the geoms it can see, the hit of each pixel, and its
 // colour. Part of the tile kernels.
 
+#include "mjsense/render/kernels/edges.h"
 #include "mjsense/render/kernels/output.h"
 #include "mjsense/render/kernels/sky.h"
 #include "mjsense/render/kernels/tile_fixed_layer.h"
@@ -88,19 +89,6 @@ inline TileLists find_geoms(const View& view, const float* window, TileScratch& 
   return lists;
 }
 
-// Sample offsets within a pixel: Hammersley points, which are well spread in both directions.
-inline void sample_shift(int index, int samples, float& x, float& y) {
-  if (samples == 1) {
-    x = y = 0;
-    return;
-  }
-  std::uint32_t b = static_cast<std::uint32_t>(index);
-  float radical = 0, half = 0.5f;
-  for (; b; b >>= 1, half *= 0.5f) radical += (b & 1u) * half;
-  x = (static_cast<float>(index) + 0.5f) / samples - 0.5f;
-  y = radical + 0.5f / samples - 0.5f;
-}
-
 // Computes the colours of packet `q` before transparent geoms: surfaces, sky, reflections, haze.
 inline void shade_packet(const View& view, const FixedTile* fixed, const Reflection& reflection,
                          int q, const Pixels& pixels, Hits& hits, Shadows& shadows,
@@ -128,15 +116,6 @@ struct TileSpace {
   Reflection reflection;
   Tile sampled;
 };
-
-// Sample offsets of OpenGL's multisampling: for four samples those that all common implementations
-// use.
-inline void multisample_shift(int index, int samples, float& x, float& y) {
-  constexpr float kFour[4][2] = {{-1, -3}, {3, -1}, {-3, 1}, {1, 3}};
-  if (samples != 4) return sample_shift(index, samples, x, y);
-  x = kFour[index][0] / 8;
-  y = -kFour[index][1] / 8;  // OpenGL counts rows from the bottom
-}
 
 // Sets the pixels of a tile at (x0, y0), `across` packets wide, and clears its hits.
 inline void start_tile(const View& view, int x0, int y0, int across, int packets, float shift_x,
@@ -172,133 +151,31 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
                       colors);
 }
 
-// If 1/t deviates from a linear function of the image by more than this times the size of a pixel,
-// relative to 1/t, there is an edge within one geom.
-constexpr float kBend = 0.06f;
-
-// Sets the lanes of each packet that show an edge: neighbouring pixels see different geoms, or planes
-// with different slopes. Geoms that are so thin that they may be between the centres of pixels are
-// added.
-inline void find_edges(const View& view, const TileLists& lists, int across, int down,
-                       const TileScratch& scratch, const Tile& tile, std::uint32_t* edges) {
-  constexpr int kSide = kTileSize;
-  const PixelGrid& grid = view.grid;
-  const int columns = 4 * across, rows = 4 * down;
-  alignas(64) int geom[kSide * kSide];
-  alignas(64) float nearness[kSide * kSide];
-  for (int q = 0; q < across * down; ++q) {
-    const int at = 4 * (q / across) * kSide + 4 * (q % across);
-    for (int r = 0; r < 4; ++r)
-      for (int i = 0; i < 4; ++i) {
-        geom[at + r * kSide + i] = tile.hits[q].geom[4 * r + i];
-        nearness[at + r * kSide + i] = 1 / tile.hits[q].t[4 * r + i];
-      }
-  }
-  const float maximum = 2 * kBend * grid.dx;
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) {
-      const int at = y * kSide + x, id = geom[at];
-      const auto differs = [&](bool before, bool after, int step) {
-        if ((before && geom[at - step] != id) || (after && geom[at + step] != id)) return true;
-        if (!before || !after) return false;
-        const float bend = nearness[at - step] + nearness[at + step] - 2 * nearness[at];
-        return (bend < 0 ? -bend : bend) > maximum * nearness[at];
-      };
-      if (differs(x > 0, x + 1 < columns, 1) || differs(y > 0, y + 1 < rows, kSide))
-        edges[y / 4 * across + x / 4] |= 1u << (y % 4 * 4 + x % 4);
-    }
-  const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
-  for (int i = 0; i < lists.opaque; ++i) {
-    const ViewGeom& g = view.geoms[scratch.opaque[i]];
-    const float* w = g.window;
-    if (w[1] - w[0] > thin && w[3] - w[2] > thin) continue;
-    const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
-    for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
-      edges[__builtin_ctz(near)] = 0xffffu;
-  }
-}
-
-// Samples of some pixels of a tile, `samples` lanes for each pixel.
-struct SampledPixels {
-  int packet[kTilePackets * kLanes], lane[kTilePackets * kLanes];  // of each pixel
-  int count = 0;
-};
-
-// Starts a tile whose lanes are the samples of the pixels.
-inline void start_samples(const View& view, const Tile& centers, const SampledPixels& pixels,
-                          int samples, Tile& out) {
-  const float far = view.far > 0 ? view.far : kInfinity;
-  const int lanes = pixels.count * samples;
-  const int packets = (lanes + kLanes - 1) / kLanes;
-  out.shaded = true;
-  out.regular = false;
-  out.around[0] = out.around[2] = kInfinity;
-  out.around[1] = out.around[3] = -kInfinity;
-  for (int q = 0; q < packets; ++q) {
-    Pixels& p = out.pixels[q];
-    p.window[0] = p.window[2] = kInfinity;
-    p.window[1] = p.window[3] = -kInfinity;
-    for (int k = 0; k < kLanes; ++k) {
-      const int at = q * kLanes + k < lanes ? q * kLanes + k : lanes - 1, pixel = at / samples;
-      float shift_x, shift_y;
-      multisample_shift(at % samples, samples, shift_x, shift_y);
-      const Pixels& from = centers.pixels[pixels.packet[pixel]];
-      const float x = from.x[pixels.lane[pixel]] + shift_x * view.grid.dx;
-      const float y = from.y[pixels.lane[pixel]] + shift_y * view.grid.dy;
-      p.x[k] = x;
-      p.y[k] = y;
-      p.near[k] = view.near;
-      float* w = p.window;
-      w[0] = x < w[0] ? x : w[0];
-      w[1] = x > w[1] ? x : w[1];
-      w[2] = y < w[2] ? y : w[2];
-      w[3] = y > w[3] ? y : w[3];
-    }
-    for (int c = 0; c < 4; ++c) out.window[c][q] = p.window[c];
-    for (int c = 0; c < 4; c += 2) {
-      out.around[c] = p.window[c] < out.around[c] ? p.window[c] : out.around[c];
-      out.around[c + 1] = p.window[c + 1] > out.around[c + 1] ? p.window[c + 1] : out.around[c + 1];
-    }
-    out.farthest[q] = far;
-    clear(out.hits[q], far);
-  }
-  for (int q = packets; q < kTilePackets; ++q) out.farthest[q] = -kInfinity;
-  out.depth = far;
-}
-
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
-// the surface of its centre keeps its colour, unless its packet is in `always`.
+// the surface of its centre keeps its colour, unless it is among the lanes `always` of its packet.
 inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
-                          const SampledPixels& pixels, int samples, PacketMask always,
+                          const SampledPixels& pixels, const std::uint32_t* always,
                           TileScratch& scratch, Tile& tile, Reflection& reflection,
                           Colors* colors) {
-  start_samples(view, centers, pixels, samples, tile);
+  start_samples(view, centers, pixels, tile);
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
-  const int packets = (pixels.count * samples + kLanes - 1) / kLanes;
+  const int packets = pixels.packets(), samples = pixels.samples;
   PacketMask shaded = 0;
   std::uint32_t lanes[kTilePackets] = {};
-  for (int i = 0; i < pixels.count; ++i) {
-    const int q = i * samples / kLanes, first = i * samples % kLanes;
+  for (int q = 0; q < packets; ++q) {
     Hits& hits = tile.hits[q];
-    const Hits& center = centers.hits[pixels.packet[i]];
-    const int lane = pixels.lane[i];
-    bool differs = always >> pixels.packet[i] & 1u;
-    const float nearness = 1 / center.t[lane];
-    float mean = 0;
-    for (int k = first; k < first + samples; ++k) {
-      differs |= hits.geom[k] != center.geom[lane];
-      mean += 1 / hits.t[k];
+    lanes[q] = differing(view, centers, pixels, q, hits);
+    for (int k = 0; k < kLanes; k += samples) {
+      const int pixel = pixels.pixel(q, k);
+      if (always[pixels.packet[pixel]] >> pixels.lane[pixel] & 1u)
+        lanes[q] |= ((1u << samples) - 1) << k;
     }
-    const float bend = mean / samples - nearness;
-    differs |= (bend < 0 ? -bend : bend) > kBend * view.grid.dx * nearness;
-    if (differs) {
-      shaded |= 1u << q;
-      lanes[q] |= ((1u << samples) - 1) << first;
-      continue;
-    }
-    for (int k = first; k < first + samples; ++k) {
-      hits.t[k] = kInfinity;
-      hits.geom[k] = hits.id[k] = -1;
+    if (lanes[q]) shaded |= 1u << q;
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask m = mask_of(lanes[q] >> k & kAllLanes);
+      store(hits.t + k, select(m, load(hits.t + k), splat(kInfinity)));
+      store(hits.geom + k, select(m, load(hits.geom + k), int_of(-1)));
+      store(hits.id + k, select(m, load(hits.id + k), int_of(-1)));
     }
   }
   if (!shaded) return;
@@ -309,9 +186,9 @@ inline void shade_samples(const View& view, const TileLists& lists, const Tile& 
     const int q = __builtin_ctz(shaded);
     Colors sampled;
     shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, sampled);
-    for (int k = 0; k < kLanes; k += samples) {
+    for (int k = 0; k < kLanes && q * kLanes + k < pixels.count * samples; k += samples) {
       if (!(lanes[q] >> k & 1u)) continue;
-      const int pixel = (q * kLanes + k) / samples;
+      const int pixel = pixels.pixel(q, k);
       for (int c = 0; c < 3; ++c) {
         float sum = 0;
         for (int i = k; i < k + samples; ++i) sum += sampled.rgb[c][i];
@@ -319,6 +196,15 @@ inline void shade_samples(const View& view, const TileLists& lists, const Tile& 
       }
     }
   }
+}
+
+// Adds the lanes of each packet that show an edge in the mirror.
+inline void find_reflected_edges(const View& beyond, const Reflection& reflection, int across,
+                                 int down, std::uint32_t* edges) {
+  find_edges(beyond.grid, reflection.tile.hits, across, down, edges);
+  for (int i = 0; i < beyond.num_opaque; ++i)
+    add_thin(beyond.grid, beyond.geoms[i], reflection.tile, edges);
+  for (int q = 0; q < across * down; ++q) edges[q] &= reflection.lanes[q];
 }
 
 // Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
@@ -329,7 +215,7 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   const PixelGrid& grid = view.grid;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
-  const int packets = across * down, samples = targets.samples;
+  const int packets = across * down;
   tile.shaded = true;
   start_tile(view, x0, y0, across, packets, 0, 0, tile);
   // Samples are up to half a pixel outside tile.around.
@@ -340,34 +226,33 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
-  if (view.reflection) trace_reflection(view, packets, tile, reflection);
   std::uint32_t edges[kTilePackets] = {};
-  find_edges(view, lists, across, down, scratch, tile, edges);
-  PacketMask always = 0;
+  find_edges(grid, tile.hits, across, down, edges);
+  for (int i = 0; i < lists.opaque; ++i) add_thin(grid, view.geoms[scratch.opaque[i]], tile, edges);
+  std::uint32_t always[kTilePackets] = {};
+  if (view.reflection && trace_reflection(view, packets, tile, reflection))
+    find_reflected_edges(*view.reflection, reflection, across, down, always);
+  PacketMask veiled = 0;
   for (int i = 0; i < lists.transparent; ++i)
-    always |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
+    veiled |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
   Colors colors[kTilePackets];
   for (int q = 0; q < packets; ++q) {
     shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, colors[q]);
-    // Edges of what is reflected.
-    if (view.reflection && reflection.lanes[q] && hit_lanes(reflection.tile.hits[q]))
-      always |= 1u << q;
-    if (always >> q & 1u) edges[q] = 0xffffu;
+    if (veiled >> q & 1u) always[q] = 0xffffu;
+    edges[q] |= always[q];
   }
-  const int maximum = kTilePackets * kLanes / samples;  // pixels in a tile of samples
-  SampledPixels pixels;
+  SampledPixels pixels{.samples = targets.samples};
   for (int q = 0; q < packets; ++q) {
     for (std::uint32_t lanes = edges[q]; lanes; lanes &= lanes - 1) {
       pixels.packet[pixels.count] = q;
       pixels.lane[pixels.count++] = __builtin_ctz(lanes);
-      if (pixels.count < maximum) continue;
-      shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, reflection,
-                    colors);
+      if (pixels.count < pixels.maximum()) continue;
+      shade_samples(view, lists, tile, pixels, always, scratch, sampled, reflection, colors);
       pixels.count = 0;
     }
   }
   if (pixels.count)
-    shade_samples(view, lists, tile, pixels, samples, always, scratch, sampled, reflection, colors);
+    shade_samples(view, lists, tile, pixels, always, scratch, sampled, reflection, colors);
   for (int q = 0; q < packets; ++q)
     write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
 }

@@ -74,12 +74,15 @@ inline std::uint32_t mirror_lanes(const View& view, const Pixels& pixels, const 
   return lanes & top;
 }
 
-// Traces the reflected view in the tile. The tile's opaque geoms must already be traced.
-inline void trace_reflection(const View& view, int packets, const Tile& tile, Reflection& out) {
+// Traces the reflected view in the tile. The tile's opaque geoms must already be traced. Returns the
+// packets that show the mirror.
+inline PacketMask trace_reflection(const View& view, int packets, const Tile& tile,
+                                   Reflection& out) {
   PacketMask through = 0;
   for (int q = 0; q < packets; ++q) {
     const std::uint32_t lanes = out.lanes[q] = mirror_lanes(view, tile.pixels[q], tile.hits[q]);
     out.tile.farthest[q] = lanes ? kInfinity : -kInfinity;
+    clear(out.tile.hits[q], kInfinity);
     if (!lanes) continue;
     through |= 1u << q;
     Pixels& pixels = out.tile.pixels[q];
@@ -87,21 +90,24 @@ inline void trace_reflection(const View& view, int packets, const Tile& tile, Re
     for (int k = 0; k < kLanes; k += kWidth)
       store(pixels.near + k, select(mask_of(lanes >> k & kAllLanes),
                                     load(tile.hits[q].t + k) * splat(1.00001f), splat(kInfinity)));
-    clear(out.tile.hits[q], kInfinity);
   }
-  if (!through) return;
+  if (!through) return 0;
   for (int q = packets; q < kTilePackets; ++q) out.tile.farthest[q] = -kInfinity;
   out.tile.regular = tile.regular;
+  out.tile.shaded = true;
+  out.tile.depth = kInfinity;
   __builtin_memcpy(out.tile.window, tile.window, sizeof tile.window);
+  __builtin_memcpy(out.tile.around, tile.around, sizeof tile.around);
   const View& beyond = *view.reflection;
   for (int i = 0; i < beyond.num_opaque; ++i) {
     const ViewGeom& g = beyond.geoms[i];
     if (!overlap(g.window, tile.around)) continue;
     const PacketMask some = packets_in_reach(g.window, g.nearest, out.tile);
     if (!some) continue;
-    const PacketMask changed = trace_geom(beyond, i, out.tile.pixels, out.tile.hits, some);
+    const PacketMask changed = draw_or_trace(beyond, i, some, out.tile);
     if (changed) update_farthest(out.tile, changed);
   }
+  return through;
 }
 
 // Adds the reflection to the colour of packet `q`.

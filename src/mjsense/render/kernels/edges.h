@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Samples within pixels: their places, the pixels of a tile that show an edge, and tiles whose lanes
+// are the samples of such pixels. Part of the tile kernels.
+
+#include "mjsense/render/kernels/trace.h"
+
+namespace mjsense::render {
+namespace {
+
+// Sample offsets within a pixel: Hammersley points, which are well spread in both directions.
+inline void sample_shift(int index, int samples, float& x, float& y) {
+  if (samples == 1) {
+    x = y = 0;
+    return;
+  }
+  std::uint32_t b = static_cast<std::uint32_t>(index);
+  float radical = 0, half = 0.5f;
+  for (; b; b >>= 1, half *= 0.5f) radical += (b & 1u) * half;
+  x = (static_cast<float>(index) + 0.5f) / samples - 0.5f;
+  y = radical + 0.5f / samples - 0.5f;
+}
+
+// Sample offsets of OpenGL's multisampling: for four samples those that all common implementations
+// use.
+inline void multisample_shift(int index, int samples, float& x, float& y) {
+  constexpr float kFour[4][2] = {{-1, -3}, {3, -1}, {-3, 1}, {1, 3}};
+  if (samples != 4) return sample_shift(index, samples, x, y);
+  x = kFour[index][0] / 8;
+  y = -kFour[index][1] / 8;  // OpenGL counts rows from the bottom
+}
+
+// If 1/t deviates from a linear function of the image by more than this times the size of a pixel,
+// relative to 1/t, there is an edge within one geom.
+constexpr float kBend = 0.06f;
+
+// A value of each pixel of a tile, row by row, with one pixel more at each side.
+struct alignas(64) PaddedTile {
+  static constexpr int kStride =
+      3 * kTileSize;  // between rows, which start at a multiple of 64 bytes
+  float values[(kTileSize + 2) * kStride];
+
+  float* row(int y) { return values + (y + 1) * kStride + kTileSize; }
+  void set(int packet, int across, const float* lanes) {
+    for (int r = 0; r < 4; ++r)
+      __builtin_memcpy(row(4 * (packet / across) + r) + 4 * (packet % across), lanes + 4 * r,
+                       4 * sizeof(float));
+  }
+  // Continues the tile beyond its border: `slope` 0 repeats the border, 1 extrapolates linearly.
+  void pad(int columns, int rows, float slope) {
+    for (int y = 0; y < rows; ++y) {
+      float *first = row(y), *last = first + columns - 1;
+      first[-1] = first[0] + slope * (first[0] - first[1]);
+      last[1] = last[0] + slope * (last[0] - last[-1]);
+    }
+    const auto beyond = [&](float* out, const float* border, const float* inner) {
+      for (int k = 0; k < kTileSize; k += kWidth)
+        store(out + k, fma(splat(slope), load(border + k) - load(inner + k), load(border + k)));
+    };
+    beyond(row(-1), row(0), row(1));
+    beyond(row(rows), row(rows - 1), row(rows - 2));
+  }
+};
+
+// Adds the lanes of each packet that show an edge: neighbouring pixels see different geoms, or planes
+// with different slopes.
+inline void find_edges(const PixelGrid& grid, const Hits* hits, int across, int down,
+                       std::uint32_t* edges) {
+  PaddedTile geoms, nearness;
+  for (int q = 0; q < across * down; ++q) {
+    alignas(64) float geom[kLanes], inverse[kLanes];
+    for (int k = 0; k < kLanes; k += kWidth) {
+      store(geom + k, to_float(load(hits[q].geom + k)));
+      store(inverse + k, splat(1.0f) / load(hits[q].t + k));
+    }
+    geoms.set(q, across, geom);
+    nearness.set(q, across, inverse);
+  }
+  const int columns = 4 * across, rows = 4 * down;
+  geoms.pad(columns, rows, 0);
+  nearness.pad(columns, rows, 1);
+  const Float maximum = splat(2 * kBend * grid.dx);
+  for (int y = 0; y < rows; ++y) {
+    std::uint32_t found = 0;
+    for (int k = 0; k < kTileSize; k += kWidth) {
+      const float *geom = geoms.row(y) + k, *inverse = nearness.row(y) + k;
+      const Float id = load(geom), here = load(inverse), limit = maximum * here;
+      Mask edge = mask_of(0);
+      for (int step : {1, PaddedTile::kStride}) {
+        const Float before = loadu(geom - step), after = loadu(geom + step);
+        const Float bend = loadu(inverse - step) + loadu(inverse + step) - splat(2.0f) * here;
+        edge = edge | (before < id) | (id < before) | (after < id) | (id < after) |
+               (limit < abs(bend));
+      }
+      found |= bits(edge) << k;
+    }
+    for (int i = 0; i < across; ++i)
+      edges[y / 4 * across + i] |= (found >> 4 * i & 0xfu) << (y % 4 * 4);
+  }
+}
+
+// If the geom is so thin that it may be between the centres of pixels, adds all lanes of the packets
+// that may see it.
+inline void add_thin(const PixelGrid& grid, const ViewGeom& g, const Tile& tile,
+                     std::uint32_t* edges) {
+  const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
+  const float* w = g.window;
+  if (w[1] - w[0] > thin && w[3] - w[2] > thin) return;
+  const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
+  for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
+    edges[__builtin_ctz(near)] = 0xffffu;
+}
+
+// Pixels of a tile, each of which has `samples` lanes in a tile of samples.
+struct SampledPixels {
+  int samples;
+  int packet[kTilePackets * kLanes], lane[kTilePackets * kLanes];  // of each pixel
+  int count = 0;
+
+  int maximum() const { return kTilePackets * kLanes / samples; }
+  int packets() const { return (count * samples + kLanes - 1) / kLanes; }
+  // The pixel of a packet's lane; lanes that are not used repeat the last pixel.
+  int pixel(int q, int k) const {
+    const int i = (q * kLanes + k) / samples;
+    return i < count ? i : count - 1;
+  }
+};
+
+// Starts a tile whose lanes are the samples of the pixels.
+inline void start_samples(const View& view, const Tile& centers, const SampledPixels& pixels,
+                          Tile& out) {
+  const int packets = pixels.packets(), samples = pixels.samples;
+  const float far = view.far > 0 ? view.far : kInfinity;
+  alignas(64) float shift_x[kLanes], shift_y[kLanes];
+  for (int k = 0; k < kLanes; ++k) multisample_shift(k % samples, samples, shift_x[k], shift_y[k]);
+  out.shaded = true;
+  out.regular = false;
+  out.around[0] = out.around[2] = kInfinity;
+  out.around[1] = out.around[3] = -kInfinity;
+  for (int q = 0; q < packets; ++q) {
+    Pixels& p = out.pixels[q];
+    for (int k = 0; k < kLanes; ++k) {
+      const int i = pixels.pixel(q, k);
+      const Pixels& from = centers.pixels[pixels.packet[i]];
+      p.x[k] = from.x[pixels.lane[i]];
+      p.y[k] = from.y[pixels.lane[i]];
+    }
+    Float low[2] = {splat(kInfinity), splat(kInfinity)};
+    Float high[2] = {splat(-kInfinity), splat(-kInfinity)};
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Float x = fma(load(shift_x + k), splat(view.grid.dx), load(p.x + k));
+      const Float y = fma(load(shift_y + k), splat(view.grid.dy), load(p.y + k));
+      store(p.x + k, x);
+      store(p.y + k, y);
+      store(p.near + k, splat(view.near));
+      low[0] = min(low[0], x);
+      high[0] = max(high[0], x);
+      low[1] = min(low[1], y);
+      high[1] = max(high[1], y);
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      const float a = lane_min(low[axis]), b = lane_max(high[axis]);
+      p.window[2 * axis] = out.window[2 * axis][q] = a;
+      p.window[2 * axis + 1] = out.window[2 * axis + 1][q] = b;
+      out.around[2 * axis] = a < out.around[2 * axis] ? a : out.around[2 * axis];
+      out.around[2 * axis + 1] = b > out.around[2 * axis + 1] ? b : out.around[2 * axis + 1];
+    }
+    out.farthest[q] = far;
+    clear(out.hits[q], far);
+  }
+  for (int q = packets; q < kTilePackets; ++q) out.farthest[q] = -kInfinity;
+  out.depth = far;
+}
+
+// Lanes of packet `q` of the samples whose pixels have samples that do not see the surface of the
+// centre.
+inline std::uint32_t differing(const View& view, const Tile& centers, const SampledPixels& pixels,
+                               int q, const Hits& hits) {
+  alignas(64) int geom[kLanes];
+  alignas(64) float center[kLanes], nearness[kLanes];
+  for (int k = 0; k < kLanes; ++k) {
+    const int i = pixels.pixel(q, k);
+    const Hits& from = centers.hits[pixels.packet[i]];
+    geom[k] = from.geom[pixels.lane[i]];
+    center[k] = from.t[pixels.lane[i]];
+  }
+  std::uint32_t other = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    other |= bits(~(load(geom + k) == load(hits.geom + k))) << k;
+    store(center + k, splat(1.0f) / load(center + k));
+    store(nearness + k, splat(1.0f) / load(hits.t + k));
+  }
+  const int samples = pixels.samples;
+  const float maximum = kBend * view.grid.dx;
+  std::uint32_t lanes = 0;
+  for (int k = 0; k < kLanes; k += samples) {
+    const std::uint32_t mine = ((1u << samples) - 1) << k;
+    float mean = 0;
+    for (int i = k; i < k + samples; ++i) mean += nearness[i];
+    const float bend = mean / samples - center[k];
+    if (other & mine || (bend < 0 ? -bend : bend) > maximum * center[k]) lanes |= mine;
+  }
+  return lanes;
+}
+
+}  // namespace
+}  // namespace mjsense::render
