@@ -11,6 +11,7 @@ import numpy as np
 
 from mjsense import _foreign_model
 from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense._randomizable import check_randomizable
 from mjsense.configs import SceneCfg
 from mjsense.errors import UnknownNameError
 from mjsense.scene import Scene
@@ -267,7 +268,7 @@ class Attached(KnownAttributes):
                 continue
             try:
                 if name != "bvh_aabb":
-                    sim._check_randomizable(name)
+                    check_randomizable(sim.model, name)
                 target = sim._core.model_field(name)  # bytes
             except ValueError as error:
                 raise ValueError(f"{what.format(name)} is different, which only a new attach() follows ({error})") from None

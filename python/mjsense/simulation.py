@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from mjsense import _core, _mujoco, _show
 from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense._randomizable import check_randomizable, valid_values
+from mjsense.derived_fields import DerivedFields
 from mjsense.drawing import DebugShapes
 from mjsense.errors import UnknownNameError
 from mjsense.native_sensor import NativeSensor
@@ -22,26 +24,6 @@ from mjsense.sensor import Sensor, as_sensor
 
 if TYPE_CHECKING:
     import mujoco
-
-_IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
-"""Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
-_WHOLE = {
-    "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_group", "geom_matid", "geom_castshadow",
-    "geom_dataid", "site_group", "site_matid", "jnt_group", "jnt_limited", "jnt_actfrclimited", "jnt_actgravcomp",
-    "light_active", "light_castshadow", "light_type", "cam_projection", "flex_contype", "flex_conaffinity", "flex_condim",
-    "flex_priority", "flex_group", "flex_matid", "flex_selfcollide", "skin_group", "skin_matid", "mat_texid",
-    "mat_texuniform", "eq_active0", "tendon_group", "tendon_matid", "tendon_limited", "tendon_actfrclimited",
-    "actuator_group", "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "actuator_actearly",
-    "geom_type",
-}  # fmt: skip
-"""Integer and boolean model fields that may differ between worlds. All others are sizes and addresses, which MuJoCo uses to index
-memory."""
-_FIXED = {
-    "actuator_delay", "sensor_delay", "sensor_interval", "efm0_L", "bvh_aabb", "oct_aabb", "oct_coeff", "numeric_data",
-    "tuple_objprm",
-}  # fmt: skip
-"""Floating-point model fields that may not differ between worlds: buffer sizes and data structures depend on them."""
-_STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 
 
 class _State:
@@ -346,66 +328,13 @@ class Simulation(KnownAttributes):
         follow. Raises ValueError for fields that cannot differ between worlds (meshes, height fields, texture pixels), for a
         wrong shape, and for values that are not finite.
         """
-        self._check_randomizable(field)
+        check_randomizable(self.model, field)
         target = self.model_field(field)
         rows = self._rows(world_ids)
-        target[rows] = self._valid_values(field, values, target[rows], np.arange(self.num_worlds)[rows])
+        target[rows] = valid_values(self.model, field, values, target[rows], np.arange(self.num_worlds)[rows])
         self._core.model_changed(_ids(world_ids), field in _core.setconst_inputs())
         self._follow_models()
         self.forward(world_ids)
-
-    def _valid_values(self, field: str, values: Any, like: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Values of a model field with the shape and dtype of `like`, a row for each of these worlds."""
-        try:
-            values = np.broadcast_to(np.asarray(values, like.dtype), like.shape)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{field}: values must be of shape {like.shape} or broadcast to it: {error}") from None
-        if values.dtype.kind == "f" and not np.isfinite(values).all():
-            world, *element = np.argwhere(~np.isfinite(values))[0].tolist()
-            place = f"that of world {worlds[world]}, element {element}"
-            raise ValueError(f"{field}: values must be finite numbers; {place} is {values[(world, *element)]}")
-        if field.endswith("_condim") and not np.isin(values, (1, 3, 4, 6)).all():
-            raise ValueError(f"{field}: values must be 1, 3, 4 or 6")
-        if field in ("geom_type", "light_type", "cam_projection"):
-            self._check_types(field, values)
-        if field == "geom_dataid":
-            model, meshes = self.model, self.model.geom_type == _mujoco.Geom.MESH
-            fits = np.where(meshes, (values >= 0) & (values < model.nmesh), values == model.geom_dataid)
-            if not fits.all():
-                raise ValueError(
-                    f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs"
-                )
-        if field in _IDS:
-            count = getattr(self.model, _IDS[field])
-            if (values < -1).any() or (values >= count).any():
-                raise ValueError(
-                    f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none"
-                )
-        if field.endswith("quat") and values.size and (norms := np.linalg.norm(values, axis=-1)).min() < 1e-12:
-            world, *element = np.argwhere(norms < 1e-12)[0].tolist()
-            raise ValueError(
-                f"{field}: values must be quaternions; that of world {worlds[world]}, element {element}, has length 0"
-            )
-        return values
-
-    def _check_types(self, field: str, values: np.ndarray) -> None:
-        """Geom types may change to other primitives; meshes, height fields and signed distance fields cannot change."""
-        if field == "geom_type":
-            kinds = _mujoco.Geom
-            primitives = [kinds.PLANE, kinds.SPHERE, kinds.CAPSULE, kinds.ELLIPSOID, kinds.CYLINDER, kinds.BOX]
-            fits = (values == self.model.geom_type) | (np.isin(values, primitives) & np.isin(self.model.geom_type, primitives))
-        else:
-            fits = (values >= 0) & (values <= (1 if field == "cam_projection" else 3))
-        if not fits.all():
-            raise ValueError(f"{field}: {np.unique(values[~fits]).tolist()} cannot be given here")
-
-    def _check_randomizable(self, field: str) -> None:
-        like = getattr(self.model, field, None)
-        if not isinstance(like, np.ndarray):
-            return  # model_field() reports the available fields
-        real = like.dtype.kind == "f"
-        if (real and field in _FIXED) or (not real and field not in _WHOLE):
-            raise ValueError(f"{field}: part of the model's structure, which is the same in all worlds")
 
     def model_field(self, name: str) -> np.ndarray:
         """A field of the model with one value per world, ``[B, ...]``, live; see :meth:`randomize`."""
@@ -567,70 +496,6 @@ def _on_warp(
     sim = WarpSimulation(compiled, scene.cfg.num_envs if num_worlds is None else num_worlds, device, nconmax, njmax)
     scene._simulation = compiled._core
     return sim
-
-
-class DerivedFields:
-    """Fields of mjData of all worlds at the current state: ``sim.data.xpos`` is float64 ``[B, nbody, 3]``.
-
-    Like sensor data, the arrays are read-only and overwritten by the next read after a change. A field is copied only when it is
-    read.
-    """
-
-    _sim: Simulation
-    # Declared for editors and type checkers; all other fields of mjData are available too and listed by dir().
-    xpos: np.ndarray
-    xquat: np.ndarray
-    xmat: np.ndarray
-    xipos: np.ndarray
-    geom_xpos: np.ndarray
-    geom_xmat: np.ndarray
-    site_xpos: np.ndarray
-    site_xmat: np.ndarray
-    cam_xpos: np.ndarray
-    cam_xmat: np.ndarray
-    subtree_com: np.ndarray
-    cvel: np.ndarray
-    qacc: np.ndarray
-    qfrc_bias: np.ndarray
-    qfrc_passive: np.ndarray
-    qfrc_actuator: np.ndarray
-    qfrc_constraint: np.ndarray
-    actuator_length: np.ndarray
-    actuator_velocity: np.ndarray
-    actuator_force: np.ndarray
-    ten_length: np.ndarray
-    sensordata: np.ndarray
-    cfrc_ext: np.ndarray
-
-    def __init__(self, sim: Simulation) -> None:
-        object.__setattr__(self, "_sim", sim)
-
-    def __repr__(self) -> str:
-        return f"<mjData of {self._sim.num_worlds} worlds: .xpos, .sensordata ..., computed when read>"
-
-    def __dir__(self) -> list[str]:
-        return sorted({*_STATE, *self._sim._core.derived_fields()})
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name not in _STATE:
-            raise AttributeError(f"mjData.{name} is computed from the state: write {', '.join(_STATE[:4])} ...")
-        self._sim._component(name)[...] = value
-
-    def __getattr__(self, name: str) -> np.ndarray:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        sim = self._sim
-        if name in _STATE:
-            return sim._component(name)
-        if name not in sim._derived:
-            try:
-                handle = sim._core.derived_field(name)
-            except KeyError as error:
-                raise AttributeError(str(error)) from None
-            sim._derived[name] = handle, handle.arrays()[""]
-        handle, array = sim._derived[name]
-        sim._core.refresh(handle)
-        return array
 
 
 def _ids(world_ids: Any) -> list[int] | None:

@@ -14,6 +14,7 @@ import warp as wp
 
 from mjsense import _mujoco, data
 from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense._randomizable import check_randomizable, valid_values
 from mjsense.sensor import Sensor
 from mjsense.warp import (
     arrays,
@@ -439,14 +440,14 @@ class WarpSimulation(KnownAttributes):
         differ; for others the error lists them.
         """
         self._check_open()
-        self._compiled._check_randomizable(field)
+        check_randomizable(self._compiled.model, field)
         self._models.array(field)
         for sensor in self._sensors.values():
             if field in sensor.fixed_fields:
                 raise unsupported(sensor.name, f"randomize('{field}')")
         rows = np.arange(self.num_worlds) if world_ids is None else ids_of(world_ids, self.num_worlds)
         like = np.zeros((len(rows), *getattr(self.model, field).shape), np.float32)
-        values = self._compiled._valid_values(field, arrays.on_host(values), like, rows)
+        values = valid_values(self._compiled.model, field, arrays.on_host(values), like, rows)
         self._models.write(field, values, rows)
         self.forward(world_ids)
 
