@@ -743,6 +743,8 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     """Placement of the robot."""
     vary: Sequence[SceneVaryCfg] = ()
     """What is randomised in every episode."""
+    moods: Sequence[SceneMoodCfg] = ()
+    """Light moods; every episode uses one of them, all with the same probability."""
     sky: SceneSkyCfg | None = None
     """Colours of the sky; by default a generated scene has a blue sky outside its windows."""
     headlight: SceneHeadlightCfg | None = None
@@ -845,12 +847,25 @@ class SceneVaryCfg(_config_methods.Config):
     """Half width of the change of the hue, degrees."""
     saturation: float = 0.0
     """Half width of the change of the saturation."""
+    tint: Sequence[float] = (1.0, 1.0, 1.0)
+    """Factors of the red, green and blue of the colour. Lights that are 0 0 0 are off."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
     """light, body: half widths of the displacement. [m]"""
     angle: float = 0.0
     """light: maximum change of its direction; body: half width of the rotation about the vertical, degrees."""
     textures: Sequence[str] = ()
     """material: full names of the textures to choose from."""
+
+
+@dataclass
+class SceneMoodCfg(_config_methods.Config):
+    """A light mood: changes of lights, materials and geoms that belong together, such as those of daylight."""
+
+    name: str
+    """Name of the mood."""
+    vary: Sequence[SceneVaryCfg] = ()
+    """What differs from the model in this mood. The scene's own ``vary`` comes after it, and its colour factors multiply
+    those of the mood."""
 
 
 @dataclass
@@ -911,6 +926,7 @@ __all__ = [
     "SceneEntityCfg",
     "SceneFileCfg",
     "SceneHeadlightCfg",
+    "SceneMoodCfg",
     "SceneObjectCfg",
     "SceneRegionCfg",
     "SceneRobotCfg",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The outer camera of the camera system close_up: targets are wide enough to be recognised, and images are not clipped."""
+"""The outer cameras of franka: targets are wide enough to be recognised, and images are not clipped."""
 
 import json
 
@@ -11,16 +11,17 @@ import mjsense as mjs
 GEOM = 5  # mjOBJ_GEOM
 
 
+@pytest.mark.parametrize("system", ["", "close_up"])
 @pytest.mark.parametrize("task", ["pick", "pick_and_place", "pick_and_place_next_to", "pick_and_place_color", "packing"])
-def test_targets_are_forty_pixels_wide(task):
+def test_targets_are_forty_pixels_wide(task, system):
     env = mjs.make_vec(
-        task, "franka", num_envs=4, policy=None, camera_system="close_up", segmentation=True, cameras=["exo_camera_1"]
+        task, "franka", num_envs=4, policy=None, camera_system=system, segmentation=True, cameras=["exo_camera_1"]
     )
     rgb = env.rows["exo_camera_1"]
     labels = next(rows for name, rows in env.rows.items() if "segmentation" in name)
     model = env.sim.model
     widths, clipped = [], []
-    for start in range(3):
+    for start in range(8):
         env.reset(seed=3) if start == 0 else env.reset()
         for world in range(4):
             target = model.body(json.loads(env._rollout.obs_scene(world))["objects"]["pickup_obj"]["body"]).id

@@ -75,6 +75,7 @@ RIGHT = {
     mjs.SceneObjectCfg: dict(body="mug/mug"),
     mjs.SceneRegionCfg: dict(name="top", on="bench/top"),
     mjs.SceneVaryCfg: dict(what="light", pattern=".*"),
+    mjs.SceneMoodCfg: dict(name="evening"),
 }
 # Arguments that violate conditions other than the declared ranges, and the texts of some errors of declared ranges.
 WRONG = [
@@ -152,6 +153,7 @@ WRONG = [
     (mjs.SceneRegionCfg, dict(area=(float("nan"), 0, 0, 0)), "area"),
     (mjs.SceneRobotCfg, dict(yaw_spread=-1.0), "yaw_spread is -1"),
     (mjs.SceneVaryCfg, dict(hue=200.0), "hue is 200"),
+    (mjs.SceneVaryCfg, dict(tint=(-1.0, 0, 0)), "tint"),
     (mjs.SceneSkyCfg, dict(top=(2.0, 0, 0)), "top"),
     (mjs.SceneHeadlightCfg, dict(ambient=2.0), "ambient is 2"),
 ]  # fmt: skip

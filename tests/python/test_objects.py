@@ -19,11 +19,8 @@ SCENE = """
 name = "things"
 extends = "table"
 catalogue = {names}
+entities = []
 objects = []
-
-[[entities]]
-name = "room"
-model = "embedded:scenes/varied_table/room.xml"
 """
 
 

@@ -103,7 +103,7 @@ def lab(tmp_path):
     (scene / "statue.xml").write_text(STATUE)
     (scene / "base.toml").write_text('name = "base"\nextends = "table"\ngap = 0.02\n')
     (scene / "scene.toml").write_text(
-        'name = "mine"\nextends = "base.toml"\n[[entities]]\nname = "room"\nmodel = "room.xml"\n'
+        'name = "mine"\nextends = "base.toml"\ngenerator = ""\n[[entities]]\nname = "room"\nmodel = "room.xml"\n'
         '[[entities]]\nname = "statue"\nmodel = "statue.xml"\n'
         '[[entities]]\nname = "mug"\nmodel = "mug.xml"\n[[entities]]\nname = "pear"\nmodel = "embedded:objects/pear.xml"\n'
         '[[objects]]\nbody = "mug/mug"\ntext = "mug"\n[[objects]]\nbody = "pear/pear"\ntext = "pear"\n'

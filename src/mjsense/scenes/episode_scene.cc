@@ -77,8 +77,8 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
 
 void EpisodeScene::bind(sim::Simulation& simulation) {
   simulation_ = &simulation;
-  if (!cfg_.vary.empty())
-    variation_ = std::make_unique<SceneVariation>(cfg_.vary, simulation, context());
+  if (!cfg_.vary.empty() || !cfg_.moods.empty())
+    variation_ = std::make_unique<SceneVariation>(cfg_, simulation, context());
   make_sizes();
 }
 

@@ -356,6 +356,48 @@ TEST(EpisodeScene, VariationIsBoundedAndDependsOnTheEpisodeOnly) {
   EXPECT_EQ(textures.size(), 2u);
 }
 
+TEST(EpisodeScene, AnEpisodeHasOneMoodWhoseTintsMultiplyTheOtherColours) {
+  Files files;
+  const auto light_tint = [](std::array<double, 3> tint) {
+    SceneVaryCfg lamp;
+    lamp.what = VaryKind::kLight;
+    lamp.pattern = "room/lamp";
+    lamp.tint = tint;
+    return lamp;
+  };
+  SceneVaryCfg glow;
+  glow.what = VaryKind::kMaterial;
+  glow.pattern = "room/top";
+  glow.tint = {.5, .5, .5};
+  files.cfg.moods = {{"bright", {light_tint({2, 2, 2})}}, {"dark", {light_tint({0, 0, 0}), glow}}};
+  files.cfg.vary = {light_tint({1, .5, .25})};
+  Played played(files.cfg, 2);
+  mjBatch* batch = played.sim->worlds().batch();
+  const mjModel* m = played.sim->model();
+  const int light = mj_name2id(m, mjOBJ_LIGHT, "room/lamp");
+  const int material = mj_name2id(m, mjOBJ_MATERIAL, "room/top");
+  std::set<bool> seen;
+  for (std::uint64_t episode = 0; episode < 20; ++episode) {
+    played.start(episode, 0, 1);
+    const auto row = [&](const char* field, int row_size, int at) {
+      return static_cast<const float*>(mjb_expanded(batch, field, nullptr, nullptr)) + row_size +
+             at;
+    };
+    const float* diffuse = row("light_diffuse", 3 * m->nlight, 3 * light);
+    const float* specular = row("light_specular", 3 * m->nlight, 3 * light);
+    const float* top = row("mat_rgba", 4 * m->nmat, 4 * material);
+    const bool dark = diffuse[0] == 0;
+    seen.insert(dark);
+    for (int i = 0; i < 3; ++i) {
+      const float factor = dark ? 0.0f : 2.0f * std::array{1.0f, .5f, .25f}[i];
+      EXPECT_FLOAT_EQ(diffuse[i], factor * m->light_diffuse[3 * light + i]);
+      EXPECT_FLOAT_EQ(specular[i], factor * m->light_specular[3 * light + i]);
+      EXPECT_FLOAT_EQ(top[i], (dark ? .5f : 1.0f) * m->mat_rgba[4 * material + i]);
+    }
+  }
+  EXPECT_EQ(seen.size(), 2u);
+}
+
 TEST(ShiftColour, RotatesHueAndScalesValue) {
   float red[3] = {1, 0, 0};
   shift_colour(120, 0, .5, red);

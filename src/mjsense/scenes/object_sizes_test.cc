@@ -326,7 +326,7 @@ TEST(ObjectSizes, FaultsNameTheSetting) {
                 table.hue = 10;
                 f.cfg.vary = {table};
               }),
-              HasSubstr("hue and saturation do not apply to bodies"));
+              HasSubstr("saturation and tint do not apply to bodies"));
 }
 
 }  // namespace

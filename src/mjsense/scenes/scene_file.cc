@@ -21,6 +21,22 @@ void check_sizes(const std::array<double, 2>& sizes, const std::string& who) {
         fmt::format("{}: sizes is {}, {}: must be minimum, maximum", who, sizes[0], sizes[1]));
 }
 
+void check_vary(const std::vector<SceneVaryCfg>& all, const std::string& who) {
+  for (const SceneVaryCfg& vary : all) {
+    const std::string what = fmt::format("{}, vary {} '{}'", who, vary.what.text(), vary.pattern);
+    if (vary.brightness[0] > vary.brightness[1])
+      throw ValueError(fmt::format("{}: brightness is from {} to {}: the minimum must come first",
+                                   what, vary.brightness[0], vary.brightness[1]));
+    if (vary.what != VaryKind::kMaterial && !vary.textures.empty())
+      throw ValueError(what + ": textures apply to materials only");
+    const bool stands = vary.what == VaryKind::kLight || vary.what == VaryKind::kBody;
+    if (!stands && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
+      throw ValueError(what + ": pos and angle apply to lights and bodies only");
+    if (vary.what == VaryKind::kBody && changes_colour(vary))
+      throw ValueError(what + ": brightness, hue, saturation and tint do not apply to bodies");
+  }
+}
+
 }  // namespace
 
 void validate(const SceneFileCfg& cfg, std::string_view context) {
@@ -58,20 +74,14 @@ void validate(const SceneFileCfg& cfg, std::string_view context) {
   for (const SceneObjectCfg& object : cfg.objects) {
     if (object.sizes) check_sizes(*object.sizes, fmt::format("{}, object '{}'", who, object.body));
   }
-  for (const SceneVaryCfg& vary : cfg.vary) {
-    const std::string what = fmt::format("{}, vary {} '{}'", who, vary.what.text(), vary.pattern);
-    if (vary.brightness[0] > vary.brightness[1])
-      throw ValueError(fmt::format("{}: brightness is from {} to {}: the minimum must come first",
-                                   what, vary.brightness[0], vary.brightness[1]));
-    if (vary.what != VaryKind::kMaterial && !vary.textures.empty())
-      throw ValueError(what + ": textures apply to materials only");
-    const bool stands = vary.what == VaryKind::kLight || vary.what == VaryKind::kBody;
-    if (!stands && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
-      throw ValueError(what + ": pos and angle apply to lights and bodies only");
-    const bool colours =
-        vary.brightness != std::array<double, 2>{1, 1} || vary.hue > 0 || vary.saturation > 0;
-    if (vary.what == VaryKind::kBody && colours)
-      throw ValueError(what + ": brightness, hue and saturation do not apply to bodies");
+  check_vary(cfg.vary, who);
+  for (const SceneMoodCfg& mood : cfg.moods) {
+    const std::string what = fmt::format("{}, mood '{}'", who, mood.name);
+    check_vary(mood.vary, what);
+    for (const SceneVaryCfg& vary : mood.vary) {
+      if (vary.what == VaryKind::kBody)
+        throw ValueError(what + ": a mood cannot move bodies; use the scene's 'vary'");
+    }
   }
 }
 

@@ -142,6 +142,7 @@ struct SceneVaryCfg {
   std::array<double, 2> brightness{1, 1};
   double hue = 0;
   double saturation = 0;
+  std::array<double, 3> tint{1, 1, 1};
   std::array<double, 3> pos{};
   double angle = 0;
   std::vector<std::string> textures;
@@ -160,12 +161,37 @@ void visit_fields(V& v, SceneVaryCfg& c) {
   v("brightness", c.brightness, "Minimum and maximum factor of the colour.").at_least(0);
   v("hue", c.hue, "Half width of the change of the hue, degrees.").within(0, 180);
   v("saturation", c.saturation, "Half width of the change of the saturation.").within(0, 1);
+  v("tint", c.tint,
+    "Factors of the red, green and blue of the colour. Lights that are 0 0 0 are off.")
+      .at_least(0);
   v("pos", c.pos, "light, body: half widths of the displacement.").unit("m").at_least(0);
   v("angle", c.angle,
     "light: maximum change of its direction; body: half width of the rotation about the vertical, "
     "degrees.")
       .within(0, 90);
   v("textures", c.textures, "material: full names of the textures to choose from.");
+}
+
+// Whether it changes the colour of what it names.
+inline bool changes_colour(const SceneVaryCfg& c) {
+  return c.brightness != std::array<double, 2>{1, 1} || c.hue > 0 || c.saturation > 0 ||
+         c.tint != std::array<double, 3>{1, 1, 1};
+}
+
+struct SceneMoodCfg {
+  std::string name;
+  std::vector<SceneVaryCfg> vary;
+};
+template <class V>
+void visit_fields(V& v, SceneMoodCfg& c) {
+  v.object(
+      "SceneMoodCfg",
+      "A light mood: changes of lights, materials and geoms that belong together, such as those "
+      "of daylight.");
+  v("name", c.name, "Name of the mood.").required();
+  v("vary", c.vary,
+    "What differs from the model in this mood. The scene's own ``vary`` comes after it, and its "
+    "colour factors multiply those of the mood.");
 }
 
 struct SceneSkyCfg {
@@ -204,6 +230,7 @@ struct SceneFileCfg {
   std::vector<SceneRegionCfg> regions;
   SceneRobotCfg robot;
   std::vector<SceneVaryCfg> vary;
+  std::vector<SceneMoodCfg> moods;
   std::optional<SceneSkyCfg> sky;
   std::optional<SceneHeadlightCfg> headlight;
   scene::OptionsCfg options;
@@ -249,6 +276,8 @@ void visit_fields(V& v, SceneFileCfg& c) {
     "Where objects may be placed; empty: objects stay where their models put them.");
   v("robot", c.robot, "Placement of the robot.");
   v("vary", c.vary, "What is randomised in every episode.");
+  v("moods", c.moods,
+    "Light moods; every episode uses one of them, all with the same probability.");
   v("sky", c.sky,
     "Colours of the sky; by default a generated scene has a blue sky outside its windows.");
   v("headlight", c.headlight, "The light at the camera; by default MuJoCo's.");

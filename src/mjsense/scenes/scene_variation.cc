@@ -71,12 +71,21 @@ void shift_colour(double hue, double saturation, double brightness, float rgb[3]
   }
 }
 
-SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, sim::Simulation& simulation,
+SceneVariation::SceneVariation(const SceneFileCfg& cfg, sim::Simulation& simulation,
                                std::string_view context)
     : model_(simulation.model()) {
   mjBatch* batch = simulation.worlds().batch();
-  for (SceneVaryCfg& one : cfg) {
-    Part part;
+  for (const SceneMoodCfg& mood : cfg.moods)
+    moods_.push_back(parts_of(mood.vary, batch, fmt::format("{}, mood '{}'", context, mood.name)));
+  parts_ = parts_of(cfg.vary, batch, std::string(context));
+}
+
+std::vector<SceneVariation::Part> SceneVariation::parts_of(const std::vector<SceneVaryCfg>& cfg,
+                                                           mjBatch* batch,
+                                                           const std::string& context) {
+  std::vector<Part> parts;
+  for (const SceneVaryCfg& one : cfg) {
+    Part part{one, {}, {}};
     const mjtObj type = object_type(one.what);
     const std::vector<std::string> names = scene::model_names(model_, type);
     const std::string who = fmt::format("{}, vary {}", context, one.what.text());
@@ -87,10 +96,13 @@ SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, sim::Simulation& s
     if (part.ids.empty()) throw_unknown(who, one.what.text(), one.pattern, names);
     for (const std::string& texture : one.textures)
       part.textures.push_back(scene::resolve(model_, mjOBJ_TEXTURE, texture, who));
-    const bool colours =
-        one.brightness != std::array<double, 2>{1, 1} || one.hue > 0 || one.saturation > 0;
+    const bool colours = changes_colour(one);
     if (colours && one.what == VaryKind::kLight)
       light_diffuse_ = expand(batch, "light_diffuse", light_diffuse_);
+    if (one.tint != std::array<double, 3>{1, 1, 1} && one.what == VaryKind::kLight) {
+      light_ambient_ = expand(batch, "light_ambient", light_ambient_);
+      light_specular_ = expand(batch, "light_specular", light_specular_);
+    }
     if (colours && one.what == VaryKind::kMaterial)
       mat_rgba_ = expand(batch, "mat_rgba", mat_rgba_);
     if (colours && one.what == VaryKind::kGeom) geom_rgba_ = expand(batch, "geom_rgba", geom_rgba_);
@@ -108,31 +120,46 @@ SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, sim::Simulation& s
       body_quat_ = expand(batch, "body_quat", body_quat_);
     }
     if (!part.textures.empty()) mat_texid_ = expand(batch, "mat_texid", mat_texid_);
-    part.cfg = std::move(one);
-    parts_.push_back(std::move(part));
+    parts.push_back(std::move(part));
   }
+  return parts;
 }
 
-// Resets this world's row to the model's colour and returns it; null if colours of this kind do not
-// vary.
-float* SceneVariation::colour_of(VaryKind what, int world, int id) const {
-  const auto row = [&](float* base, int count, int size, const float* rest) -> float* {
-    if (!base) return nullptr;
-    float* mine = base + (static_cast<std::size_t>(world) * count + id) * size;
-    std::copy_n(rest + static_cast<std::ptrdiff_t>(id) * size, size, mine);
-    return mine;
+void SceneVariation::reset(int world) const {
+  const mjModel* m = model_;
+  const auto row = [&](auto* rows, const auto* values, std::size_t size) {
+    if (rows) std::copy_n(values, size, rows + size * world);
   };
-  switch (what) {
-    case VaryKind::kLight:
-      return row(light_diffuse_, static_cast<int>(model_->nlight), 3, model_->light_diffuse);
-    case VaryKind::kMaterial:
-      return row(mat_rgba_, static_cast<int>(model_->nmat), 4, model_->mat_rgba);
-    case VaryKind::kBody:
-      return nullptr;
-    case VaryKind::kGeom:
-      break;
+  row(light_pos_, m->light_pos, 3 * m->nlight);
+  row(light_dir_, m->light_dir, 3 * m->nlight);
+  row(light_ambient_, m->light_ambient, 3 * m->nlight);
+  row(light_diffuse_, m->light_diffuse, 3 * m->nlight);
+  row(light_specular_, m->light_specular, 3 * m->nlight);
+  row(mat_rgba_, m->mat_rgba, 4 * m->nmat);
+  row(mat_texid_, m->mat_texid, mjNTEXROLE * m->nmat);
+  row(geom_rgba_, m->geom_rgba, 4 * m->ngeom);
+}
+
+void SceneVariation::recolour(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const {
+  const double brightness = rng.uniform(cfg.brightness[0], cfg.brightness[1]);
+  const double hue = around(rng, cfg.hue), saturation = around(rng, cfg.saturation);
+  const auto tint = [&](float* rows, std::size_t count, int size) {
+    if (!rows) return static_cast<float*>(nullptr);
+    float* rgb = rows + (count * world + id) * size;
+    for (int i = 0; i < 3; ++i) rgb[i] *= static_cast<float>(cfg.tint[i]);
+    return rgb;
+  };
+  float* rgb = nullptr;
+  if (cfg.what == VaryKind::kLight) {
+    tint(light_ambient_, model_->nlight, 3);
+    tint(light_specular_, model_->nlight, 3);
+    rgb = tint(light_diffuse_, model_->nlight, 3);
+  } else if (cfg.what == VaryKind::kMaterial) {
+    rgb = tint(mat_rgba_, model_->nmat, 4);
+  } else {
+    rgb = tint(geom_rgba_, model_->ngeom, 4);
   }
-  return row(geom_rgba_, static_cast<int>(model_->ngeom), 4, model_->geom_rgba);
+  if (rgb) shift_colour(hue, saturation, brightness, rgb);
 }
 
 const double* SceneVariation::body_pos(int world) const {
@@ -148,36 +175,36 @@ void SceneVariation::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& 
   write_quat(axis_angle({0, 0, 1}, turn) * quat(model_->body_quat + 4 * id), body_quat_ + 4 * at);
 }
 
-void SceneVariation::vary(int world, Rng& rng) const {
-  for (const Part& part : parts_) {
-    const SceneVaryCfg& c = part.cfg;
-    for (int id : part.ids) {
-      if (c.what == VaryKind::kBody) {
-        move_body(c, world, id, rng);
-        continue;
-      }
-      const double brightness = rng.uniform(c.brightness[0], c.brightness[1]);
-      const double hue = around(rng, c.hue), saturation = around(rng, c.saturation);
-      if (float* rgb = colour_of(c.what, world, id)) shift_colour(hue, saturation, brightness, rgb);
-      if (c.what == VaryKind::kLight) {
-        const std::size_t at = 3 * (static_cast<std::size_t>(world) * model_->nlight + id);
-        if (light_pos_) {
-          for (int i = 0; i < 3; ++i)
-            light_pos_[at + i] = model_->light_pos[3 * id + i] + around(rng, c.pos[i]);
-        }
-        if (light_dir_ && c.angle > 0) {
-          const Vec3 dir =
-              turned(vec3(model_->light_dir + 3 * id), c.angle * std::numbers::pi / 180, rng);
-          write_vec(dir, light_dir_ + at);
-        }
-      }
-      if (!part.textures.empty()) {
-        const std::size_t at =
-            mjNTEXROLE * (static_cast<std::size_t>(world) * model_->nmat + id) + mjTEXROLE_RGB;
-        mat_texid_[at] = part.textures[rng.below(static_cast<std::uint32_t>(part.textures.size()))];
-      }
+void SceneVariation::apply(const Part& part, int world, Rng& rng) const {
+  const SceneVaryCfg& c = part.cfg;
+  for (int id : part.ids) {
+    if (c.what == VaryKind::kBody) {
+      move_body(c, world, id, rng);
+      continue;
+    }
+    recolour(c, world, id, rng);
+    if (c.what == VaryKind::kLight) {
+      const std::size_t at = 3 * (static_cast<std::size_t>(world) * model_->nlight + id);
+      for (int i = 0; i < 3 && light_pos_; ++i) light_pos_[at + i] += around(rng, c.pos[i]);
+      if (light_dir_ && c.angle > 0)
+        write_vec(turned(vec3(light_dir_ + at), c.angle * std::numbers::pi / 180, rng),
+                  light_dir_ + at);
+    }
+    if (!part.textures.empty()) {
+      const std::size_t at =
+          mjNTEXROLE * (static_cast<std::size_t>(world) * model_->nmat + id) + mjTEXROLE_RGB;
+      mat_texid_[at] = part.textures[rng.below(static_cast<std::uint32_t>(part.textures.size()))];
     }
   }
+}
+
+void SceneVariation::vary(int world, Rng& rng) const {
+  reset(world);
+  if (!moods_.empty()) {
+    for (const Part& part : moods_[rng.below(static_cast<std::uint32_t>(moods_.size()))])
+      apply(part, world, rng);
+  }
+  for (const Part& part : parts_) apply(part, world, rng);
 }
 
 }  // namespace mjsense::scenes

@@ -16,10 +16,8 @@ class SceneVariation {
  public:
   // Throws KeyError for a pattern that matches nothing or an unknown texture, and ValueError for a
   // body that moves. `context` is the prefix of messages.
-  SceneVariation(std::vector<SceneVaryCfg> cfg, sim::Simulation& simulation,
-                 std::string_view context);
+  SceneVariation(const SceneFileCfg& cfg, sim::Simulation& simulation, std::string_view context);
 
-  bool varies() const { return !parts_.empty(); }
   // body_pos of this world; the model's own array if body positions do not vary.
   const double* body_pos(int world) const;
   // Writes this world's rows of the model. Call Worlds::model_changed() and forward() afterwards.
@@ -30,14 +28,21 @@ class SceneVariation {
     SceneVaryCfg cfg;
     std::vector<int> ids, textures;
   };
-  float* colour_of(VaryKind what, int world, int id) const;
+  std::vector<Part> parts_of(const std::vector<SceneVaryCfg>& cfg, mjBatch* batch,
+                             const std::string& context);
+  // Gives this world's rows the model's values, except those of bodies.
+  void reset(int world) const;
+  void apply(const Part& part, int world, Rng& rng) const;
+  void recolour(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const;
   void move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const;
 
   std::vector<Part> parts_;
+  std::vector<std::vector<Part>> moods_;
   const mjModel* model_;
   // [B, n, ...] fields of MuJoCo's batch; null if the field does not vary.
   double *light_pos_ = nullptr, *light_dir_ = nullptr, *body_pos_ = nullptr, *body_quat_ = nullptr;
-  float *light_diffuse_ = nullptr, *mat_rgba_ = nullptr, *geom_rgba_ = nullptr;
+  float *light_ambient_ = nullptr, *light_diffuse_ = nullptr, *light_specular_ = nullptr;
+  float *mat_rgba_ = nullptr, *geom_rgba_ = nullptr;
   int* mat_texid_ = nullptr;
 };
 

@@ -29,7 +29,7 @@ void put_chunk(std::vector<std::uint8_t>& out, const char (&type)[5],
 }  // namespace
 
 std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int width, int height,
-                                     int channels) {
+                                     int channels, int level) {
   const bool known = channels == 1 || channels == 3 || channels == 4;
   if (width <= 0 || height <= 0 || !known ||
       pixels.size() != static_cast<std::size_t>(width) * height * channels) {
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
   }
   uLongf packed_size = compressBound(rows.size());
   std::vector<std::uint8_t> packed(packed_size);
-  if (compress2(packed.data(), &packed_size, rows.data(), rows.size(), 6) != Z_OK) {
+  if (compress2(packed.data(), &packed_size, rows.data(), rows.size(), level) != Z_OK) {
     throw RuntimeError("PNG: zlib failed to compress the image");
   }
   packed.resize(packed_size);

@@ -11,9 +11,10 @@
 namespace mjsense {
 
 // `pixels` [height, width, channels], dense, row 0 at the top; 1 (grey), 3 (RGB) or 4 (RGBA)
-// channels. Throws ValueError if the sizes do not agree.
+// channels. `level` is zlib's, 1 (fastest) to 9 (smallest). Throws ValueError if the sizes do not
+// agree.
 std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int width, int height,
-                                     int channels);
+                                     int channels, int level = 6);
 
 // Writes the file atomically. Throws RuntimeError with the path and the reason.
 void write_png(const std::filesystem::path& path, std::span<const std::uint8_t> pixels, int width,

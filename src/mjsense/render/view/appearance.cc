@@ -15,6 +15,12 @@ void resolve_rgba(const mjModel* m, int material, const float* own, float* out) 
   std::copy_n(material >= 0 && is_default ? m->mat_rgba + 4 * material : own, 4, out);
 }
 
+// A light without any colour contributes nothing, so that its shadows need not be computed.
+bool is_black(const ViewLight& light) {
+  const auto black = [](const float* rgb) { return rgb[0] <= 0 && rgb[1] <= 0 && rgb[2] <= 0; };
+  return black(light.ambient) && black(light.diffuse) && black(light.specular);
+}
+
 }  // namespace
 
 Appearance::Appearance(const mjModel* m, int max_lights)
@@ -74,7 +80,7 @@ void Appearance::copy_lights(const mjModel* m) {
       continue;
     ViewLight& light =
         add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
-    light.shadows = m->light_castshadow[i];
+    light.shadows = m->light_castshadow[i] && !is_black(light);
     light.kind = m->light_type[i] == mjLIGHT_DIRECTIONAL ? LightKind::kDirectional
                  : m->light_type[i] == mjLIGHT_SPOT      ? LightKind::kSpot
                                                          : LightKind::kPoint;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/scenes/generators/dining.h"
 
+#include "mjsense/scenes/generators/furniture.h"
 #include "mjsense/scenes/generators/room_writer.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
@@ -8,7 +9,7 @@ namespace mjsense::scenes {
 namespace {
 
 constexpr Colour kRugs[] = {{0.48, 0.30, 0.28}, {0.34, 0.40, 0.46}, {0.62, 0.56, 0.44}};
-constexpr Colour kPaintings[] = {{0.36, 0.50, 0.58}, {0.66, 0.52, 0.36}, {0.44, 0.54, 0.38}};
+constexpr Colour kFrames[] = {{0.16, 0.14, 0.13}, {0.46, 0.34, 0.20}, {0.72, 0.70, 0.66}};
 
 // A body named `name`: a chair that faces -x or +x, with its seat at x, y.
 void chair(RoomWriter& room, const char* name, double x, double y, double back) {
@@ -31,12 +32,12 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   write_shell_finishes(room, rng);
   const Colour wood = wood_colour(rng);
   const Gloss satin{.specular = 0.2, .shininess = 0.4};
-  room.tiled("table", planks_png(wood, 6, rng.next()), 1.0, satin);
+  room.tiled("table", boards_png(wood, 8, rng.next()), 1.0, satin);
   room.wrapped("table_edge", wood_png(brighter(wood, 0.85), rng.next()), satin);
   room.wrapped("chair", wood_png(wood_colour(rng), rng.next()), satin);
   room.tiled("rug", cloth_png(pick(rng, kRugs), rng.next()), 0.5);
-  room.wrapped("picture", stone_png(pick(rng, kPaintings), rng.next()));
-  room.plain("frame", {0.16, 0.14, 0.13}, satin);
+  room.plain("frame", pick(rng, kFrames), satin);
+  write_picture(room, "picture", rng);
 
   const double wide = rng.uniform(1.2, 1.5), deep = rng.uniform(0.80, 0.90),
                high = rng.uniform(0.60, 0.70), front = 0.30, x = front + deep / 2;
@@ -62,7 +63,8 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   chair(room, "chair_1", front + deep + 0.26, rng.uniform(0.25, 0.5), 1);
   const double py = rng.uniform(-0.6, 0.6);
   room.box("", "frame", {wall - 0.012, py, 1.55}, {0.012, 0.42, 0.30});
-  room.box("", "picture", {wall - 0.026, py, 1.55}, {0.003, 0.38, 0.26});
+  room.slab("", "picture", Facing::kMinusX, {wall - 0.0255, py, 1.55}, 0.76, 0.52, 0.002,
+            "contype=\"0\" conaffinity=\"0\"");
 
   SceneRegionCfg region;
   region.name = "table";

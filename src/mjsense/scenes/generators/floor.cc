@@ -274,6 +274,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
     out.cylinder({x, y, kHeight - 0.03}, 0.16, 0.03, "shade", false);
     furnisher.furnish(order[k], static_cast<RoomKind>(k));
   }
+  write_bounce_light(text);
   furnisher.loosen();
   const Rect& living = rooms[order[0]];
   cfg.robot.pos = {0.5 * (living.x0 + living.x1), 0.5 * (living.y0 + living.y1), 0};

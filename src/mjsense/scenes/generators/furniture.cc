@@ -328,7 +328,6 @@ void write_furniture_materials(RoomWriter& text, Rng& rng) {
   // Light sources below the ceiling shine down only; emission stands in for the light that the room
   // reflects onto the ceiling.
   text.glowing("ceiling_paint", {0.90, 0.90, 0.89}, 0.35);
-  text.glowing("window_pane", {0.80, 0.89, 0.97}, 0.75);
 }
 
 void write_picture(RoomWriter& text, const std::string& name, Rng& rng) {

@@ -12,13 +12,14 @@
 #include "mjsense/scenes/generators/kitchen.h"
 #include "mjsense/scenes/generators/room_with_door.h"
 #include "mjsense/scenes/generators/shelf.h"
+#include "mjsense/scenes/generators/table_room.h"
 
 namespace mjsense::scenes {
 
 std::span<const Generator> generators() {
-  static const std::vector<Generator> all{dining_generator(), floor_generator(),
+  static const std::vector<Generator> all{dining_generator(),  floor_generator(),
                                           kitchen_generator(), room_with_door_generator(),
-                                          shelf_generator()};
+                                          shelf_generator(),   table_room_generator()};
   return all;
 }
 

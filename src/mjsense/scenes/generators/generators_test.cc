@@ -53,10 +53,12 @@ struct Built {
   }
 };
 
+// Without the scenes of packages, which are in folders of their own.
 std::vector<std::string> generated_scenes() {
   std::vector<std::string> names;
   for (const std::string& name : scene_names()) {
-    if (!load_scene(name).generator.empty()) names.push_back(name);
+    if (name.find('/') == std::string::npos && !load_scene(name).generator.empty())
+      names.push_back(name);
   }
   return names;
 }
@@ -136,7 +138,7 @@ TEST(Generators, OccupancyCoversDisplacedFurniture) {
 }
 
 TEST(Generators, ErrorsNameValidGenerators) {
-  EXPECT_THAT(error_of([] { load_scene("table:3"); }), HasSubstr("has no generator"));
+  EXPECT_THAT(error_of([] { load_scene("libero/table:3"); }), HasSubstr("has no generator"));
   EXPECT_THAT(error_of<KeyError>([] { load_scene("shelv:3"); }), HasSubstr("did you mean 'shelf'"));
   mjsense::testing::TempDir dir;
   const std::string file = dir.file("scene.toml");

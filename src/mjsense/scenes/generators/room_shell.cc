@@ -14,7 +14,7 @@ void skirting(RoomWriter& room, const ShellCfg& s, Vec3 middle, Vec3 half) {
   room.box("", s.skirting, middle, half, "contype=\"0\" conaffinity=\"0\"");
 }
 
-// The wall at y1 with a window: four pieces around the opening, frame, sill, and the sky behind it.
+// The wall at y1 with a window: four pieces around the opening, frame, sill and a bright pane.
 void window_wall(RoomWriter& room, const ShellCfg& s) {
   const double left = s.window_x - s.window_wide / 2, right = s.window_x + s.window_wide / 2;
   const double top = s.sill + s.window_high, y = s.y1;
@@ -35,6 +35,8 @@ void window_wall(RoomWriter& room, const ShellCfg& s) {
     room.box("", s.skirting, middle + Vec3{0, 0, side * (s.window_high / 2 - bar)},
              {s.window_wide / 2, depth, bar});
   }
+  room.box("", "window_pane", middle + Vec3{0, 0.02, 0},
+           {s.window_wide / 2, 0.004, s.window_high / 2}, "contype=\"0\" conaffinity=\"0\"");
   room.box("window_sill", s.skirting, {s.window_x, y - 0.06, s.sill - 0.015},
            {s.window_wide / 2 + 0.05, 0.08, 0.015});
 }
@@ -63,8 +65,6 @@ void write_shell(RoomWriter& room, const ShellCfg& s) {
   skirting(room, s, {x, s.y0 + t, h}, {wide / 2, t, h});
   skirting(room, s, {x, s.y1 - t, h}, {wide / 2, t, h});
 
-  // The lamp below the ceiling casts shadows. Daylight from the window casts none, like light from
-  // a whole sky.
   room.box("", "lamp_glass", {x, y, s.height - 0.02}, {0.22, 0.22, 0.02},
            "contype=\"0\" conaffinity=\"0\"");
   room.add(
@@ -74,8 +74,15 @@ void write_shell(RoomWriter& room, const ShellCfg& s) {
   const double window = s.window_wide > 0 ? s.window_x : x;
   room.add(
       fmt::format("<light name=\"daylight\" type=\"point\" pos=\"{} {} {}\" diffuse=\"0.30 0.32 "
-                  "0.35\" specular=\"0.1 0.1 0.1\" attenuation=\"1 0 0\" castshadow=\"false\"/>",
-                  window, s.y1 - 0.15, s.sill + 0.6));
+                  "0.35\" specular=\"0.1 0.1 0.1\" attenuation=\"1 0 0\" castshadow=\"true\"/>",
+                  window, s.y1 - 0.5, s.sill + 0.8 * s.window_high));
+  write_bounce_light(room);
+}
+
+void write_bounce_light(RoomWriter& room) {
+  room.add(
+      "<light name=\"bounce\" type=\"directional\" dir=\"0 0 -1\" ambient=\"0.20 0.20 0.20\" "
+      "diffuse=\"0 0 0\" specular=\"0 0 0\" castshadow=\"false\"/>");
 }
 
 }  // namespace mjsense::scenes

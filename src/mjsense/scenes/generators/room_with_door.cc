@@ -89,6 +89,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
     out.lamp(name, {x, mid, kHeight - 0.12}, 0.85, 3.6);
     out.cylinder({x, mid, kHeight - 0.03}, 0.16, 0.03, "shade", false);
   }
+  write_bounce_light(text);
 
   // At the far walls, outside of the space needed to open the door: x, y on the wall's face, yaw.
   const double f = -s.front + 0.06, b = s.back - 0.06, l = s.left - 0.06, r = -s.right + 0.06;

@@ -78,7 +78,9 @@ struct ShellCfg {
   double window_x = 0, sill = 1.0, window_wide = 1.2, window_high = 1.1;
 };
 // Names of the geoms: floor, ceiling, wall_x0, wall_x1, wall_y0, wall_y1; of the lights: lamp,
-// daylight.
+// daylight, bounce.
 void write_shell(RoomWriter& room, const ShellCfg& shell);
+// The light `bounce`: ambient light, which stands in for what walls reflect. Moods can colour it.
+void write_bounce_light(RoomWriter& room);
 
 }  // namespace mjsense::scenes

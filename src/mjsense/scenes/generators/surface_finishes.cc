@@ -42,6 +42,7 @@ void write_shell_finishes(RoomWriter& room, Rng& rng) {
              {.specular = 0.0, .shininess = 0.05});
   room.plain("skirting", {0.92, 0.92, 0.90}, {.specular = 0.15, .shininess = 0.3});
   room.glowing("lamp_glass", {1.0, 0.98, 0.92}, 0.9);
+  room.glowing("window_pane", {0.25, 0.28, 0.31}, 2.2);
 }
 
 }  // namespace mjsense::scenes

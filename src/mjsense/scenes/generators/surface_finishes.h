@@ -9,7 +9,8 @@
 
 namespace mjsense::scenes {
 
-// Writes the materials floor, wall, ceiling, skirting and lamp_glass, which write_shell() needs.
+// Writes the materials floor, wall, ceiling, skirting, lamp_glass and window_pane, which
+// write_shell() needs.
 // Floors are planks or tiles.
 void write_shell_finishes(RoomWriter& room, Rng& rng);
 

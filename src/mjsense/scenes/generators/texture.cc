@@ -11,6 +11,8 @@
 namespace mjsense::scenes {
 namespace {
 
+constexpr int kFast = 1;  // zlib's level: 3 times as fast as the default, files 15 % larger
+
 std::uint32_t hash(std::uint32_t x, std::uint32_t y, std::uint32_t seed) {
   std::uint32_t h = x * 0x9E3779B1u ^ (y * 0x85EBCA77u) ^ (seed * 0xC2B2AE3Du);
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
@@ -29,10 +31,11 @@ double noise(double u, double v, int nx, int ny, std::uint32_t seed) {
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
   const auto ease = [](double t) { return t * t * (3 - 2 * t); };
   const double s = ease(x - x0), t = ease(y - y0);
-  const auto at = [&](int i, int k) {
-    return cell(((x0 + i) % nx + nx) % nx, ((y0 + k) % ny + ny) % ny, seed);
-  };
-  return std::lerp(std::lerp(at(0, 0), at(1, 0), s), std::lerp(at(0, 1), at(1, 1), s), t);
+  const auto wrap = [](int i, int n) { return (i % n + n) % n; };
+  const int xa = wrap(x0, nx), ya = wrap(y0, ny);
+  const int xb = xa + 1 == nx ? 0 : xa + 1, yb = ya + 1 == ny ? 0 : ya + 1;
+  return std::lerp(std::lerp(cell(xa, ya, seed), cell(xb, ya, seed), s),
+                   std::lerp(cell(xa, yb, seed), cell(xb, yb, seed), s), t);
 }
 
 // Sum of several noises with increasing frequency and decreasing weight; about [0, 1].
@@ -68,7 +71,7 @@ std::string picture(int size, F colour_at) {
       }
     }
   }
-  const std::vector<std::uint8_t> png = encode_png(pixels, size, size, 3);
+  const std::vector<std::uint8_t> png = encode_png(pixels, size, size, 3, kFast);
   return {png.begin(), png.end()};
 }
 
@@ -88,6 +91,18 @@ Colour brighter(Colour c, double factor) {
 std::string wood_png(Colour colour, std::uint32_t seed, int size) {
   return picture(
       size, [&](double u, double v) { return brighter(colour, 1 + 0.16 * grain(u, v, seed)); });
+}
+
+std::string boards_png(Colour colour, int boards, std::uint32_t seed, int size) {
+  return picture(size, [&](double u, double v) {
+    const int row = std::min(boards - 1, static_cast<int>(v * boards));
+    const double side = std::min(v * boards - row, row + 1 - v * boards) / boards;
+    const double tone = 0.90 + 0.2 * cell(row, 1, seed);
+    const double joint = side * size < 0.6 ? 0.75 : 1.0;
+    const double line =
+        grain(u + cell(row, 2, seed), v * 2 / boards + cell(row, 3, seed), seed + 7);
+    return brighter(colour, tone * joint * (1 + 0.14 * line));
+  });
 }
 
 std::string planks_png(Colour colour, int boards, std::uint32_t seed, int size) {

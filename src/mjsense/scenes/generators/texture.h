@@ -16,6 +16,8 @@ Colour brighter(Colour c, double factor);
 
 // Return PNG files of `size` x `size` pixels.
 std::string wood_png(Colour colour, std::uint32_t seed, int size = 256);  // grain along the rows
+// Boards glued side by side, each along a whole row with its own tone.
+std::string boards_png(Colour colour, int boards, std::uint32_t seed, int size = 512);
 // Planks along the rows; each of the `boards` planks has its own tone.
 std::string planks_png(Colour colour, int boards, std::uint32_t seed, int size = 512);
 // `count` x `count` tiles with joints; `bricks` shifts every second row by half a tile.
