@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue of objects, and the command that installs those of other packages."""
 
+import itertools
 import json
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from wheels import wheel
 
@@ -77,8 +79,13 @@ def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)
     monkeypatch.delenv("CONDA_PREFIX", raising=False)
     assert not listed()["robosuite_can"]["installed"]
-    with pytest.raises(ValueError, match="pip install robosuite"):
-        mjs.make_vec("pick", "franka", scene="robosuite/objects", num_envs=1, cameras=[], policy=None)
+    for scene, packages in (
+        ("robosuite", "robosuite "),
+        ("rgb", "dm-robotics-manipulation==0.10.0 "),
+        ("ycb", "myosuite==2.12.2 "),
+    ):
+        with pytest.raises(ValueError, match=f"pip install {packages}"):
+            mjs.make_vec("pick", "franka", scene=f"{scene}/objects", num_envs=1, cameras=[], policy=None)
 
 
 def test_masses_and_friction_are_those_of_the_table(monkeypatch):
@@ -89,6 +96,55 @@ def test_masses_and_friction_are_those_of_the_table(monkeypatch):
     assert model.body_subtreemass[body] == pytest.approx(0.10)
     geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == body]
     assert [list(model.geom_friction[g]) for g in geoms] == [[0.9, 0.01, 0.0005]] * len(geoms)
+    env.close()
+
+
+CORNERS = np.array(list(itertools.product((-1, 1), repeat=3)), "<f4")
+FACES = [
+    (0, 1, 3),
+    (0, 3, 2),
+    (4, 6, 7),
+    (4, 7, 5),
+    (0, 4, 5),
+    (0, 5, 1),
+    (2, 3, 7),
+    (2, 7, 6),
+    (0, 2, 6),
+    (0, 6, 4),
+    (1, 5, 7),
+    (1, 7, 3),
+]
+
+
+def box_stl(half):
+    """A box as a binary STL."""
+    facets = b"".join(
+        bytes(12) + (CORNERS[list(face)] * np.array(half, "<f4")).astype("<f4").tobytes() + bytes(2) for face in FACES
+    )
+    return bytes(80) + len(FACES).to_bytes(4, "little") + facets
+
+
+def test_objects_of_several_meshes(tmp_path, monkeypatch):
+    """The package is replaced by boxes in the files of its meshes."""
+    packages = tmp_path / "it's a <folder> & more"
+    monkeypatch.setenv("MJSENSE_PACKAGES", str(packages))
+    for one in listed().values():
+        if one["source"] == "metaworld":
+            assert not one["installed"] and one["meshes"]
+            for mesh in one["meshes"]:
+                file = packages / mesh.removeprefix("package:")
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(box_stl((0.01, 0.02, 0.03)))
+    assert listed()["metaworld_golf_club"]["installed"]
+    (tmp_path / "scene.toml").write_text(SCENE.format(names='["metaworld_golf_club", "metaworld_hammer"]'))
+    env = mjs.make_vec("pick", scene=str(tmp_path / "scene.toml"), cameras=[], policy=None, observations=["qpos"])
+    model = env.sim.model
+    body = model.body("metaworld_golf_club/metaworld_golf_club").id
+    geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body]
+    assert len(geoms) == len(listed()["metaworld_golf_club"]["meshes"]) == 3
+    assert model.body_mass[body] == pytest.approx(0.12)
+    assert all(model.geom_contype[g] for g in geoms)
+    assert np.allclose(model.geom_pos[geoms], [[0.03, 0, 0.032], [-0.045, 0, -0.06], [0.03, 0, 0.032]], atol=1e-6)
     env.close()
 
 

@@ -66,6 +66,8 @@ constexpr struct {
     {"door_opening", "Open a door by its handle.",
      "a mobile base, an arm with a gripper; a scene with a door."},
     {"nav_to_obj", "Drive to an object.", "a mobile base, a head camera; a scene with objects."},
+    {"nav_and_pick", "Drive to an object and pick it up.",
+     "a mobile base, a head camera, an arm with a gripper; a scene with objects."},
     {"multi_task", "Several tasks in one scene, such as nav_to_obj+pick.",
      "everything that its tasks need."},
 };
@@ -74,9 +76,10 @@ constexpr struct {
 std::string packages_of(const scenes::SceneFileCfg& scene) {
   std::vector<std::string> found;
   for (const scenes::SceneEntityCfg& entity : scene.entities) {
-    constexpr std::string_view kPrefix = "package:";
-    if (!entity.model.starts_with(kPrefix)) continue;
-    const std::string inside = entity.model.substr(kPrefix.size());
+    constexpr std::string_view kPrefix = "package:";  // of the model, or of files in its MJCF text
+    const std::size_t at = entity.model.find(kPrefix);
+    if (at == std::string::npos) continue;
+    const std::string inside = entity.model.substr(at + kPrefix.size());
     const std::string package = inside.substr(0, inside.find('/'));
     if (std::ranges::find(found, package) == found.end()) found.push_back(package);
   }
@@ -132,6 +135,8 @@ std::string list_objects(bool json) {
     if (!object.excluded.empty()) note = "not used: " + object.excluded;
     table.rows.push_back(
         {object.name, object.kind, source.name, source.license, installed ? "yes" : "no", note});
+    std::vector<std::string> meshes;
+    for (const scenes::CataloguePartCfg& part : object.parts) meshes.push_back(part.mesh);
     out.push_back({{"name", object.name},
                    {"description", object.text},
                    {"kind", object.kind},
@@ -141,6 +146,7 @@ std::string list_objects(bool json) {
                    {"url", source.url},
                    {"packages", source.packages},
                    {"model", object.model},
+                   {"meshes", meshes},
                    {"installed", installed},
                    {"excluded", object.excluded}});
   }

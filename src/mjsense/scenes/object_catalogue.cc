@@ -2,6 +2,7 @@
 #include "mjsense/scenes/object_catalogue.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -19,10 +20,32 @@ namespace {
 
 constexpr DataFolder kTables{"table of objects", "objects/", ".toml"};
 
+// The MJCF of an object that consists of meshes.
+std::string model_of_parts(const CatalogueObjectCfg& object) {
+  std::string assets, geoms;
+  for (std::size_t i = 0; i < object.parts.size(); ++i) {
+    const CataloguePartCfg& part = object.parts[i];
+    assets += fmt::format("<mesh name='{}' file='{}'/>", i, part.mesh);
+    if (!part.texture.empty())
+      assets += fmt::format("<texture name='{}' type='2d' file='{}'/>", i, part.texture);
+    assets += fmt::format("<material name='{}' rgba='{}' specular='0.3' shininess='0.3'{}/>", i,
+                          fmt::join(part.rgba, " "),
+                          part.texture.empty() ? "" : fmt::format(" texture='{}'", i));
+    geoms += fmt::format("<geom type='mesh' mesh='{0}' material='{0}' pos='{1}' euler='{2}'/>", i,
+                         fmt::join(part.pos, " "), fmt::join(part.euler, " "));
+  }
+  // The contact parameters are those of the built-in objects.
+  return fmt::format(
+      "<mujoco model='{0}'><compiler angle='radian'/>"
+      "<default><geom group='2' condim='6' solref='0.008 1'/></default>"
+      "<asset>{1}</asset><worldbody><body name='{0}'>{2}</body></worldbody></mujoco>",
+      object.name, assets, geoms);
+}
+
 SceneEntityCfg entity_of(const CatalogueObjectCfg& object) {
   SceneEntityCfg entity;
   entity.name = object.name;
-  entity.model = object.model;
+  entity.model = object.parts.empty() ? object.model : model_of_parts(object);
   entity.free = !object.model.starts_with("embedded:");
   entity.hidden_group = object.hidden_group;
   entity.mass = object.mass;
@@ -62,19 +85,25 @@ std::vector<int> denoted(const std::string& entry, std::string_view context) {
 
 const ObjectCatalogue& object_catalogue() {
   static const ObjectCatalogue table = [] {
-    ObjectCatalogue read;
-    const DataFile file = kTables.find("catalogue");
-    read_toml_fields(file.text, file.path, read);
-    check_fields(read, file.path);
-    for (CatalogueObjectCfg& object : read.objects) {
-      if (object.model.empty()) object.model = fmt::format("embedded:objects/{}.xml", object.name);
+    ObjectCatalogue all;
+    for (const std::string& name : kTables.names()) {
+      const DataFile file = kTables.find(name);
+      ObjectCatalogue read;
+      read_toml_fields(file.text, file.path, read);
+      check_fields(read, file.path);
+      all.sources.insert(all.sources.end(), read.sources.begin(), read.sources.end());
+      all.objects.insert(all.objects.end(), read.objects.begin(), read.objects.end());
+    }
+    for (CatalogueObjectCfg& object : all.objects) {
+      if (object.model.empty() && object.parts.empty())
+        object.model = fmt::format("embedded:objects/{}.xml", object.name);
       if (object.text.empty()) {
         object.text = object.name;
         std::ranges::replace(object.text, '_', ' ');
       }
       if (object.kind.empty()) object.kind = object.text;
     }
-    return read;
+    return all;
   }();
   return table;
 }
@@ -87,6 +116,10 @@ const ObjectSourceCfg& source_of(const CatalogueObjectCfg& object) {
 bool is_installed(const CatalogueObjectCfg& object) {
   try {
     model_path(object.model, "");
+    for (const CataloguePartCfg& part : object.parts) {
+      model_path(part.mesh, "");
+      model_path(part.texture, "");
+    }
     return true;
   } catch (const ValueError&) {
     return false;

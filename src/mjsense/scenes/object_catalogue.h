@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Objects that scenes can name: built-in ones and those of other packages, with what is known about
-// them. The table is models/objects/catalogue.toml.
+// them. The tables are models/objects/*.toml: catalogue.toml comes first.
 
 #include <array>
 #include <optional>
@@ -28,11 +28,30 @@ void visit_fields(V& v, ObjectSourceCfg& c) {
   v("url", c.url, "Home page.").required();
 }
 
+// A rigid part of an object without an MJCF file of its own.
+struct CataloguePartCfg {
+  std::string mesh;
+  std::string texture;
+  std::array<double, 4> rgba{1, 1, 1, 1};
+  std::array<double, 3> pos{};
+  std::array<double, 3> euler{};
+};
+template <class V>
+void visit_fields(V& v, CataloguePartCfg& c) {
+  v.object("CataloguePartCfg", "A mesh of a package; its convex hull takes part in contacts.");
+  v("mesh", c.mesh, "File of the mesh, ``package:<package>/<file>``.").required();
+  v("texture", c.texture, "PNG file of its texture, likewise.").or_none();
+  v("rgba", c.rgba, "Colour, which is multiplied with the texture.");
+  v("pos", c.pos, "Position of the mesh in the object.").unit("m");
+  v("euler", c.euler, "Orientation of the mesh in the object, as in MJCF.").unit("rad");
+}
+
 struct CatalogueObjectCfg {
   std::string name;
   std::string kind;
   std::string source = "mjsense";
   std::string model;
+  std::vector<CataloguePartCfg> parts;
   std::string text;
   std::vector<std::string> other_texts;
   std::vector<std::string> rests{"upright"};
@@ -52,6 +71,7 @@ void visit_fields(V& v, CatalogueObjectCfg& c) {
   v("kind", c.kind, "Kind of object, such as ``mug``; by default its text.").or_none();
   v("source", c.source, "Name of its source.");
   v("model", c.model, "Its MJCF file; by default a built-in model with its name.").or_none();
+  v("parts", c.parts, "Its meshes, instead of a model.");
   v("text", c.text, "Word for it in instructions; by default its name.").or_none();
   v("other_texts", c.other_texts, "Other words for it.");
   v("rests", c.rests, "Poses in which it may rest.").one_of(kRests).not_empty();
