@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
-    parser.add_argument("--statistics", choices=("all", "key"), default="all",
-                        help="lerobot, lerobot21: frames that the statistics of images use; key: the key frames, which takes a tenth of the time.")  # fmt: skip
+    parser.add_argument("--statistics", choices=("key", "all"), default="key",
+                        help="lerobot, lerobot21: frames that the statistics of images use. key: the key frames, by default every 20th; all: all frames.")  # fmt: skip
     add_ray(parser)
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
@@ -40,10 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
     options: dict[str, Any] = {"encode_again": True} if arguments.encode_again else {}
-    if arguments.statistics != "all":
+    if arguments.statistics != "key":
         if arguments.format not in ("lerobot", "lerobot21"):
             raise ValueError("--statistics is an option of the formats lerobot and lerobot21")
-        options["statistics_frames"] = arguments.statistics
+        options["statistics_frames"] = 0
     options |= {"map": arguments.map, "episodes": arguments.episodes, "success": arguments.success or None}
     report = counter("episodes", False if arguments.quiet else None)
     if arguments.ray:
