@@ -46,6 +46,7 @@ _core.leave_no_log_file()
 from mjsense import _gymnasium, assets, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
+from mjsense._recording import RecordProgress, RecordSummary
 from mjsense._user_code import SensorError
 from mjsense.attach import Attached, attach
 from mjsense.configs import *  # noqa: F403
@@ -101,7 +102,7 @@ from mjsense.pipeline import ObservationPipeline
 from mjsense.plot import plot
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.record import RecordProgress, RecordSummary, record
+from mjsense.record import record
 from mjsense.record_episodes import RecordEpisodes, RecordVectorEpisodes
 from mjsense.recorder import Recorder
 from mjsense.renderer import Renderer

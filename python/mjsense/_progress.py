@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from mjsense.record import RecordProgress
+    from mjsense._recording import RecordProgress
 
 T = TypeVar("T")
 _PERIOD = 0.1  # s between two updates of a line that is overwritten

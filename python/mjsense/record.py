@@ -1,72 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recording of episodes."""
+"""Recording of episodes: on this machine, on Ray, or converted to another format."""
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from mjsense import _core, _show
 from mjsense._arguments import Seed, checked
-from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
+from mjsense._parts import Policies, Robots, Scenes, Tasks
 from mjsense._progress import ProgressLine, interactive, of_recording
-from mjsense.assets import use_installed_meshes
-from mjsense.ffmpeg import use_installed_ffmpeg
-from mjsense.simulation import Simulation
-
-
-@dataclass(frozen=True)
-class RecordProgress:
-    """Progress of a recording."""
-
-    kept: int
-    """Number of episodes on disk."""
-    wanted: int
-    running: int
-    succeeded: int
-    """Successful attempts of this run."""
-    failed: int
-    steps: int
-    """Control steps of all worlds."""
-    physics_steps: int
-    frames: int
-    """Images of all cameras."""
-    seconds: float
-    """Wall-clock time."""
-    seconds_left: float
-    """Estimated remaining time; NaN until an episode has ended."""
-
-
-@dataclass(frozen=True)
-class RecordSummary(RecordProgress):
-    """Result of a recording."""
-
-    interrupted: bool
-    enough: bool
-    """All requested episodes are on disk."""
-    failures: dict[str, int]
-    """Number of failed attempts by reason."""
-    lengths: list[int]
-    """Number of observations of each ended attempt."""
-    times: dict[str, float]
-    """Wall-clock seconds by activity: policy, physics, sensing, rendering, reset, recording."""
-    published_bytes: int
-    path: Path
-    """Folder of the episodes."""
-
-    def _repr_html_(self) -> str:
-        """HTML for notebooks: the numbers, and the reasons of failures."""
-        ended = self.succeeded + self.failed
-        facts = [("episodes on disk", f"{self.kept} of {self.wanted}"), ("attempts of this run", f"{ended}, {self.succeeded} successful"),
-                 ("steps", f"{self.steps} in {self.seconds:.1f} s"), ("size", f"{self.published_bytes / 1e6:.1f} MB"), ("folder", self.path)]  # fmt: skip
-        failures = _show.grid(("attempts", "reason of the failure"), [(count, reason) for reason, count in self.failures.items()])
-        times = _show.grid(("activity", "s"), [(name, f"{seconds:.2f}") for name, seconds in self.times.items()])
-        state = " (interrupted)" if self.interrupted else ""
-        return _show.block(f"recording{state}", _show.grid(("", ""), facts) + (failures if self.failures else ""), {"times": times})
+from mjsense._recording import RecordProgress, RecordSummary, record_here
 
 
 @checked
@@ -192,8 +138,7 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` with
-            ``statistics_frames="key"`` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
         map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
         keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
             data set is complete.
@@ -213,55 +158,39 @@ def record(
     if format == "mjsense":
         if map is not None or keep_recording:
             raise ValueError("record: map and keep_recording are options of format='lerobot'")
-        return _record(options, sensors, progress)
+        return record_here(options, sensors, progress)
     if shard or append or overwrite:
         raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
-    # Formats are modules of a folder that this one may not import; they are found by name, as `mjsense export` finds them.
-    module = importlib.import_module(f"mjsense.export.record_{format}")
-    with module.converted(out, resume=resume, map=map, keep_recording=keep_recording) as folder:
-        summary = _record({**options, "out": folder}, sensors, progress)
+    from mjsense.export.record_lerobot import converted
+
+    with converted(out, resume=resume, map=map, keep_recording=keep_recording) as folder:
+        summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))
 
 
 def _record_on_ray(options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
-    cluster = importlib.import_module("mjsense.cluster")  # as formats below
+    from mjsense.cluster import ClusterProgress, Job, record_on_ray
+
     own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
     for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
         del options[name]
     if not options["threads"]:
         del options["threads"]  # one per worker
 
-    def counts(now: Any) -> dict[str, Any]:
+    def counts(now: ClusterProgress) -> dict[str, Any]:
         return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
                 "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
 
     line = ProgressLine() if progress is True or (progress is None and interactive()) else None
 
-    def show(now: Any) -> None:
+    def show(now: ClusterProgress) -> None:
         about = RecordProgress(**counts(now), seconds_left=math.nan)
         if callable(progress):
             progress(about)
         elif line is not None:
             line.show(of_recording(about))
 
-    made = cluster.record_on_ray(cluster.Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"],
-                                 resume=own["resume"], address=address, progress=show)  # fmt: skip
+    made = record_on_ray(Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"], resume=own["resume"],
+                         address=address, progress=show)  # fmt: skip
     return RecordSummary(**counts(made), seconds_left=0.0, interrupted=False, enough=made.enough, failures=made.failures, lengths=[], times={},
                          published_bytes=0, path=Path(own["out"]))  # fmt: skip
-
-
-def _record(options: dict[str, Any], sensors: Iterable[Any], progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
-    options["out"] = str(options["out"])
-    objects = parts_of(options, sensors)
-    line = ProgressLine() if progress is True or (progress is None and interactive()) else None
-    show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
-    report = None if show is None else lambda p: show(RecordProgress(**p))
-    if options["meshes"] == "real":
-        use_installed_meshes()
-    use_installed_ffmpeg()
-    made = _core.record(options, report, objects, Simulation._of)
-    made["path"] = Path(made["path"])
-    summary = RecordSummary(**made)
-    if line is not None:
-        line.show(of_recording(summary), last=True)
-    return summary

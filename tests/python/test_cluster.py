@@ -17,7 +17,7 @@ import pytest
 pytest.importorskip("ray", reason="Ray is not installed")
 h5py = pytest.importorskip("h5py")
 
-from mjsense.cluster import Job, export_on_ray, record_on_ray, render_on_ray
+from mjsense.cluster import Job, export_on_ray, exporting, record_on_ray, render_on_ray
 from mjsense.cluster import driver as driver_module
 from mjsense.cluster.job import Shard, ShardResult
 
@@ -97,7 +97,7 @@ def test_render_and_export_on_ray(tmp_path):
     data, ray = tmp_path / "data", pytest.importorskip("ray")
     pytest.importorskip("av")
     options = {"width": 48, "height": 32, "cameras": ["wrist_camera"]}
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
+    ray.init("local", num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
     try:
         record_on_ray(Job(str(data), ARGUMENTS), episodes=5, shard_attempts=2)
         summary = render_on_ray(data, tmp_path / "rendered", shard_episodes=2, **options)
@@ -106,14 +106,53 @@ def test_render_and_export_on_ray(tmp_path):
         assert content(tmp_path / "rendered") == content(tmp_path / "alone")
         with pytest.raises(ValueError, match="contains a different recording: options"):
             render_on_ray(data, tmp_path / "rendered", shard_episodes=2, resume=True, **{**options, "width": 64})
-        for format, export in (("lerobot", mjs.export_lerobot), ("lerobot21", mjs.export_lerobot21)):
-            made = [export_on_ray(format, data / "index.parquet", tmp_path / f"{format}_ray"), export(data, tmp_path / format)]
-            files = [{str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file()} for out in made]
-            assert files[0] == files[1]
-        with pytest.raises(ValueError, match="zarr is written by one process"):
-            export_on_ray("zarr", data, tmp_path / "zarr")
     finally:
         ray.shutdown()
+
+
+def files_of(root):
+    """Contents of the files of a folder. Of HDF5 files, all arrays and attributes; of Rerun's files, which contain the time, nothing."""
+    if root.is_file():
+        found = {}
+        with h5py.File(root) as file:
+            def add(name, item):
+                found[name] = {key: np.asarray(value).tolist() for key, value in item.attrs.items()}
+                if isinstance(item, h5py.Dataset):
+                    found[name] |= {"": item[()].tobytes(), "stored": item.id.get_storage_size(), "links": h5py.h5o.get_info(item.id).rc}
+
+            file.visititems(add)
+            return {"data/demo": [*file["data"]], **found, "attributes": dict(file["data"].attrs)}
+    return {str(p.relative_to(root)): None if p.suffix == ".rrd" else p.read_bytes() for p in root.rglob("*") if p.is_file()}
+
+
+class TestExport:
+    @pytest.fixture(scope="class")
+    def index(self, tmp_path_factory):
+        """The index of a recording on Ray of five episodes with depth, and a cluster."""
+        ray, data = pytest.importorskip("ray"), tmp_path_factory.mktemp("index") / "data"
+        ray.init("local", num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
+        record_on_ray(Job(str(data), {**ARGUMENTS, "depth": True}), episodes=5, shard_attempts=2)
+        yield data / "index.parquet"
+        ray.shutdown()
+
+    @pytest.mark.parametrize(("format", "library"), (("lerobot", "av"), ("lerobot21", "av"), ("robomimic", "h5py"), ("rlds", "google_crc32c"), ("zarr", "zarr"),
+                                                     ("mcap", "mcap_protobuf"), ("rerun", "rerun_cli")))  # fmt: skip
+    def test_it_equals_that_of_one_process(self, format, library, index, tmp_path, monkeypatch):
+        pytest.importorskip(library, reason=f"needs {library}")
+        monkeypatch.setattr(exporting, "_CHUNK", 2)  # three parts
+        monkeypatch.setattr("mjsense.export.rlds._SHARD_BYTES", 50_000)
+        shown = []
+        (tmp_path / "ray").mkdir()
+        ours = export_on_ray(format, index, tmp_path / "ray/data", progress=lambda *now: shown.append(now))
+        theirs = getattr(mjs, f"export_{format}")(index, tmp_path / "data")
+        assert files_of(ours) == files_of(theirs) and shown[-1] == (5, 5)
+        assert [path.name for path in (tmp_path / "ray").iterdir()] == ["data"]
+        for file in ours.glob("*.rrd"):
+            program = Path(sys.modules["rerun_cli"].__file__).parent / "rerun"
+            compared = subprocess.run([program, "rrd", "compare", "--unordered", file, theirs / file.name], capture_output=True, text=True)
+            assert compared.returncode == 0, compared.stderr
+        with pytest.raises(FileExistsError, match="exists; name another output"):
+            export_on_ray(format, index, ours)
 
 
 def test_killed_workers(alone, tmp_path):
@@ -193,6 +232,65 @@ def test_user_code_and_errors(tmp_path):
     with pytest.raises(TypeError, match="record: policy cannot be sent to the workers"):
         record_on_ray(Job(str(tmp_path / "b"), {**ARGUMENTS, "policy": lambda obs: lock}), episodes=1)
     assert not Path(tmp_path / "b").exists()
+
+
+CRASH = """
+import os
+import mjsense as mjs
+
+class Crash(mjs.Policy):
+    name = "crash"
+
+    def act(self, obs):
+        with open({log!r}, "a") as log:
+            log.write(f"{{os.getpid()}}\\n")
+        {defect}
+"""
+DEFECTS = {
+    "SIGSEGV": "os.kill(os.getpid(), 11)",
+    "exit code 3": "os._exit(3)",
+}
+
+
+@pytest.mark.parametrize("how", DEFECTS)
+def test_a_defect_that_ends_the_process_is_an_error(how, tmp_path, monkeypatch):
+    """After four deaths of the same shard. The message names the shard, its attempts, the signal and the line."""
+    (tmp_path / "crashing.py").write_text(CRASH.format(log=str(tmp_path / "log"), defect=DEFECTS[how]))
+    monkeypatch.syspath_prepend(tmp_path)
+    policy = __import__("crashing").Crash
+    job = Job(str(tmp_path / "out"), {**ARGUMENTS, "policy": policy, "worlds": 1})
+    environment = {"env_vars": {"PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}}
+    with pytest.raises(RuntimeError) as raised:
+        record_on_ray(job, episodes=2, max_attempts=2, shard_attempts=2, runtime_env=environment)
+    text = str(raised.value)
+    assert f"Shard 0 (attempts 0 to 1) ended its process 4 times, the last time with {how}, on " in text
+    assert how != "SIGSEGV" or text.endswith(f"a defect: act in line 11 of {tmp_path}/crashing.py"), text
+    assert len(set((tmp_path / "log").read_text().split())) == 4  # processes
+    sys.modules.pop("crashing")
+
+
+def test_lost_machines_are_no_defect(alone, tmp_path):
+    """The machine that records is lost four times."""
+    cluster = pytest.importorskip("ray.cluster_utils").Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
+    lost = []
+
+    def lose(now):
+        if workers_of(os.getpid()) and len(lost) < 4:
+            lost.append(nodes.pop())
+            cluster.remove_node(lost[-1], allow_graceful=False)
+            nodes.append(cluster.add_node(num_cpus=1))
+
+    ray = pytest.importorskip("ray")
+    nodes = [cluster.add_node(num_cpus=1)]
+    ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
+    try:
+        assert record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=2, shard_attempts=2, progress=lose).enough
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+    assert len(lost) == 4
+    found = content(tmp_path / "out", 2)
+    assert found == {number: alone[number] for number in range(2)}
 
 
 @pytest.mark.parametrize("words, message", ((["--shard", "0/2"], "--shard cannot be combined with --ray"), (["--nonsense"], "--nonsense")))

@@ -13,7 +13,7 @@ pq = pytest.importorskip("pyarrow.parquet")
 
 import av
 from mjsense.dataset import statistics
-from mjsense.export import Mapping, Source, lerobot, lerobot_depth
+from mjsense.export import Mapping, Source, frame_statistics, lerobot, lerobot_depth
 from mjsense.export.mapping import _filled
 from mjsense.export.remux import Concatenation
 
@@ -34,7 +34,7 @@ def root(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def v3(root, tmp_path_factory):
-    return mjs.export_lerobot(root, tmp_path_factory.mktemp("export") / "v3")
+    return mjs.export_lerobot(root, tmp_path_factory.mktemp("export") / "v3", statistics_frames=0)
 
 
 def rows(folder):
@@ -107,6 +107,21 @@ def test_statistics(root, v3):
     np.testing.assert_allclose(episodes["stats/action/max"][1], actions[12:24].max(0))
 
 
+@pytest.mark.parametrize(("keyint", "count"), ((20, 3), (2, 30), (250, 3)))
+def test_statistics_use_key_frames_or_every_20th(keyint, count, tmp_path):
+    """60 frames. A video with one key frame would give statistics of the initial state only."""
+    path = tmp_path / "video.mp4"
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("libx264", rate=20, options={"g": str(keyint), "sc_threshold": "0"})
+        stream.width, stream.height, stream.pix_fmt = 32, 16, "yuv420p"
+        for t in range(61):
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((16, 32, 3), 4 * t, np.uint8), format="rgb24")))
+        file.mux(stream.encode(None))
+    counts, images = frame_statistics.frame_histograms(path, 60)
+    assert images == count and counts.sum() == count * 3 * 16 * 32
+    assert np.flatnonzero(counts[0]).max() > 150
+
+
 def test_files_are_limited_in_size(root, tmp_path, monkeypatch):
     monkeypatch.setattr(lerobot, "DATA_FILE_MB", 1e-4)
     monkeypatch.setattr(lerobot, "VIDEO_FILE_MB", 1e-4)
@@ -164,6 +179,11 @@ def test_lerobot21(root, tmp_path):
     modality = json.loads((out / "meta/modality.json").read_text())
     assert modality["state"]["gripper"] == {"start": 7, "end": 9, "original_key": "observation.state"}
     assert modality["video"]["wrist_camera"] == {"original_key": "observation.images.wrist_camera"}
+    assert modality["annotation"] == {"human.task_description": {}}
+    assert data["annotation.human.task_description"] == data["task_index"] and "annotation.human.task_description" in info["features"]
+    for name, column in (("state", "observation.state"), ("action", "action")):  # as GR00T's page on data preparation says
+        parts = sorted((part["start"], part["end"]) for part in modality[name].values())
+        assert [start for start, _ in parts] == [0, *(end for _, end in parts[:-1])] and parts[-1][1] == info["features"][column]["shape"][0]
 
 
 MAP = """

@@ -18,6 +18,7 @@ from mjsense._rotations import quaternions_of
 from mjsense.dataset.model_xml import model_xml
 from mjsense.dataset.playback import Stepper
 from mjsense.export import FORMATS, Source
+from mjsense.export import zarr as zarr_format
 from mjsense.export.images import depth_unit, to_uint16
 from mjsense.export.scene import bodies
 
@@ -207,6 +208,21 @@ def test_zarr_is_a_replay_buffer(root, source, tmp_path):
         np.testing.assert_array_equal(group["data/wrist_camera"][part], episode.video("wrist_camera")[:-1])
         np.testing.assert_array_equal(group["data/wrist_camera_depth"][part], episode.video("wrist_camera_depth")[:-1])
     assert group.attrs["names"]["action"][-1] == "gripper_0" and group.attrs["episodes"][1]["outcome"] == source.episodes[1].outcome
+
+
+def test_zarr_of_parts(source, tmp_path, monkeypatch):
+    """Chunks of three images: some lie in one part and are moved, one contains rows of both."""
+    pytest.importorskip("zarr", reason="needs zarr 2")
+    monkeypatch.setattr(zarr_format, "_CHUNK_BYTES", 3 * 32 * 23 * 3)
+    parts = []
+    for i in range(2):
+        parts.append(tmp_path / str(i))
+        zarr_format.write(source.part(i, i + 1), parts[-1])
+    assert {path.name for path in (parts[1] / "data/wrist_camera").glob("[0-9]*")} == {"2.0.0.0", "3.0.0.0", "4.0.0.0", "5.0.0.0"}
+    zarr_format.join(source, parts, tmp_path / "joined")
+    zarr_format.write(source, tmp_path / "whole")
+    files = [{str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file()} for out in (tmp_path / "joined", tmp_path / "whole")]
+    assert files[0] == files[1]
 
 
 # The scene, Rerun and MCAP

@@ -134,7 +134,7 @@ def test_lerobot_reads_every_row_and_frame(record, tmp_path, version, format, fp
     root = record(fps, 200)
     map = map_of(version if repeats == 1 else "")
     rows = expected_of(root, tmp_path / "expected.npz", map)
-    out = getattr(mjs, f"export_{format}")(root, tmp_path / "out", map=map, episodes=[0, 1] * repeats, statistics_frames=0 if repeats == 1 else 1)
+    out = getattr(mjs, f"export_{format}")(root, tmp_path / "out", map=map, episodes=[0, 1] * repeats)
     if repeats > 1:
         (_video,) = out.glob("videos/*/*/*.mp4")
         assert 2 * repeats * 201 / fps > 3700

@@ -31,7 +31,7 @@ def tree(root):
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("exported")
     mjs.record("pick", out=folder / "recording", **ARGUMENTS)
-    return tree(mjs.export_lerobot(folder / "recording", folder / "out", statistics_frames="key"))
+    return tree(mjs.export_lerobot(folder / "recording", folder / "out"))
 
 
 def test_it_equals_an_exported_recording(exported, tmp_path):

@@ -152,7 +152,7 @@ def run_job(
     """Runs the shards of a job until ``episodes`` are there without a gap, and writes the index.
 
     Args:
-        job: A :class:`Job`, or an object with its attributes ``out``, ``arguments``, ``settings``, ``fingerprint`` and ``record``.
+        job: A :class:`Job`, or an object with its attributes ``out``, ``settings``, ``fingerprint``, ``about`` and ``record``.
         more: Settings of the division into shards.
     """
     storage, fingerprint = Storage(job.out), job.fingerprint()
@@ -170,7 +170,7 @@ def run_job(
     with cluster(address, runtime_env) as ray:
         began = time.perf_counter()
         waiting = ((job, shard, fingerprint) for shard in shards if shard.number not in results.done)
-        with running(ray, run_shard, waiting) as tasks:
+        with running(ray, run_shard, waiting, lambda job, shard, _: f"Shard {shard.number} ({job.about(shard)})") as tasks:
             while report()["kept"] < episodes:
                 done = tasks.wait()
                 workers = tasks.count

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 import os
 import shutil
@@ -18,13 +17,17 @@ from pathlib import Path
 from typing import Any
 
 from mjsense import _core
+from mjsense._parts import parts_of
+from mjsense._recording import PARTS, check_names, record_here
 from mjsense.cluster.storage import Storage
 from mjsense.dataset import Episode
 from mjsense.dataset.episode import Store
 from mjsense.dataset.files import entries_of
 
-_FREE = {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite", "ffmpeg",
-         "batches", "out", "progress", "sensors", "format", "map", "keep_recording", "ray"}  # fmt: skip
+_OF_RECORD = {"sensors", "progress", "format", "map", "keep_recording", "ray"}
+"""Arguments of ``record`` that do not decide the data."""
+_FREE = _OF_RECORD | {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite",
+                      "ffmpeg", "batches", "out"}  # fmt: skip
 """Arguments of ``record`` that do not change the episodes, or that the driver sets."""
 
 
@@ -82,13 +85,10 @@ class Job:
         """Everything that decides which episodes the job contains, as JSON values."""
         if self.arguments is None:
             return {"version": _core.__version__, "words": list(_without(self.words, ("--worlds", "--threads", "--ffmpeg")))}  # pyright: ignore[reportAttributeAccessIssue]
-        from mjsense._parts import parts_of
-        from mjsense.record import record
-
-        bound = inspect.signature(record).bind(**{**self.arguments, "out": self.out})
-        bound.apply_defaults()
-        options = {**bound.arguments, "resume": True}  # the code of all parts must be comparable
-        code = parts_of(options, options["sensors"])[4]
+        sensors = self.arguments.get("sensors", ())
+        options = {**PARTS, **self.arguments, "resume": True}  # the code of all parts must be comparable
+        check_names(options.keys() - _OF_RECORD)
+        code = parts_of(options, sensors)[4]
         decided = {name: value for name, value in options.items() if name not in _FREE}
         return json.loads(json.dumps({"version": _core.__version__, "options": decided, "code": code}, default=str))  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -96,12 +96,16 @@ class Job:
         """Checksum of the settings."""
         return hashlib.sha256(json.dumps(self.settings(), sort_keys=True).encode()).hexdigest()[:16]
 
+    def about(self, shard: Shard) -> str:
+        """What the shard contains, for messages."""
+        return f"attempts {shard.first} to {shard.first + shard.count - 1}"
+
     def record(self, folder: Path, shard: Shard) -> dict[str, Any]:
         """Records the shard's attempts into an empty local folder. Returns the summary as ``mjsense record --json`` prints it."""
         if self.arguments is not None:
-            from mjsense.record import record
-
-            summary = record(**{"threads": 1, "progress": False, **self.arguments, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count})
+            options = {name: value for name, value in self.arguments.items() if name not in _OF_RECORD}
+            options = {"threads": 1, **options, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count}
+            summary = record_here(options, self.arguments.get("sensors", ()), progress=False)
             return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
         words = ["record", *self.words, "--out", str(folder), "--no-sheet", "--json", "--quiet"]
         words += ["--first-attempt", str(shard.first), "--num-attempts", str(shard.count)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -166,6 +167,7 @@ def repair(path: str, *options: str) -> dict[str, list[str]]:
     if storage.read("job.json") is None:
         return json.loads(_program("repair", _fetched(path)[0], "--json", *options))
     local, rows = _fetched(path)
+    remote = resolved(path)[1]
     damaged: dict[str, str] = {}
     if any(local.glob("shard_*/*/*.h5")):
         for finding in json.loads(_program("verify", local, "--json", *options))["findings"]:
@@ -182,6 +184,8 @@ def repair(path: str, *options: str) -> dict[str, list[str]]:
             result, why = None, f"done.json cannot be read: {error}"
         if result is None or why:
             storage.remove(name)
+            if remote is not None:  # the index may stay equal, so that the copy on this machine would be read again
+                shutil.rmtree(local / folder, ignore_errors=True)
             made["actions"].append(f"{folder}: {why}. It is no longer marked as done; mjsense record --resume records it again")
         else:
             done[result.shard.number] = result

@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
     parser.add_argument("--trim-idle", action="store_true",
                         help="Leave out the steps in which nothing moves. Formats: lerobot, lerobot21, robomimic, rlds, zarr.")  # fmt: skip
-    parser.add_argument("--statistics", choices=("all", "key"), default="all",
-                        help="lerobot, lerobot21: frames that the statistics of images use; key: the key frames, which takes a tenth of the time.")  # fmt: skip
+    parser.add_argument("--statistics", choices=("key", "all"), default="key",
+                        help="lerobot, lerobot21: frames that the statistics of images use. key: the key frames, by default every 20th; all: all frames.")  # fmt: skip
     add_ray(parser)
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
@@ -42,10 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
     options: dict[str, Any] = {"encode_again": True} if arguments.encode_again else {}
-    if arguments.statistics != "all":
+    if arguments.statistics != "key":
         if arguments.format not in ("lerobot", "lerobot21"):
             raise ValueError("--statistics is an option of the formats lerobot and lerobot21")
-        options["statistics_frames"] = arguments.statistics
+        options["statistics_frames"] = 0
     if arguments.trim_idle:
         if arguments.format in ("mcap", "rerun"):
             raise ValueError(f"--trim-idle is an option of lerobot, lerobot21, robomimic, rlds and zarr; {arguments.format} shows episodes with their times")

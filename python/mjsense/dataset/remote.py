@@ -18,6 +18,11 @@ def is_address(root: str | Path) -> bool:
     return "://" in str(root)
 
 
+def absolute(root: str | Path) -> str:
+    """The address, or the absolute path."""
+    return str(root) if is_address(root) else str(Path(root).resolve())
+
+
 def open_address(address: str) -> tuple[Any, str]:
     """fsspec's file system of an address or a path, and the path there."""
     try:

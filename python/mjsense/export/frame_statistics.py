@@ -11,7 +11,10 @@ import numpy as np
 from mjsense.dataset import statistics
 from mjsense.export.output import needs
 
+DEFAULT_FRAMES: Literal["key"] = "key"
+"""Frames that the statistics of images use."""
 _LONG_SIDE = 160  # pixels; frames are sampled at every n-th row and column down to about this size
+_PERIOD = 20  # frames from one key frame to the next, by default; with far fewer key frames, every 20th frame is used
 
 
 def check_frames(frames: int | str) -> None:
@@ -20,13 +23,20 @@ def check_frames(frames: int | str) -> None:
         raise ValueError(f"statistics_frames is {frames!r}: must be a number of frames of each episode, 0 for all, or 'key' for the key frames")
 
 
-def frame_histograms(path: Path, length: int, frames: int | Literal["key"] = 0) -> tuple[np.ndarray, int]:
+def frame_histograms(path: Path, length: int, frames: int | Literal["key"] = DEFAULT_FRAMES) -> tuple[np.ndarray, int]:
     """Histograms int64 [3, 256] of the channels of the first ``length`` frames, and the number of frames used.
 
     Args:
         frames: Maximum number of frames, evenly spaced; 0: all. All frames are decoded, up to the last one that is used. ``key``: the key
-            frames, which need no others to be decoded.
+            frames, which need no others to be decoded; if a video has few of them, every 20th frame.
     """
+    if frames == "key":
+        found = _histograms(path, length, frames)
+        return found if found[1] * 2 * _PERIOD >= length else _histograms(path, length, -(-length // _PERIOD))
+    return _histograms(path, length, frames)
+
+
+def _histograms(path: Path, length: int, frames: int | Literal["key"]) -> tuple[np.ndarray, int]:
     av = needs("av")
     chosen = range(length) if not frames or frames == "key" else np.unique(np.linspace(0, length - 1, min(frames, length)).astype(int))
     wanted = {int(n) for n in chosen}

@@ -15,7 +15,7 @@ import numpy as np
 from mjsense._arguments import checked
 from mjsense.dataset import Episode, statistics
 from mjsense.export import lerobot_depth
-from mjsense.export.frame_statistics import check_frames, frame_histograms
+from mjsense.export.frame_statistics import DEFAULT_FRAMES, check_frames, frame_histograms
 from mjsense.export.images import video_file
 from mjsense.export.mapping import Feature, Mapping, Source
 from mjsense.export.output import needs, new_output
@@ -38,7 +38,7 @@ def export_lerobot(
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
     trim_idle: bool = False,
-    statistics_frames: int | Literal["key"] = 0,
+    statistics_frames: int | Literal["key"] = DEFAULT_FRAMES,
     histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
@@ -51,8 +51,8 @@ def export_lerobot(
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
         trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). Their videos are encoded again.
-        statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
-            by default every 20th, which takes a tenth of the time.
+        statistics_frames: Frames that the statistics of images use. ``key``: the key frames, which are every 20th unless the recording was
+            made with another ``keyint``; a number: at most so many frames of each episode and camera; 0: all, which takes ten times as long.
         histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
         progress: Called with the number of written episodes and of all episodes.
 

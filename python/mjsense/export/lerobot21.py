@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from mjsense._arguments import checked
-from mjsense.export.frame_statistics import check_frames, frame_histograms
+from mjsense.export.frame_statistics import DEFAULT_FRAMES, check_frames, frame_histograms
 from mjsense.export.images import video_file
 from mjsense.export.lerobot import (
     FILES_PER_CHUNK,
@@ -33,6 +33,8 @@ from mjsense.export.output import needs, new_output
 
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 _VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
+_INSTRUCTION = "human.task_description"
+"""GR00T's name of the instruction. It reads the number of the task from a column of its own."""
 
 
 @checked
@@ -44,7 +46,7 @@ def export_lerobot21(
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
     trim_idle: bool = False,
-    statistics_frames: int | Literal["key"] = 0,
+    statistics_frames: int | Literal["key"] = DEFAULT_FRAMES,
     histograms: Callable[..., Any] = frame_histograms,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
@@ -57,8 +59,8 @@ def export_lerobot21(
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
         trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). Their videos are encoded again.
-        statistics_frames: Number of frames of each episode and camera that the statistics of images use; 0: all; ``key``: the key frames,
-            by default every 20th, which takes a tenth of the time.
+        statistics_frames: Frames that the statistics of images use. ``key``: the key frames, which are every 20th unless the recording was
+            made with another ``keyint``; a number: at most so many frames of each episode and camera; 0: all, which takes ten times as long.
         histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
         progress: Called with the number of written episodes and of all episodes.
 
@@ -84,6 +86,7 @@ def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], 
     for position, episode in enumerate(source.episodes):
         place = {"episode_chunk": position // FILES_PER_CHUNK, "episode_index": position}
         columns = columns_of(source, episode, position, first, source.tasks.index(episode.task))
+        columns[f"annotation.{_INSTRUCTION}"] = columns["task_index"]
         file = _made(path / _DATA.format(**place))
         needs("pyarrow.parquet").write_table(table_of(columns), file)
         histograms = {}
@@ -108,7 +111,8 @@ def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], 
         "codebase_version": "v2.1", "robot_type": source.robot or None, "total_episodes": count, "total_frames": first,
         "total_tasks": len(source.tasks), "total_videos": count * len(source.cameras), "total_chunks": -(-count // FILES_PER_CHUNK),
         "chunks_size": FILES_PER_CHUNK, "fps": number(source.fps), "splits": {"train": f"0:{count}"}, "data_path": _DATA,
-        "video_path": _VIDEO if source.cameras else None, "features": features_of(source, codec),
+        "video_path": _VIDEO if source.cameras else None,
+        "features": features_of(source, codec) | {f"annotation.{_INSTRUCTION}": {"dtype": "int64", "shape": [1], "names": None}},
     }  # fmt: skip
     write_json(path / "meta/info.json", info)
 
@@ -123,7 +127,7 @@ def modality_of(source: Source) -> dict[str, Any]:
             entry = {"start": part.start, "end": part.stop, "original_key": key_of(feature)}
             result["action" if feature.of_step else "state"][name] = entry
     result["video"] = {camera: {"original_key": image_key(camera)} for camera in source.cameras}
-    result["annotation"] = {"human.task_description": {"original_key": "task_index"}}
+    result["annotation"] = {_INSTRUCTION: {}}
     return result
 
 

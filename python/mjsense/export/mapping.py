@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field
@@ -123,18 +124,21 @@ class Source:
     ) -> None:
         mapping = Mapping.of(map)
         chosen = Dataset(root, episodes=episodes, success=success, trim_idle=trim_idle)
-        self._chosen = chosen
+        self.name: str = Path(root).resolve().name
+        """Name of the recording's folder or file."""
         self.episodes: list[Episode] = [episode for episode in chosen.episodes if episode.length > 1]
         """The episodes that have at least one step."""
         if not self.episodes:
             raise ValueError(f"{root}: no episode with a step matches")
+        self.first_step: int = 0
+        """Number of steps of the episodes before, in a part of a recording."""
         self.fps: Fraction = chosen.fps
         """Observations per second, exactly."""
         self.robot: str = str(self.episodes[0].settings.get("robot", ""))
         """Name of the robot; empty if the recording does not state it."""
         known = dict(chosen.streams)
         wanted = {"state": mapping.state, "action": _default_action(known) if mapping.action is None else mapping.action, **mapping.features, **_FLAGS}
-        self.features: dict[str, Feature] = {name: self._feature(name, streams, known) for name, streams in wanted.items()}
+        self.features: dict[str, Feature] = {name: _feature(chosen, name, streams, known) for name, streams in wanted.items()}
         """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features."""
         self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
         """The distinct instructions, in the order of their first episode."""
@@ -149,6 +153,13 @@ class Source:
 
     def __len__(self) -> int:
         return len(self.episodes)
+
+    def part(self, begin: int, end: int) -> Source:
+        """The episodes at the positions ``begin`` to ``end - 1``, with the same features and cameras."""
+        part = copy.copy(self)
+        part.episodes = self.episodes[begin:end]
+        part.first_step = self.first_step + sum(episode.length - 1 for episode in self.episodes[:begin])
+        return part
 
     def rows(self, episode: Episode) -> dict[str, np.ndarray]:
         """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
@@ -166,28 +177,6 @@ class Source:
         """Frames of a camera by its exported name."""
         return episode.video(self.cameras[camera])
 
-    def _feature(self, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
-        try:
-            expanded = self._chosen._expand_all(streams, known)
-        except UnknownNameError as error:
-            raise UnknownNameError(f"Feature '{name}': {error.args[0]}. A map (map=, --map) chooses other streams") from error
-        found = list(dict.fromkeys(stream for stream in expanded if "/given/" not in stream))
-        names: list[str] = []
-        parts: dict[str, slice] = {}
-        for stream in found:
-            about = known[stream]
-            if about.kind == "video" or about.dtype == object or about.dtype.itemsize * int(np.prod(about.shape)) >= LARGE_ROW:
-                raise ValueError(f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than {LARGE_ROW} bytes per row")
-            short = stream if "/" not in stream else stream.rsplit("/", 1)[1]
-            short = short if short not in parts else stream
-            size = int(np.prod(about.shape))
-            parts[short] = slice(len(names), len(names) + size)
-            names += [f"{short}_{i}" for i in range(size)] if about.shape else [short]
-        of_step = {stream.startswith(_OF_STEPS) for stream in found}
-        if len(of_step) != 1:
-            raise ValueError(f"The feature '{name}' mixes observations and results of steps: {', '.join(found)}")
-        return Feature(name, np.result_type(*(known[s].dtype for s in found)), tuple(names), parts, tuple(found), of_step.pop())
-
     def _rows(self, episode: Episode, feature: Feature, loaded: dict[str, np.ndarray]) -> np.ndarray:
         columns = []
         for stream, part in zip(feature.streams, feature.parts.values()):
@@ -202,6 +191,29 @@ class Source:
             columns.append(values.reshape(episode.length, size))
         rows = np.concatenate(columns, 1).astype(feature.dtype, copy=False)
         return rows[1:] if feature.of_step else rows
+
+
+def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
+    try:
+        expanded = chosen._expand_all(streams, known)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"Feature '{name}': {error.args[0]}. A map (map=, --map) chooses other streams") from error
+    found = list(dict.fromkeys(stream for stream in expanded if "/given/" not in stream))
+    names: list[str] = []
+    parts: dict[str, slice] = {}
+    for stream in found:
+        about = known[stream]
+        if about.kind == "video" or about.dtype == object or about.dtype.itemsize * int(np.prod(about.shape)) >= LARGE_ROW:
+            raise ValueError(f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than {LARGE_ROW} bytes per row")
+        short = stream if "/" not in stream else stream.rsplit("/", 1)[1]
+        short = short if short not in parts else stream
+        size = int(np.prod(about.shape))
+        parts[short] = slice(len(names), len(names) + size)
+        names += [f"{short}_{i}" for i in range(size)] if about.shape else [short]
+    of_step = {stream.startswith(_OF_STEPS) for stream in found}
+    if len(of_step) != 1:
+        raise ValueError(f"The feature '{name}' mixes observations and results of steps: {', '.join(found)}")
+    return Feature(name, np.result_type(*(known[s].dtype for s in found)), tuple(names), parts, tuple(found), of_step.pop())
 
 
 def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:

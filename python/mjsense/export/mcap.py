@@ -15,7 +15,7 @@ from mjsense._arguments import checked
 from mjsense._rotations import quaternions_of
 from mjsense.export.images import CRF, depth_videos, padded
 from mjsense.export.mapping import Source
-from mjsense.export.output import needs, new_output
+from mjsense.export.output import join_folders, needs, new_output
 from mjsense.export.scene import Body, Shape, bodies
 
 if TYPE_CHECKING:
@@ -57,23 +57,31 @@ def export_mcap(
     Raises:
         ValueError: A video has B-frames, and ``encode_again`` is False.
     """
+    source = Source(root, map=map, episodes=episodes, success=success)
+    with new_output(out) as path:
+        write(source, path, progress, encode_again=encode_again)
+    return Path(out)
+
+
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None, *, encode_again: bool = False) -> None:
+    """Writes the files of all episodes to the new folder ``path``."""
     writers, schemas = needs("mcap.writer", "mcap"), needs("mcap_protobuf.schema", "mcap")
     for module in ("foxglove_schemas_protobuf", "av"):
         needs(module, "mcap")
-    source = Source(root, map=map, episodes=episodes, success=success)
-    with new_output(out) as path:
-        path.mkdir()
-        for i, episode in enumerate(source.episodes):
-            with open(path / f"episode_{episode.index:08d}.mcap", "wb") as file:
-                writer = writers.Writer(file)
-                writer.start(library="mjsense")
-                about = {"task": episode.task, "outcome": episode.outcome, "seed": str(episode.seed), "robot": source.robot}
-                writer.add_metadata("episode", about | {"file": f"{episode.path.name}/{episode.trajectory}"})
-                _write(writer, schemas.register_schema, source, _messages(source, episode, encode_again))
-                writer.finish()
-            if progress is not None:
-                progress(i + 1, len(source))
-    return Path(out)
+    path.mkdir()
+    for i, episode in enumerate(source.episodes):
+        with open(path / f"episode_{episode.index:08d}.mcap", "wb") as file:
+            writer = writers.Writer(file)
+            writer.start(library="mjsense")
+            about = {"task": episode.task, "outcome": episode.outcome, "seed": str(episode.seed), "robot": source.robot}
+            writer.add_metadata("episode", about | {"file": f"{episode.path.name}/{episode.trajectory}"})
+            _write(writer, schemas.register_schema, source, _messages(source, episode, encode_again))
+            writer.finish()
+        if progress is not None:
+            progress(i + 1, len(source))
+
+
+join = join_folders
 
 
 def _messages(source: Source, episode: Episode, encode_again: bool) -> Iterator[_Message]:

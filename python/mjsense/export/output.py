@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,15 @@ def new_output(out: str | Path) -> Iterator[Path]:
         part.rename(final)
     finally:
         _delete(part)
+
+
+def join_folders(source: Any, parts: Iterable[Path], out: Path) -> None:
+    """Writes the new folder ``out`` with the files of several folders, which are moved."""
+    with new_output(out) as path:
+        path.mkdir()
+        for part in parts:
+            for file in part.iterdir():
+                file.rename(path / file.name)
 
 
 def _delete(path: Path) -> None:

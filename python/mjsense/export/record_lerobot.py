@@ -19,14 +19,12 @@ from typing import Any, Literal
 import numpy as np
 
 from mjsense.dataset.files import BATCH
-from mjsense.export.frame_statistics import frame_histograms
+from mjsense.export.frame_statistics import DEFAULT_FRAMES, frame_histograms
 from mjsense.export.lerobot import Writer
 from mjsense.export.mapping import Source
 from mjsense.export.output import needs, new_output
 
 _PERIOD_S = 0.3
-STATISTICS = "key"
-"""The frames that the statistics of images use."""
 
 
 class CompleteError(FileExistsError):
@@ -126,7 +124,7 @@ class _Conversion(threading.Thread):
                         source = Source(file, map=self._map)
                     except ValueError:  # no episode with a step
                         continue
-                    writer = writer or Writer(source, path, STATISTICS, self._histograms)
+                    writer = writer or Writer(source, path, DEFAULT_FRAMES, self._histograms)
                     abouts.append((source.features, source.cameras, source.fps, source.robot))
                     for episode in source.episodes:
                         writer.add(episode, source)
@@ -139,7 +137,7 @@ class _Conversion(threading.Thread):
                 # Files have different features, for example because a move group never acts in one: only all together decide them.
                 shutil.rmtree(path, ignore_errors=True)
                 whole = Source(self._recording, map=self._map)
-                writer = Writer(whole, path, STATISTICS, self._histograms)
+                writer = Writer(whole, path, DEFAULT_FRAMES, self._histograms)
                 for episode in whole.episodes:
                     writer.add(episode)
             writer.close()

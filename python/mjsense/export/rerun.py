@@ -14,7 +14,7 @@ from mjsense._arguments import checked
 from mjsense._png import png_of
 from mjsense.export.images import depth_unit, depth_videos, to_uint16
 from mjsense.export.mapping import Source
-from mjsense.export.output import needs, new_output
+from mjsense.export.output import join_folders, needs, new_output
 from mjsense.export.scene import Shape, bodies
 
 if TYPE_CHECKING:
@@ -46,26 +46,34 @@ def export_rerun(
     Returns:
         ``out``.
     """
-    rr = needs("rerun", "rerun")
     source = Source(root, map=map, episodes=episodes, success=success)
     with new_output(out) as path:
-        path.mkdir()
-        for i, episode in enumerate(source.episodes):
-            name = f"episode_{episode.index:08d}"
-            stream = rr.RecordingStream("mjsense", recording_id=f"{Path(root).resolve().name}_{name}")
-            stream.save(path / f"{name}.rrd", default_blueprint=_blueprint(source, episode))
-            stream.send_recording_name(f"{episode.index}: {episode.task}")
-            stream.send_property("episode", rr.AnyValues(outcome=episode.outcome, seed=str(episode.seed), file=f"{episode.path.name}/{episode.trajectory}"))
-            stream.log("task", rr.TextDocument(episode.task), static=True)
-            _log_features(rr, stream, source, episode)
-            for camera in source.cameras:
-                _log_camera(rr, stream, source, episode, camera)
-            _log_depth(rr, stream, source, episode)
-            _log_scene(rr, stream, source, episode)
-            stream.disconnect()
-            if progress is not None:
-                progress(i + 1, len(source))
+        write(source, path, progress)
     return Path(out)
+
+
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Writes the files of all episodes to the new folder ``path``."""
+    rr = needs("rerun", "rerun")
+    path.mkdir()
+    for i, episode in enumerate(source.episodes):
+        name = f"episode_{episode.index:08d}"
+        stream = rr.RecordingStream("mjsense", recording_id=f"{source.name}_{name}")
+        stream.save(path / f"{name}.rrd", default_blueprint=_blueprint(source, episode))
+        stream.send_recording_name(f"{episode.index}: {episode.task}")
+        stream.send_property("episode", rr.AnyValues(outcome=episode.outcome, seed=str(episode.seed), file=f"{episode.path.name}/{episode.trajectory}"))
+        stream.log("task", rr.TextDocument(episode.task), static=True)
+        _log_features(rr, stream, source, episode)
+        for camera in source.cameras:
+            _log_camera(rr, stream, source, episode, camera)
+        _log_depth(rr, stream, source, episode)
+        _log_scene(rr, stream, source, episode)
+        stream.disconnect()
+        if progress is not None:
+            progress(i + 1, len(source))
+
+
+join = join_folders
 
 
 def _blueprint(source: Source, episode: Episode) -> Any:

@@ -6,9 +6,9 @@ from __future__ import annotations
 import json
 import re
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,23 +52,41 @@ def export_rlds(
     Returns:
         ``out``.
     """
-    checksum = needs("google_crc32c", "rlds").value
-    name = Path(out).resolve().name
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
+    _write_data_set(source, _records(source, progress), Path(out))
+    return Path(out)
+
+
+def write(source: Source, path: Path) -> None:
+    """Writes the records of all episodes to the new file ``path``."""
+    with open(path, "wb") as file:
+        file.writelines(_records(source))
+
+
+def join(source: Source, parts: Iterable[Path], out: Path) -> None:
+    """Writes the new data set ``out`` with the records of several files.
+
+    Args:
+        source: The episodes of all files.
+    """
+    _write_data_set(source, (record for part in parts for record in _read_records(part)), out)
+
+
+def _write_data_set(source: Source, records: Iterable[bytes], out: Path) -> None:
+    name = out.resolve().name
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         valid = re.sub(r"\W+", "_", name.lower())
         raise ValueError(f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'")
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
     with new_output(out) as path:
         folder = path / _VERSION
         folder.mkdir(parents=True)
         shards: list[list[int]] = []  # bytes of the examples of each shard
-        for i, episode in enumerate(source.episodes):
+        for record in records:
             if not shards or sum(shards[-1]) > _SHARD_BYTES:
                 shards.append([])
             with open(folder / f"shard_{len(shards) - 1}", "ab") as file:
-                shards[-1].append(_write_record(file, _example(source, episode), checksum))
-            if progress is not None:
-                progress(i + 1, len(source))
+                file.write(record)
+            shards[-1].append(len(record) - _FRAME_BYTES)
         for k in range(len(shards)):
             (folder / f"shard_{k}").rename(folder / f"{name}-train.tfrecord-{k:05d}-of-{len(shards):05d}")
         split = {"name": "train", "filepathTemplate": "{DATASET}-{SPLIT}.{FILEFORMAT}-{SHARD_X_OF_Y}",
@@ -77,7 +95,6 @@ def export_rlds(
         info = {"name": name, "version": _VERSION, "description": about, "fileFormat": "tfrecord", "splits": [split]}
         (folder / "dataset_info.json").write_text(json.dumps(info, indent=2))
         (folder / "features.json").write_text(json.dumps(_features(source), indent=2))
-    return Path(out)
 
 
 # The description of the features, as tensorflow-datasets writes it.
@@ -175,13 +192,27 @@ def _feature(values: Any) -> bytes:
     return _field(3, _field(1, b"".join(_varint(int(value)) for value in values.ravel())))
 
 
-def _write_record(file: BinaryIO, data: bytes, checksum: Callable[[bytes], int]) -> int:
-    """Appends a record of a TFRecord file: length, its checksum, data, its checksum. Returns the length."""
+# Records of a TFRecord file: length, its checksum, data, its checksum.
+
+_FRAME_BYTES = 16
+
+
+def _records(source: Source, progress: Callable[[int, int], None] | None = None) -> Iterator[bytes]:
+    checksum = needs("google_crc32c", "rlds").value
 
     def masked(content: bytes) -> bytes:
         crc = checksum(content)
         return struct.pack("<I", ((crc >> 15 | crc << 17) + 0xA282EAD8) & 0xFFFFFFFF)
 
-    length = struct.pack("<Q", len(data))
-    file.write(length + masked(length) + data + masked(data))
-    return len(data)
+    for i, episode in enumerate(source.episodes):
+        data = _example(source, episode)
+        length = struct.pack("<Q", len(data))
+        yield length + masked(length) + data + masked(data)
+        if progress is not None:
+            progress(i + 1, len(source))
+
+
+def _read_records(path: Path) -> Iterator[bytes]:
+    with open(path, "rb") as file:
+        while length := file.read(8):
+            yield length + file.read(struct.unpack("<Q", length)[0] + _FRAME_BYTES - len(length))

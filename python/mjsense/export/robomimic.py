@@ -51,29 +51,66 @@ def export_robomimic(
     Returns:
         ``out``.
     """
-    h5py = needs("h5py", "robomimic")
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    with new_output(out) as path, h5py.File(path, "w") as file:
-        data = file.create_group("data")
-        total = 0
-        written: dict[bytes, Any] = {}  # files of models, which demonstrations share
+    with new_output(out) as path:
+        write(source, path, progress)
+    return Path(out)
+
+
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Writes all episodes to the new file ``path``."""
+    with needs("h5py", "robomimic").File(path, "w") as file:
+        models: dict[bytes, Any] = {}
         for i, episode in enumerate(source.episodes):
-            total += _write_demo(data.create_group(f"demo_{i}"), written, source, episode)
+            _write_demo(file.create_group(f"data/demo_{i}"), models, source, episode)
             if progress is not None:
                 progress(i + 1, len(source))
-        data.attrs["total"] = total
-        data.attrs["env_args"] = json.dumps(_env_args(source.episodes[0]) if source.episodes else {})
-        demos = [f"demo_{i}" for i in range(len(source))]
-        masks = {
-            "train": [demo for i, demo in enumerate(demos) if i % _VALID_EVERY != _VALID_EVERY - 1],
-            "valid": demos[_VALID_EVERY - 1 :: _VALID_EVERY] or demos[-1:],
-            "success": [demo for demo, episode in zip(demos, source.episodes) if episode.success],
-        }
-        if len(demos) > 1 and len(masks["train"]) == len(demos):  # fewer than ten: the last one validates
-            masks["train"] = demos[:-1]
-        for name, chosen in masks.items():
-            file[f"mask/{name}"] = np.array(chosen, "S")
-    return Path(out)
+        _finish(file, source)
+
+
+def join(source: Source, parts: Iterable[Path], out: Path) -> None:
+    """Writes the new file ``out`` with the demonstrations of several files, whose arrays are copied as they are compressed.
+
+    Args:
+        source: The episodes of all files.
+    """
+    h5py = needs("h5py", "robomimic")
+    with new_output(out) as path, h5py.File(path, "w") as file:
+        models: dict[bytes, Any] = {}
+        count = 0
+        for part in parts:
+            with h5py.File(part) as written:
+                for i in range(len(written["data"])):
+                    _copy_demo(written[f"data/demo_{i}"], file.create_group(f"data/demo_{count}"), models)
+                    count += 1
+        _finish(file, source)
+
+
+def _copy_demo(written: Any, demo: Any, models: dict[bytes, Any]) -> None:
+    for name, value in written.attrs.items():
+        demo.attrs[name] = value
+    for name in written:
+        if name != "assets":
+            written.copy(name, demo)
+    for name, content in written.get("assets", {}).items():
+        _write_asset(demo, name, content[()].tobytes(), models)
+
+
+def _finish(file: Any, source: Source) -> None:
+    """Writes what follows the demonstrations."""
+    data = file["data"]
+    data.attrs["total"] = sum(episode.length - 1 for episode in source.episodes)
+    data.attrs["env_args"] = json.dumps(_env_args(source.episodes[0]))
+    demos = [f"demo_{i}" for i in range(len(source))]
+    masks = {
+        "train": [demo for i, demo in enumerate(demos) if i % _VALID_EVERY != _VALID_EVERY - 1],
+        "valid": demos[_VALID_EVERY - 1 :: _VALID_EVERY] or demos[-1:],
+        "success": [demo for demo, episode in zip(demos, source.episodes) if episode.success],
+    }
+    if len(demos) > 1 and len(masks["train"]) == len(demos):  # fewer than ten: the last one validates
+        masks["train"] = demos[:-1]
+    for name, chosen in masks.items():
+        file[f"mask/{name}"] = np.array(chosen, "S")
 
 
 def _env_args(episode: Episode) -> dict[str, Any]:
@@ -83,8 +120,12 @@ def _env_args(episode: Episode) -> dict[str, Any]:
     return {"env_name": env_id(task, robot) if task else "", "type": _GYM, "env_kwargs": {}, "mjsense": settings}
 
 
-def _write_demo(demo: Any, written: dict[bytes, Any], source: Source, episode: Episode) -> int:
-    """Writes one episode; row t of everything is observation t and the step from it. Returns the number of steps."""
+def _write_demo(demo: Any, models: dict[bytes, Any], source: Source, episode: Episode) -> None:
+    """Writes one episode; row t of everything is observation t and the step from it.
+
+    Args:
+        models: Files of models, which demonstrations share, by their content.
+    """
     steps = episode.length - 1
     demo.attrs["num_samples"] = steps
     demo.attrs["ep_meta"] = json.dumps({"lang": episode.task, "seed": episode.seed, "outcome": episode.outcome})
@@ -103,8 +144,7 @@ def _write_demo(demo: Any, written: dict[bytes, Any], source: Source, episode: E
     for name, video in depth_videos(source, episode).items():
         _write_video(demo, f"{name}_depth", video)
     if "replay/state" in episode.streams:
-        _write_states(demo, written, episode)
-    return steps
+        _write_states(demo, models, episode)
 
 
 def _write_video(demo: Any, name: str, video: Video) -> None:
@@ -120,7 +160,7 @@ def _write_video(demo: Any, name: str, video: Video) -> None:
             after[t - 1] = frame
 
 
-def _write_states(demo: Any, written: dict[bytes, Any], episode: Episode) -> None:
+def _write_states(demo: Any, models: dict[bytes, Any], episode: Episode) -> None:
     """``states`` as robosuite's ``MjSimState.flatten``: time, qpos, qvel. ``integration_states`` is all that MuJoCo's state contains."""
     model = episode.model()
     states = episode.states[:-1]
@@ -129,7 +169,11 @@ def _write_states(demo: Any, written: dict[bytes, Any], episode: Episode) -> Non
     demo.create_dataset("integration_states", data=states, compression="gzip", compression_opts=4)
     demo.attrs["model_file"], assets = model_xml(episode)
     for name, content in assets.items():
-        if content not in written:
-            written[content] = demo.create_dataset(f"assets/{name}", data=np.frombuffer(content, np.uint8))
-        else:
-            demo[f"assets/{name}"] = written[content]  # a link
+        _write_asset(demo, name, content, models)
+
+
+def _write_asset(demo: Any, name: str, content: bytes, models: dict[bytes, Any]) -> None:
+    if content not in models:
+        models[content] = demo.create_dataset(f"assets/{name}", data=np.frombuffer(content, np.uint8))
+    else:
+        demo[f"assets/{name}"] = models[content]  # a link
