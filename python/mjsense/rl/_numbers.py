@@ -52,7 +52,7 @@ class Numbers:
 
     def of(self, observation: dict[str, Any], worlds: int) -> Any:
         """A new array with the rows of all worlds, ``[worlds, n]``; a tensor on the same device if the observations are tensors."""
-        first = stream_of(observation, self._paths[self.names[0]]) if self.names else None
+        first: Any = stream_of(observation, self._paths[self.names[0]]) if self.names else None
         if hasattr(first, "detach"):
             rows = first.new_empty((worlds, self.size), dtype=first.float().dtype)
             for name, columns in self.columns.items():

@@ -32,10 +32,12 @@ class WarpTaskVectorEnv(TaskVectorEnv):
     """
 
     def _make_rollout(self, options: dict[str, Any], objects: Any) -> Any:
-        return WarpRollout(options, objects)
+        rollout = WarpRollout(options, objects)
+        self._device: str = rollout.simulation().device
+        return rollout
 
     def _numbers(self, actions: Any) -> Any:
-        return torch().as_tensor(actions, dtype=torch().float32, device=self.sim.device)
+        return torch().as_tensor(actions, dtype=torch().float32, device=self._device)
 
     def _copy(self, rows: Any) -> Any:
         return rows.clone()

@@ -103,7 +103,9 @@ class _JointState(Sensor):
         super().__init__()
         self.uuid, self._addresses = uuid, addresses
         self.unit = "rad or m" if uuid == "qpos" else "rad/s or m/s"
-        spaces = {name: gymnasium.spaces.Box(-np.inf, np.inf, (len(at),), np.float32) for name, at in addresses.items()}
+        spaces: dict[str, Any] = {
+            name: gymnasium.spaces.Box(-np.inf, np.inf, (len(at),), np.float32) for name, at in addresses.items()
+        }
         self.observation_space = gymnasium.spaces.Dict(spaces)
 
     def compute(self, sim: Any) -> Any:
