@@ -222,7 +222,8 @@ class OfTask(SceneOfCheck):
         names = [model.body(i).name for i in range(model.nbody)]
         free = {names[model.jnt_bodyid[j]]: qpos[model.jnt_qposadr[j] :][:7] for j in np.flatnonzero(model.jnt_type == 0)}
         hand = [name for name in names if name.startswith("robot_0/")][-1]
-        site = model.site(int(np.flatnonzero(model.site_bodyid > 0)[0])).name
+        # Not a site on the surface of its base, where a ray may hit or miss that surface.
+        site = [name for i in range(model.nsite) if (name := model.site(i).name).startswith("robot_0/")][-1]
         camera = next((model.camera(i).name for i in range(model.ncam) if model.cam_bodyid[i] > 0), "")
         env.close()
         things = tuple(name for name in [hand, *free] if name)[:6]

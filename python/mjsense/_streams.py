@@ -11,15 +11,19 @@ Streams = Mapping[str, tuple[str, Any, Any]]
 """stream name -> (sensor, spec, rows)"""
 
 
+def _is_empty(spec: Any) -> bool:
+    return 0 in spec.shape
+
+
 def choose_streams(wanted: Sequence[str] | None, streams: Streams, texts: Sequence[str] = ()) -> list[str]:
     """Names of the streams to observe: those in `wanted`, by their own or their sensors' names; by default all numeric ones and
     ``texts``."""
     if wanted is None:
-        plain = [name for name, (_, spec, array) in streams.items() if array.size > 0 and (not spec.is_dict or name in texts)]
+        plain = [name for name, (_, spec, _) in streams.items() if not _is_empty(spec) and (not spec.is_dict or name in texts)]
         return [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
     names: list[str] = []
     for one in wanted:
-        found = [name for name, (sensor, _, array) in streams.items() if name == one or (sensor == one and array.size > 0)]
+        found = [name for name, (sensor, spec, _) in streams.items() if name == one or (sensor == one and not _is_empty(spec))]
         if not found:
             known = [*dict.fromkeys(sensor for sensor, _, _ in streams.values()), *streams]
             near = difflib.get_close_matches(one, known, 3)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 import inspect
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -168,6 +169,11 @@ class Simulation(KnownAttributes):
 
     def __exit__(self, *exception: Any) -> None:
         self.close()
+
+    @property
+    def closed(self) -> bool:
+        """True after close()."""
+        return self._core.closed
 
     def close(self) -> None:
         """Frees the worlds once no array of them is referenced any more. Every later call raises RuntimeError."""
@@ -476,24 +482,29 @@ class Simulation(KnownAttributes):
 Simulation.__signature__ = inspect.Signature([*inspect.signature(Simulation.__init__).parameters.values()][1:])  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def warp_module(name: str) -> Any:
+    """A module of ``mjsense.warp``. Raises ImportError, with the extra, if mujoco_warp is not installed."""
+    try:
+        return importlib.import_module(f"mjsense.warp.{name}")
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.split(".")[0] not in ("warp", "mujoco_warp", "mujoco"):
+            raise
+        raise ImportError(f"backend='warp' needs {error.name}: pip install \"mjsense[warp]\"") from None
+
+
 @checked
 def _on_warp(
     scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
     device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
 ) -> Any:  # fmt: skip
     """The simulation of this scene on mujoco_warp."""
-    try:
-        from mjsense.warp.simulation import WarpSimulation
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.split(".")[0] not in ("warp", "mujoco_warp", "mujoco"):
-            raise
-        raise ImportError(f"backend='warp' needs {error.name}: pip install \"mjsense[warp]\"") from None
+    warp = warp_module("simulation")
     if scene._simulation is not None:
         raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
     if threads:
         raise ValueError("Simulation(): threads is for backend='cpu'")
     compiled = Simulation._compiled(scene, decimation, seed)
-    sim = WarpSimulation(compiled, scene.cfg.num_envs if num_worlds is None else num_worlds, device, nconmax, njmax)
+    sim = warp.WarpSimulation(compiled, scene.cfg.num_envs if num_worlds is None else num_worlds, device, nconmax, njmax)
     scene._simulation = compiled._core
     return sim
 

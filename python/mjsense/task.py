@@ -71,7 +71,7 @@ class Task:
     """Columns of an action by move group."""
 
     _mjs_own: Sequence[Any] = ()
-    _mjs_found: tuple[Any, ...] | None = None
+    _mjs_found: tuple[Any, ...] | None = None  # what evaluate() returned
 
     # -------------------------------------------------------------------------------------------- to be implemented or overridden
 
@@ -133,7 +133,7 @@ class Task:
         """``task_info`` of every world at the current observation, without ``episode_step``."""
         if self._mjs_found is None:
             raise RuntimeError(f"task '{self._mjs_name()}': nothing was evaluated yet")
-        _, success, _, info = self._mjs_found
+        _, success, _, info = self._mjs_columns(self._mjs_found)
         rows: list[dict[str, Any]] = [{"success": bool(value)} for value in success]
         for key, (kind, width, values) in (info or {}).items():
             cast = {"b": bool, "i": int, "f": float}[kind]
@@ -167,7 +167,7 @@ class Task:
 
     def _mjs_bind(self, sim: Simulation, layout: list[tuple[str, list[float], list[float]]]) -> None:
         taken = getattr(self, "sim", None)
-        if taken is not None and not taken._core.closed and taken is not sim:
+        if taken is not None and not taken.closed and taken is not sim:
             raise RuntimeError(f"task '{self._mjs_name()}' is played already: make one for each environment")
         self.sim, self.num_worlds = sim, sim.num_worlds
         self.action_groups = group_slices(layout)
@@ -182,8 +182,9 @@ class Task:
     def _mjs_graspable(self) -> list[str]:
         return list(self.graspable)
 
-    def _mjs_sample(self, world: int, episode: int, seed: int) -> list[float] | None:
-        base = self.sample(episode_rng(seed, episode, "task"), WorldState(self.sim, world, episode))
+    def _mjs_sample(self, world: int, episode: int, seed: int, states: Any = None) -> list[float] | None:
+        """``states``: arrays of all worlds that are written instead of those of the simulation."""
+        base = self.sample(episode_rng(seed, episode, "task"), WorldState(states or self.sim, world, episode))
         if base is None:
             return None
         return [float(x) for x in np.asarray(base, dtype=np.float64).reshape(-1)]
@@ -192,27 +193,37 @@ class Task:
         self.begin(np.array(ids))
 
     def _mjs_evaluate(self, ids: list[int]) -> tuple[Any, ...]:
-        found = self.evaluate(self.sim, np.array(ids)) if self._mjs_ids else self.evaluate(self.sim)  # type: ignore[call-arg]
+        return self._mjs_columns(self._mjs_ask(np.array(ids)))
+
+    def _mjs_ask(self, ids: np.ndarray) -> tuple[Any, ...]:
+        """(reward, success, terminated, info) as evaluate() returns them."""
+        found = self.evaluate(self.sim, ids) if self._mjs_ids else self.evaluate(self.sim)  # type: ignore[call-arg]
         terminated = info = None
         if isinstance(found, Mapping):
             unknown = set(found) - {"reward", "success", "terminated", "info"}
             if unknown or "reward" not in found or "success" not in found:
-                raise ValueError(f"returned a dict of {sorted(found)}; it needs reward and success, and may have terminated and info")
+                raise ValueError(
+                    f"returned a dict of {sorted(found)}; it needs reward and success, and may have terminated and info"
+                )
             reward, success, terminated, info = found["reward"], found["success"], found.get("terminated"), found.get("info")
         elif isinstance(found, tuple) and len(found) == 2:
             reward, success = found
         else:
             raise TypeError(f"must return (reward, success), each [B], or a dict of them, not {found!r}")
-        self._mjs_found = (
+        self._mjs_found = reward, success, terminated, info
+        return self._mjs_found
+
+    def _mjs_columns(self, found: tuple[Any, ...]) -> tuple[Any, ...]:
+        reward, success, terminated, info = found
+        return (
             self._mjs_column("reward", reward, np.float64),
             self._mjs_column("success", success, np.bool_),
             np.zeros(self.num_worlds, bool) if terminated is None else self._mjs_column("terminated", terminated, np.bool_),
             None if info is None else self._mjs_info(info),
         )
-        return self._mjs_found
 
     def _mjs_column(self, what: str, value: Any, dtype: Any) -> np.ndarray:
-        array = np.asarray(value)
+        array = _on_host(value)
         if array.shape != (self.num_worlds,):
             raise ValueError(f"{what} has shape {array.shape}, expected ({self.num_worlds},): one value a world")
         return np.ascontiguousarray(array, dtype=dtype)
@@ -220,7 +231,7 @@ class Task:
     def _mjs_info(self, info: Mapping[str, Any]) -> dict[str, tuple[str, int, np.ndarray]]:
         columns = {}
         for key, value in info.items():
-            array = np.asarray(value)
+            array = _on_host(value)
             if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or array.shape[0] != self.num_worlds:
                 raise ValueError(
                     f"info '{key}' is {array.dtype}{list(array.shape)}; expected numbers [{self.num_worlds}] or [{self.num_worlds}, k]"
@@ -253,10 +264,9 @@ class Task:
 
 @checked
 class WorldState:
-    """The state of one world at the start of an episode, to be written by the task. Names are those of the model: ``"mug/mug"``.
-    """
+    """The state of one world at the start of an episode, to be written by the task. Names are those of the model: ``"mug/mug"``."""
 
-    def __init__(self, sim: Simulation, world: int, episode: int) -> None:
+    def __init__(self, sim: Any, world: int, episode: int) -> None:
         self._sim = sim
         self.id = world
         """Id of the world. The episode must not depend on it."""
@@ -293,7 +303,9 @@ class WorldState:
         """Orientations of mocap bodies ``[nmocap, 4]`` wxyz, live."""
         return self._sim.mocap_quat[self.id]
 
-    def place(self, body: str, pos: Sequence[float], quat: Sequence[float] = (1, 0, 0, 0), velocity: Sequence[float] | None = None) -> None:
+    def place(
+        self, body: str, pos: Sequence[float], quat: Sequence[float] = (1, 0, 0, 0), velocity: Sequence[float] | None = None
+    ) -> None:
         """Sets the pose of a free or mocap body.
 
         Args:
@@ -334,9 +346,18 @@ class WorldState:
             count = {"body": self.model.nbody, "joint": self.model.njnt}[word]
             names = [_mujoco.id2name(self.model, kind, i) for i in range(count)]
             near = difflib.get_close_matches(name, names, 3)
-            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else f"; there are {', '.join(filter(None, names[:12]))}"
+            hint = (
+                f"; did you mean {' or '.join(map(repr, near))}?"
+                if near
+                else f"; there are {', '.join(filter(None, names[:12]))}"
+            )
             raise UnknownNameError(f"no {word} named '{name}'{hint}")
         return index
+
+
+def _on_host(values: Any) -> np.ndarray:
+    """An array, also of a tensor on another device."""
+    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
 
 
 def snake_case(name: str) -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal
 
@@ -18,7 +19,7 @@ from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.assets import use_installed_meshes
 from mjsense.native_sensor import box_of
 from mjsense.scene import Scene
-from mjsense.simulation import Simulation
+from mjsense.simulation import Simulation, warp_module
 from mjsense.task import group_slices
 
 _VIEW = "default_view"
@@ -67,7 +68,7 @@ class TaskVectorEnv(VectorEnv):
         if options["meshes"] == "real":
             use_installed_meshes()
         options["default_view"] = render_mode is not None
-        self._rollout: Any = _core.Rollout(options, objects, Simulation._of)
+        self._rollout: Any = self._make_rollout(options, objects)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": self._rollout.fps}
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
         names = choose_streams(observations, streams, [sensor.uuid for sensor in objects[2]])
@@ -102,6 +103,19 @@ class TaskVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.expert_done = np.zeros(self.num_envs, bool)
         """bool ``[num_envs]``: worlds for which the policy reported ``done`` in the last :meth:`expert_action`."""
+
+    def _make_rollout(self, options: dict[str, Any], objects: Any) -> Any:
+        return _core.Rollout(options, objects, Simulation._of)
+
+    def _numbers(self, actions: Any) -> Any:
+        """Actions as the rollout takes them."""
+        return np.ascontiguousarray(actions, dtype=np.float64)
+
+    def _copy(self, rows: Any) -> Any:
+        return rows.copy()
+
+    def _on_host(self, values: Any) -> np.ndarray:
+        return values
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
@@ -177,16 +191,16 @@ class TaskVectorEnv(VectorEnv):
         self._check_open()
         if not self._started:
             raise RuntimeError("call reset() before step()")
-        actions = np.ascontiguousarray(actions, dtype=np.float64)
+        actions = self._numbers(actions)
         if actions.shape != shape:
-            raise ValueError(f"actions: shape {actions.shape}, expected ({', '.join(map(str, shape))})")
-        finite = np.isfinite(actions).reshape(self.num_envs, -1).all(1)
+            raise ValueError(f"actions: shape {tuple(actions.shape)}, expected ({', '.join(map(str, shape))})")
+        finite = self._on_host(abs(actions) < np.inf).reshape(self.num_envs, -1).all(1)
         if not finite.all():
             raise ValueError(f"actions of worlds {np.flatnonzero(~finite).tolist()} are not finite")
         if self._command_range is None:
             return actions
-        low, high = self._command_range
-        return low + (np.clip(actions, -1, 1) + 1) / 2 * (high - low)
+        low, high = (self._numbers(side) for side in self._command_range)
+        return low + (actions.clip(-1, 1) + 1) / 2 * (high - low)
 
     def _play(self, play: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         resting = self._ended.copy()
@@ -195,8 +209,9 @@ class TaskVectorEnv(VectorEnv):
         if not resting.all():
             play()
         reward, success, terminated, truncated, faults = self._rollout.outcomes()
-        for values in (reward, success, terminated, truncated):
-            values[resting] = 0
+        if resting.any():
+            for values in (reward, success, terminated, truncated):
+                values[resting] = 0
         for world in faults:
             truncated[world] = not resting[world]
         infos: dict[str, Any] = {"success": success, "_success": ~resting}
@@ -205,7 +220,7 @@ class TaskVectorEnv(VectorEnv):
             infos["fault"], infos["_fault"] = np.full(self.num_envs, "", object), np.zeros(self.num_envs, bool)
             for world in broken:
                 infos["fault"][world], infos["_fault"][world] = faults[world], True
-        self._ended = terminated | truncated
+        self._ended = self._on_host(terminated | truncated).copy()
         if self.autoreset_mode == AutoresetMode.NEXT_STEP and resting.any():
             self._begin(np.flatnonzero(resting))
         elif self.autoreset_mode == AutoresetMode.DISABLED:
@@ -243,7 +258,7 @@ class TaskVectorEnv(VectorEnv):
         return self._rollout.planned_paths(world)
 
     def _observe(self) -> dict[str, Any]:
-        return nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
+        return nest(self._paths, {name: self._copy(rows) for name, rows in self.rows.items()})
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Images of all worlds: of the first camera of the observation or, without one, of a default view."""
@@ -306,12 +321,34 @@ def _command_range(groups: dict[str, slice], low: np.ndarray, high: np.ndarray) 
     """float64 ``[n]`` each. Raises ValueError if a group's commands have no range."""
     for name, columns in groups.items():
         if not np.isfinite([low[columns], high[columns]]).all():
-            raise ValueError(f"action_space='normalised': the commands of move group '{name}' have no range; use action_space='commands'")
+            raise ValueError(
+                f"action_space='normalised': the commands of move group '{name}' have no range; use action_space='commands'"
+            )
     return low.astype(np.float64), high.astype(np.float64)
 
 
 def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
     return gymnasium.spaces.Dict({key: _space(box) if isinstance(box, dict) else box for key, box in boxes.items()})
+
+
+_WITH_WARP = {
+    "task", "num_envs", "seed", "horizon", "policy_dt_ms", "terminate_upon_success", "observations", "sensors", "use_sensors",
+    "instructions", "shadows", "meshes", "autoreset_mode", "action_space", "backend", "device", "nconmax", "njmax",
+}  # fmt: skip
+"""Arguments of make_vec() that have an effect, or no meaning, with backend="warp"."""
+
+
+def _check_backend(arguments: dict[str, Any]) -> None:
+    """Raises ValueError for arguments of the other backend."""
+    defaults = {name: parameter.default for name, parameter in inspect.signature(make_vec).parameters.items()}
+    given = [name for name, value in arguments.items() if value is not defaults[name] and value != defaults[name]]
+    if arguments["backend"] == "cpu":
+        wrong = [name for name in given if name in ("device", "nconmax", "njmax")]
+    else:
+        wrong = [name for name in given if name not in _WITH_WARP and not (name == "cameras" and not arguments["cameras"])]
+    if wrong:
+        other = "warp" if arguments["backend"] == "cpu" else "cpu"
+        raise ValueError(f"make_vec(): {', '.join(wrong)} {'is' if len(wrong) == 1 else 'are'} for backend='{other}'")
 
 
 @checked
@@ -349,6 +386,10 @@ def make_vec(
     autoreset_mode: str | AutoresetMode = "next_step",
     render_mode: str | None = None,
     action_space: Literal["commands", "normalised"] = "commands",
+    backend: Literal["cpu", "warp"] = "cpu",
+    device: str | None = None,
+    nconmax: int | None = None,
+    njmax: int | None = None,
 ) -> TaskVectorEnv:
     """Creates a gymnasium vector environment of a task.
 
@@ -394,10 +435,25 @@ def make_vec(
         render_mode: None or rgb_array.
         action_space: ``commands``: actions are the commands of the robot's controllers, in their units. ``normalised``: actions
             from -1 to 1, mapped linearly to the range of each command and clipped; an error if a command has no range.
+        backend: ``"cpu"``, or ``"warp"``: worlds on mujoco_warp, for tasks written in Python whose robot is part of the scene.
+            Observations, rewards and the ends of episodes are then torch tensors on the device.
+        device: With warp: ``"cpu"``, ``"cuda:0"`` ...; by default the first CUDA device, or the CPU without one.
+        nconmax: With warp: contacts for which each world has memory, on average over the worlds.
+        njmax: With warp: constraint rows for which each world has memory.
     """
     options = dict(locals())
-    for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space"):
+    _check_backend(options)
+    for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space", "backend"):
         del options[name]
+    if backend == "cpu":
+        for name in ("device", "nconmax", "njmax"):
+            del options[name]
     options["num_worlds"] = options.pop("num_envs")
     objects = parts_of(options, sensors)
+    if backend == "warp":
+        if objects[0] is None:
+            raise ValueError(
+                f"make_vec(): task '{options['task']}' is not available with backend='warp', which plays tasks written in Python"
+            )
+        return warp_module("rollout").WarpTaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
     return TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)

@@ -19,7 +19,9 @@ def checked_env(env: Any, who: str) -> TaskVectorEnv:
     if not isinstance(env, TaskVectorEnv):
         raise TypeError(f"{who}: env must be what mjsense.make_vec() returns, not {env!r}")
     if env.autoreset_mode != AutoresetMode.SAME_STEP:
-        raise ValueError(f"{who}: autoreset_mode is '{env.autoreset_mode.name.lower()}': make_vec(..., autoreset_mode='same_step') is needed")
+        raise ValueError(
+            f"{who}: autoreset_mode is '{env.autoreset_mode.name.lower()}': make_vec(..., autoreset_mode='same_step') is needed"
+        )
     return env
 
 
@@ -30,15 +32,15 @@ class Numbers:
         self._paths = env._paths
         streams = {name: (env._paths[name][0], env.specs[name], rows) for name, rows in env.rows.items()}
         chosen = list(streams) if observations is None else choose_streams(observations, streams)
-        self.names = [name for name in chosen if not is_image(env.rows[name])]
+        self.names = [name for name in chosen if not is_image(env.specs[name])]
         """Names of the streams, in the order of the columns."""
-        self.images = [name for name in chosen if is_image(env.rows[name])]
+        self.images = [name for name in chosen if is_image(env.specs[name])]
         """Names of the streams that are images."""
         self.columns: dict[str, slice] = {}
         """Columns of each stream."""
         at = 0
         for name in self.names:
-            width = int(np.prod(env.rows[name].shape[1:], dtype=int))
+            width = int(np.prod(env.specs[name].shape, dtype=int))
             self.columns[name] = slice(at, at + width)
             at += width
         self.size = at
@@ -48,20 +50,31 @@ class Numbers:
         """Space of one world's row."""
         return gymnasium.spaces.Box(-np.inf, np.inf, (self.size,), np.float32)
 
-    def of(self, observation: dict[str, Any], worlds: int) -> np.ndarray:
-        """A new array with the rows of all worlds, ``[worlds, n]``."""
+    def of(self, observation: dict[str, Any], worlds: int) -> Any:
+        """A new array with the rows of all worlds, ``[worlds, n]``; a tensor on the same device if the observations are tensors."""
+        first: Any = stream_of(observation, self._paths[self.names[0]]) if self.names else None
+        if hasattr(first, "detach"):
+            rows = first.new_empty((worlds, self.size), dtype=first.float().dtype)
+            for name, columns in self.columns.items():
+                rows[:, columns] = stream_of(observation, self._paths[name]).reshape(worlds, -1)
+            return rows
         out = np.empty((worlds, self.size), np.float32)
         for name, columns in self.columns.items():
             out[:, columns] = stream_of(observation, self._paths[name]).reshape(worlds, -1)
         return out
 
 
-def is_image(rows: np.ndarray) -> bool:
-    """Whether the rows are uint8 ``[B, H, W, C]``."""
-    return rows.ndim == 4 and rows.dtype == np.uint8
+def is_image(spec: Any) -> bool:
+    """Whether a world's row is uint8 ``[H, W, C]``."""
+    return len(spec.shape) == 3 and spec.dtype == "uint8"
 
 
-def stream_of(observation: Any, path: Sequence[str]) -> np.ndarray:
+def on_host(values: Any) -> np.ndarray:
+    """A NumPy array, also of a tensor on another device."""
+    return values.cpu().numpy() if hasattr(values, "detach") else values
+
+
+def stream_of(observation: Any, path: Sequence[str]) -> Any:
     """A stream of a nested observation."""
     for key in path:
         observation = observation[key]
@@ -69,7 +82,7 @@ def stream_of(observation: Any, path: Sequence[str]) -> np.ndarray:
 
 
 class Actions:
-    """Commands ``mean + scale * action``, clipped to the limits of the actuators, float64 ``[B, n]``."""
+    """Commands ``mean + scale * action``, clipped to the limits of the actuators: float64 ``[B, n]``, or tensors for tensors."""
 
     def __init__(self, space: gymnasium.spaces.Box, mean: Any, scale: Any) -> None:
         self.low, self.high = np.float64(space.low), np.float64(space.high)
@@ -84,5 +97,8 @@ class Actions:
         except (TypeError, ValueError):
             raise ValueError(f"{name}: {value!r} is neither a number nor {self.low.size} numbers") from None
 
-    def commands(self, actions: np.ndarray) -> np.ndarray:
+    def commands(self, actions: Any) -> Any:
+        if hasattr(actions, "detach"):
+            mean, scale, low, high = (actions.new_tensor(values) for values in (self.mean, self.scale, self.low, self.high))
+            return (mean + scale * actions).clamp(low, high)
         return np.clip(self.mean + self.scale * actions, self.low, self.high)

@@ -15,7 +15,7 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(f"mjsense.rl.rsl needs rsl-rl: pip install rsl-rl-lib ({error})", name=error.name) from error
 
-from mjsense.rl._numbers import Actions, Numbers, checked_env
+from mjsense.rl._numbers import Actions, Numbers, checked_env, on_host
 
 
 class RslRlVecEnv(VecEnv):
@@ -27,7 +27,8 @@ class RslRlVecEnv(VecEnv):
             rows of a TensorDict. By default one group ``policy`` with all streams.
         action_mean, action_scale: A command is ``action_mean + action_scale * action``; numbers or ``[n]``. By default the centre
             and half the width of the actuators' ranges. Commands are clipped to these ranges.
-        device: Device of the trainer; the worlds are on the CPU.
+        device: Device of the trainer. Worlds of ``make_vec(..., backend="warp")`` on the same device exchange tensors with it without
+            a copy to the host.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class RslRlVecEnv(VecEnv):
         self.max_episode_length: int = env.horizon
         self.device = device
         self.cfg: dict[str, Any] = {}
+        self._on_device = not all(isinstance(rows, np.ndarray) for rows in env.rows.values())
         self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long, device=device)
         """Number of steps of the current episodes. Writing it does not affect the episodes, because the task counts them
         separately."""
@@ -55,7 +57,7 @@ class RslRlVecEnv(VecEnv):
         self._last = self._observation(observation)
 
     def _observation(self, observation: dict[str, Any]) -> Any:
-        rows = {name: torch.from_numpy(numbers.of(observation, self.num_envs)) for name, numbers in self.numbers.items()}
+        rows = {name: torch.as_tensor(numbers.of(observation, self.num_envs)) for name, numbers in self.numbers.items()}
         return TensorDict(rows, batch_size=[self.num_envs]).to(self.device)
 
     def get_observations(self) -> Any:
@@ -65,17 +67,19 @@ class RslRlVecEnv(VecEnv):
     def step(self, actions: Any) -> tuple[Any, Any, Any, dict[str, Any]]:
         """Performs one control step; worlds whose episode has ended start the next one. Returns (observations, rewards ``[B]``,
         dones ``[B]``, extras)."""
-        commands = self._commands.commands(actions.detach().cpu().numpy().astype(np.float64))
-        observation, reward, terminated, truncated, infos = self.env.step(commands)
-        done = terminated | truncated
+        actions = actions.detach()
+        observation, reward, terminated, truncated, infos = self.env.step(
+            self._commands.commands(actions if self._on_device else on_host(actions).astype(np.float64))
+        )
         self._last = self._observation(observation)
+        terminated, truncated = (torch.as_tensor(ended, device=self.device) for ended in (terminated, truncated))
+        done = terminated | truncated
         self.episode_length_buf += 1
-        over = torch.from_numpy(done).to(self.device)
-        self.episode_length_buf[over] = 0
-        extras: dict[str, Any] = {"time_outs": torch.from_numpy(truncated & ~terminated).to(self.device), "log": {}}
-        if done.any():
-            extras["log"]["/success"] = float(infos["final_info"]["success"][done].mean())
-        return self._last, torch.from_numpy(reward.astype(np.float32)).to(self.device), over, extras
+        self.episode_length_buf[done] = 0
+        extras: dict[str, Any] = {"time_outs": truncated & ~terminated, "log": {}}
+        if "final_info" in infos:
+            extras["log"]["/success"] = float(infos["final_info"]["success"][infos["_final_info"]].mean())
+        return self._last, torch.as_tensor(reward, dtype=torch.float32, device=self.device), done, extras
 
     def close(self) -> None:
         """Frees the worlds."""

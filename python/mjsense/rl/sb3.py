@@ -12,9 +12,11 @@ import numpy as np
 try:
     from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(f"mjsense.rl.sb3 needs Stable-Baselines3: pip install stable-baselines3 ({error})", name=error.name) from error
+    raise ModuleNotFoundError(
+        f"mjsense.rl.sb3 needs Stable-Baselines3: pip install stable-baselines3 ({error})", name=error.name
+    ) from error
 
-from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
+from mjsense.rl._numbers import Actions, Numbers, checked_env, on_host, stream_of
 
 
 class SB3VecEnv(VecEnv):
@@ -30,7 +32,9 @@ class SB3VecEnv(VecEnv):
             and half the width of the actuators' ranges. Commands are clipped to these ranges.
     """
 
-    def __init__(self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None) -> None:
+    def __init__(
+        self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None
+    ) -> None:
         self.env = checked_env(env, "SB3VecEnv")
         self.numbers = Numbers(self.env, observations)
         """Columns of each stream."""
@@ -40,17 +44,17 @@ class SB3VecEnv(VecEnv):
         self._returns, self._lengths = np.zeros(env.num_envs), np.zeros(env.num_envs, int)
         space: Any = self.numbers.box()
         if self._images:
-            spaces = {name: gymnasium.spaces.Box(0, 255, env.rows[name].shape[1:], np.uint8) for name in self._images}
+            spaces = {name: gymnasium.spaces.Box(0, 255, env.specs[name].shape, np.uint8) for name in self._images}
             space = gymnasium.spaces.Dict({"state": space, **spaces})
         self.render_mode = env.render_mode
         super().__init__(env.num_envs, space, gymnasium.spaces.Box(-1, 1, env.single_action_space.shape, np.float32))
 
     def _observation(self, observation: Any, worlds: int) -> Any:
-        numbers = self.numbers.of(observation, worlds)
+        numbers = on_host(self.numbers.of(observation, worlds))
         if not self._images:
             return numbers
         paths = self.env._paths
-        return {"state": numbers, **{name: stream_of(observation, paths[name]) for name in self._images}}
+        return {"state": numbers, **{name: on_host(stream_of(observation, paths[name])) for name in self._images}}
 
     def reset(self) -> Any:
         """Starts a new episode in every world; after ``seed(s)`` the first episodes of that seed."""
@@ -67,7 +71,8 @@ class SB3VecEnv(VecEnv):
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Performs the step. Infos of worlds whose episode ended contain ``terminal_observation``, ``TimeLimit.truncated``,
         ``episode`` and ``is_success``."""
-        observation, reward, terminated, truncated, infos = self.env.step(self._actions)
+        observation, *outcome, infos = self.env.step(self._actions)
+        reward, terminated, truncated = map(on_host, outcome)
         done = terminated | truncated
         self._returns += reward
         self._lengths += 1
@@ -76,7 +81,9 @@ class SB3VecEnv(VecEnv):
             last = self._observation(infos["final_obs"][world], 1)
             final = infos["final_info"]
             out[world] = {
-                "terminal_observation": {key: value[0] if key == "state" else value for key, value in last.items()} if self._images else last[0],
+                "terminal_observation": {key: value[0] if key == "state" else value for key, value in last.items()}
+                if self._images
+                else last[0],
                 "TimeLimit.truncated": bool(truncated[world] and not terminated[world]),
                 "episode": {"r": float(self._returns[world]), "l": int(self._lengths[world])},
                 "is_success": bool(final["success"][world]),

@@ -31,18 +31,7 @@ class HostRows:
 
     def _stream(self, sensor: Any, field: str, num_worlds: int) -> np.ndarray:
         """Adds a stream and returns its rows, which read() writes."""
-        if isinstance(sensor, Sensor):
-            (spec,) = [spec for spec in sensor._mjs_row_specs() if spec["name"] == field]
-        else:
-            known = sensor.specs[field]
-            names = ("dtype", "unit", "frame", "low", "high", "is_dict", "description")
-            spec = {name: getattr(known, name) for name in names} | {"shape": list(known.shape)}
-        stream = "/".join(part for part in (sensor.uuid, field) if part)
-        if getattr(sensor, "kind", "") == "camera":
-            stream = sensor.uuid if field == "rgb" else f"{sensor.uuid}_{field}"
-            if field in ("rgb", "depth"):
-                spec |= {"video": True, "shape": spec["shape"][: 3 if field == "rgb" else 2]}
-        self.handles.append(_core.written_rows(stream, spec, num_worlds))
+        self.handles.append(_core.written_rows(*stream_of(sensor, field), num_worlds))
         return self.handles[-1].arrays(writable=True)[""]
 
     def read(self) -> None:
@@ -57,3 +46,19 @@ class HostRows:
         host = self._host.numpy()
         for _, part, rows in self._copies:
             rows[...] = host[part].view(rows.dtype).reshape(rows.shape)
+
+
+def stream_of(sensor: Any, field: str) -> tuple[str, dict[str, Any]]:
+    """Name and specification of the stream of a sensor's field."""
+    if isinstance(sensor, Sensor):
+        (spec,) = [spec for spec in sensor._mjs_row_specs() if spec["name"] == field]
+    else:
+        known = sensor.specs[field]
+        names = ("dtype", "unit", "frame", "low", "high", "is_dict", "description")
+        spec = {name: getattr(known, name) for name in names} | {"shape": list(known.shape)}
+    stream = "/".join(part for part in (sensor.uuid, field) if part)
+    if getattr(sensor, "kind", "") == "camera":
+        stream = sensor.uuid if field == "rgb" else f"{sensor.uuid}_{field}"
+        if field in ("rgb", "depth"):
+            spec |= {"video": True, "shape": spec["shape"][: 3 if field == "rgb" else 2]}
+    return stream, spec

@@ -57,6 +57,22 @@ def failed_worlds(status: wp.array(dtype=wp.int32), mask: wp.array(dtype=wp.bool
 
 
 @wp.kernel
+def rekey(
+    mask: wp.array(dtype=wp.bool),
+    keys: wp.array(dtype=wp.uint32),
+    key: wp.array(dtype=wp.uint32),
+    tick: wp.array(dtype=wp.int64),
+    episode: wp.array(dtype=wp.int64),
+):  # type: ignore[valid-type]
+    """Random numbers of the worlds of the mask are from now on those of these keys, with clocks from 0."""
+    world = wp.tid()
+    if mask[world]:
+        key[world] = keys[world]
+        tick[world] = wp.int64(0)
+        episode[world] = wp.int64(0)
+
+
+@wp.kernel
 def copy_rows(
     mask: wp.array(dtype=wp.bool), row: wp.array(dtype=wp.int32), source: wp.array2d(dtype=Any), target: wp.array2d(dtype=Any)
 ):  # type: ignore[valid-type]

@@ -32,7 +32,7 @@ from mjsense.warp import (
     user,
 )
 from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, scalar_view, unsupported
-from mjsense.warp.state import STATE, Component, DerivedFields, ids_of
+from mjsense.warp.state import MEMORY, STATE, Component, DerivedFields, ids_of
 from mjsense.warp.stepper import FINITE, Stepper
 from mjsense.warp.world_models import WorldModels
 
@@ -133,7 +133,7 @@ class WarpSimulation(KnownAttributes):
     # ---------------------------------------------------------------------------------------------------------- sensors
 
     def _make_sensors(self) -> None:
-        reader = _Reader(self)
+        reader = self._reader = _Reader(self)
         self._sensors: dict[str, WarpSensor] = self._worlds.sensors
         self._moments: dict[str, int] = {}
         for name in list(self.scene.sensors):
@@ -200,13 +200,24 @@ class WarpSimulation(KnownAttributes):
             self._forces_at = self._moment
 
     def add(self, sensor: Any) -> Any:
-        """Sensors are parts of the scene with this backend."""
-        raise NotImplementedError("Simulation.add() is not available with backend='warp': put the sensor into SceneCfg.sensors")
+        """Adds a sensor written in Python that is not part of the scene, and returns it. Others belong in ``SceneCfg.sensors``."""
+        self._check_open()
+        if not isinstance(sensor, Sensor):
+            raise NotImplementedError(f"Simulation.add() is for sensors written in Python with backend='warp', not {sensor!r}")
+        if sensor._mjs_core is not None:
+            raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
+        if sensor.uuid in self._sensors:
+            raise ValueError(f"sensor '{sensor.uuid}': there is one of that name already")
+        with wp.ScopedDevice(self._device):
+            made = user.UserSensor(self._worlds, sensor, self, self._reader)
+        made.initialize()
+        self._sensors[sensor.uuid] = made
+        return sensor
 
     def refresh(self, sensors: Sequence[Any]) -> None:
         """Computes several sensors (as returned by ``scene["name"]``)."""
         for sensor in sensors:
-            self._refresh(self._sensors[sensor.name])
+            self._refresh(self._sensors[sensor.uuid if isinstance(sensor, Sensor) else sensor.name])
 
     def _host_rows(self, sensors: Sequence[Any]) -> host_rows.HostRows:
         """The rows of these sensors for a recorder."""
@@ -303,6 +314,26 @@ class WarpSimulation(KnownAttributes):
                 self._worlds.tick.zero_()
                 self._worlds.episode.zero_()
             self._stepper.reset(mask, row)
+            self._settle()
+
+    def _start_state(self, key: int | None) -> dict[str, np.ndarray]:
+        """Components of the state after a reset, on the host, float64 ``[...]``."""
+        row = self._key_row(key)
+        shapes = {name: tuple(self._component(name).shape[1:]) for name in self._stepper.starts if name not in MEMORY}
+        return {name: self._stepper.starts[name].numpy()[row].astype(np.float64).reshape(shape) for name, shape in shapes.items()}
+
+    def _begin_episodes(self, ids: np.ndarray, keys: Sequence[int], key: int | None, components: dict[str, np.ndarray]) -> None:
+        """Begins episodes with these keys of random numbers, in start states of which components are replaced."""
+        mask, all_keys = self._mask(ids), np.zeros(self.num_worlds, np.uint32)
+        all_keys[ids] = keys
+        clocks = self._worlds
+        with wp.ScopedDevice(self._device):
+            inputs = [mask, wp.array(all_keys, dtype=wp.uint32), clocks.key, clocks.tick, clocks.episode]
+            wp.launch(kernels.rekey, self.num_worlds, inputs)
+            self._stepper.reset(mask, self._key_row(key))
+            for name, values in components.items():
+                arrays.write(self._component(name), values, ids)
+            self._stepper.apply_ctrl(mask)
             self._settle()
 
     def forward(self, world_ids: Any = None) -> None:
