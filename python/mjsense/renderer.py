@@ -85,6 +85,20 @@ class _Pool:
             return self._make()
 
 
+def camera_of_name(model: mujoco.MjModel, name: str) -> int:
+    """The id of a camera; ValueError with the nearest names if there is none."""
+    import mujoco
+
+    kind = mujoco.mjtObj.mjOBJ_CAMERA.value
+    id = mujoco.mj_name2id(model, kind, name)
+    if id == -1:
+        names = [mujoco.mj_id2name(model, kind, i) or f"(camera {i}, unnamed)" for i in range(model.ncam)]
+        near = difflib.get_close_matches(name, names, n=3, cutoff=0.0)
+        known = f"Nearest: {', '.join(near)}." if near else "The model has no cameras."
+        raise ValueError(f'The camera "{name}" does not exist. {known}')
+    return id
+
+
 @checked
 class Renderer:
     """Renders MuJoCo scenes on the CPU, with the interface of ``mujoco.Renderer`` and without OpenGL.
@@ -238,20 +252,7 @@ class Renderer:
         mujoco, model = self._mujoco, self._model
         if isinstance(camera, mujoco.MjvCamera):
             return camera
-        if isinstance(camera, str):
-            id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA.value, camera)
-            if id == -1:
-                names = [
-                    mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_CAMERA.value, i) or f"(camera {i}, unnamed)"
-                    for i in range(model.ncam)
-                ]
-                near = difflib.get_close_matches(camera, names, n=3, cutoff=0.0)
-                raise ValueError(
-                    f'The camera "{camera}" does not exist. '
-                    + (f"Nearest: {', '.join(near)}." if near else "The model has no cameras.")
-                )
-        else:
-            id = int(camera)
+        id = camera_of_name(model, camera) if isinstance(camera, str) else int(camera)
         if not -1 <= id < model.ncam:
             raise ValueError(f"The camera id {id} is out of range [-1, {model.ncam}).")
         out = mujoco.MjvCamera()

