@@ -10,8 +10,6 @@
 // there are no gaps between triangles. 1 / t is linear too: d . N / (c0 . N) with N = (c1 - c0) x
 // (c2 - c0).
 
-#include <span>
-
 #include "mjsense/render/kernels/trace.h"
 
 namespace mjsense::render {
@@ -71,10 +69,11 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, float side,
     const Float nearest = -max(c[0].z, max(c[1].z, c[2].z));
     const Float farthest = -min(c[0].z, min(c[1].z, c[2].z));
     const Mask ahead = splat(kTiny) < nearest;
-    Float low[2], high[2];
+    Float low[2], high[2], inverse_z[3];
+    for (int i = 0; i < 3; ++i) inverse_z[i] = splat(-1.0f) / c[i].z;
     for (int axis = 0; axis < 2; ++axis) {
       Float x[3];
-      for (int i = 0; i < 3; ++i) x[i] = (axis == 0 ? c[i].x : c[i].y) / -c[i].z;
+      for (int i = 0; i < 3; ++i) x[i] = (axis == 0 ? c[i].x : c[i].y) * inverse_z[i];
       const Float a = min(x[0], min(x[1], x[2])), b = max(x[0], max(x[1], x[2]));
       const Float slack = splat(1e-6f) * (splat(1.0f) + max(abs(a), abs(b)));
       low[axis] = select(ahead, a - slack, splat(-kInfinity));
@@ -289,8 +288,8 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
     if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
     const std::uint32_t lanes = set_up(view, g, side, block, tile, drawn);
     const int covered = find_covered(drawn, lanes, packets, tile, pairs);
-    for (const Pair& pair : std::span(pairs, static_cast<std::size_t>(covered))) {
-      const auto [lane, q] = pair;
+    for (int k = 0; k < covered; ++k) {
+      const auto [lane, q] = pairs[k];
       if (draw(g, index, drawn, lane, block.face[lane], tile.shaded, tile.pixels[q], tile.hits[q]))
         changed |= 1u << q;
     }
