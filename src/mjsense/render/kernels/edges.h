@@ -111,6 +111,11 @@ inline void add_thin(const PixelGrid& grid, const ViewGeom& g, const Tile& tile,
     edges[__builtin_ctz(near)] = 0xffffu;
 }
 
+template <typename T>
+void fill(T* p, int count, T value) {
+  for (int i = 0; i < count; ++i) p[i] = value;
+}
+
 // Pixels of a tile, each of which has `samples` lanes in a tile of samples.
 struct SampledPixels {
   int samples;
@@ -119,9 +124,9 @@ struct SampledPixels {
 
   int maximum() const { return kTilePackets * kLanes / samples; }
   int packets() const { return (count * samples + kLanes - 1) / kLanes; }
-  // The pixel of a packet's lane; lanes that are not used repeat the last pixel.
+  // The pixel of the lanes from k on; lanes that are not used repeat the last pixel.
   int pixel(int q, int k) const {
-    const int i = (q * kLanes + k) / samples;
+    const int i = (q * kLanes + k) >> __builtin_ctz(samples);
     return i < count ? i : count - 1;
   }
 };
@@ -139,11 +144,11 @@ inline void start_samples(const View& view, const Tile& centers, const SampledPi
   out.around[1] = out.around[3] = -kInfinity;
   for (int q = 0; q < packets; ++q) {
     Pixels& p = out.pixels[q];
-    for (int k = 0; k < kLanes; ++k) {
+    for (int k = 0; k < kLanes; k += samples) {
       const int i = pixels.pixel(q, k);
       const Pixels& from = centers.pixels[pixels.packet[i]];
-      p.x[k] = from.x[pixels.lane[i]];
-      p.y[k] = from.y[pixels.lane[i]];
+      fill(p.x + k, samples, from.x[pixels.lane[i]]);
+      fill(p.y + k, samples, from.y[pixels.lane[i]]);
     }
     Float low[2] = {splat(kInfinity), splat(kInfinity)};
     Float high[2] = {splat(-kInfinity), splat(-kInfinity)};
@@ -178,11 +183,12 @@ inline std::uint32_t differing(const View& view, const Tile& centers, const Samp
                                int q, const Hits& hits) {
   alignas(64) int geom[kLanes];
   alignas(64) float center[kLanes], nearness[kLanes];
-  for (int k = 0; k < kLanes; ++k) {
+  const int samples = pixels.samples;
+  for (int k = 0; k < kLanes; k += samples) {
     const int i = pixels.pixel(q, k);
     const Hits& from = centers.hits[pixels.packet[i]];
-    geom[k] = from.geom[pixels.lane[i]];
-    center[k] = from.t[pixels.lane[i]];
+    fill(geom + k, samples, from.geom[pixels.lane[i]]);
+    fill(center + k, samples, from.t[pixels.lane[i]]);
   }
   std::uint32_t other = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
@@ -190,7 +196,6 @@ inline std::uint32_t differing(const View& view, const Tile& centers, const Samp
     store(center + k, splat(1.0f) / load(center + k));
     store(nearness + k, splat(1.0f) / load(hits.t + k));
   }
-  const int samples = pixels.samples;
   const float maximum = kBend * view.grid.dx;
   std::uint32_t lanes = 0;
   for (int k = 0; k < kLanes; k += samples) {

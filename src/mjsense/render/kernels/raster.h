@@ -69,10 +69,11 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, float side,
     const Float nearest = -max(c[0].z, max(c[1].z, c[2].z));
     const Float farthest = -min(c[0].z, min(c[1].z, c[2].z));
     const Mask ahead = splat(kTiny) < nearest;
-    Float low[2], high[2];
+    Float low[2], high[2], inverse_z[3];
+    for (int i = 0; i < 3; ++i) inverse_z[i] = splat(-1.0f) / c[i].z;
     for (int axis = 0; axis < 2; ++axis) {
       Float x[3];
-      for (int i = 0; i < 3; ++i) x[i] = (axis == 0 ? c[i].x : c[i].y) / -c[i].z;
+      for (int i = 0; i < 3; ++i) x[i] = (axis == 0 ? c[i].x : c[i].y) * inverse_z[i];
       const Float a = min(x[0], min(x[1], x[2])), b = max(x[0], max(x[1], x[2]));
       const Float slack = splat(1e-6f) * (splat(1.0f) + max(abs(a), abs(b)));
       low[axis] = select(ahead, a - slack, splat(-kInfinity));
@@ -107,6 +108,24 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, float side,
 
 inline Float linear(const float (*f)[rays::kClusterSize], int lane, Float x, Float y) {
   return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
+}
+
+// A triangle of a block (`lane`) and a packet that it may cover.
+struct Pair {
+  std::uint8_t lane, packet;
+};
+
+// Whether the triangle covers a pixel of the packet.
+inline bool covers(const Drawn& drawn, Pair pair, const Tile& tile) {
+  const Pixels& pixels = tile.pixels[pair.packet];
+  std::uint32_t inside = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Float x = load(pixels.x + k), y = load(pixels.y + k), zero = splat(0.0f);
+    inside |= bits((zero <= linear(drawn.edges[0], pair.lane, x, y)) &
+                   (zero <= linear(drawn.edges[1], pair.lane, x, y)) &
+                   (zero <= linear(drawn.edges[2], pair.lane, x, y)));
+  }
+  return inside != 0;
 }
 
 // Writes triangle `lane` of the block to the hits of those lanes of a packet where it is the
@@ -221,6 +240,34 @@ inline void prefetch(const rays::TriangleBlock& block) {
   for (std::size_t line = 0; line < sizeof block; line += 64) __builtin_prefetch(p + line);
 }
 
+// Writes the triangles of `lanes` and the packets that they cover, in order, and returns the number of
+// such pairs. Few triangles cover a pixel of a packet that is in their reach, which the CPU could
+// not predict; therefore no step depends on it.
+inline int find_covered(const Drawn& drawn, std::uint32_t lanes, PacketMask packets,
+                        const Tile& tile, Pair* out) {
+  constexpr int kAtOnce = 64 / kTilePackets;  // triangles whose packets fit into a word
+  int count = 0;
+  while (lanes) {
+    std::uint64_t reach = 0;
+    std::uint8_t lane_of[kAtOnce];
+    for (int i = 0; i < kAtOnce && lanes; ++i, lanes &= lanes - 1) {
+      const int lane = lane_of[i] = static_cast<std::uint8_t>(__builtin_ctz(lanes));
+      const float window[4] = {drawn.window[0][lane], drawn.window[1][lane], drawn.window[2][lane],
+                               drawn.window[3][lane]};
+      // Triangles that coincide with earlier hits are in reach too; shows() decides.
+      const float nearest = drawn.nearest[lane] * (1 - 2 * kSame);
+      reach |= static_cast<std::uint64_t>(packets & packets_in_reach(window, nearest, tile))
+               << (i * kTilePackets);
+    }
+    for (; reach; reach &= reach - 1) {
+      const int bit = __builtin_ctzll(reach);
+      out[count] = {lane_of[bit / kTilePackets], static_cast<std::uint8_t>(bit % kTilePackets)};
+      count += covers(drawn, out[count], tile);
+    }
+  }
+  return count;
+}
+
 // Rasterises geom `index` into `packets` of the tile if that is cheaper than casting rays. Returns
 // false if it is not.
 inline bool rasterize(const View& view, int index, PacketMask packets, Tile& tile,
@@ -235,23 +282,16 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
   if (count < 0) return false;
   const float side = handedness(g);
   Drawn drawn;
+  Pair pairs[rays::kClusterSize * kTilePackets + 1];
   for (int i = 0; i < count; ++i) {
     const rays::TriangleBlock& block = clusters.blocks[blocks[i]];
     if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
-    for (std::uint32_t lanes = set_up(view, g, side, block, tile, drawn); lanes;
-         lanes &= lanes - 1) {
-      const int lane = __builtin_ctz(lanes);
-      const float window[4] = {drawn.window[0][lane], drawn.window[1][lane], drawn.window[2][lane],
-                               drawn.window[3][lane]};
-      // Triangles that coincide with earlier hits are in reach too; shows() decides.
-      const float nearest = drawn.nearest[lane] * (1 - 2 * kSame);
-      PacketMask over = packets & packets_in_reach(window, nearest, tile);
-      for (; over; over &= over - 1) {
-        const int q = __builtin_ctz(over);
-        if (draw(g, index, drawn, lane, block.face[lane], tile.shaded, tile.pixels[q],
-                 tile.hits[q]))
-          changed |= 1u << q;
-      }
+    const std::uint32_t lanes = set_up(view, g, side, block, tile, drawn);
+    const int covered = find_covered(drawn, lanes, packets, tile, pairs);
+    for (int k = 0; k < covered; ++k) {
+      const auto [lane, q] = pairs[k];
+      if (draw(g, index, drawn, lane, block.face[lane], tile.shaded, tile.pixels[q], tile.hits[q]))
+        changed |= 1u << q;
     }
   }
   return true;
