@@ -53,6 +53,7 @@ CASES = (
     ("door_opening", "mobile_franka", ""),
     *(("door_opening", robot, "room_with_door:*") for robot in ("rby1", "mobile_franka")),
     *((task, robot, "") for task in ("nav_to_obj", "multi_task") for robot in ("rby1", "mobile_franka")),
+    ("nav_and_pick", "mobile_franka", ""),
 )
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Doors and floors: every sensor of their tasks against MuJoCo's own numbers, in one world and in eight, and recordings of them."""
 
+import itertools
 import json
 
 import h5py
@@ -163,6 +164,20 @@ def test_any_of_several_tasks():
     env.close()
     with pytest.raises(KeyError, match="did you mean 'pick'"):
         mjs.make_vec("nav_to_obj+pik", "rby1", num_envs=1, cameras=[])
+
+
+def test_nav_and_pick_drives_and_then_picks(tmp_path):
+    made = mjs.record("nav_and_pick", out=tmp_path, first_attempt=1, num_attempts=1, worlds=1, cameras=[])
+    assert made.succeeded == 1, made.failures
+    (episode,) = mjs.Dataset(tmp_path).episodes
+    assert episode.settings["robot"] == "mobile_franka" and episode.task.endswith((" it", " it up", " it?", " it up?"))
+    numbers = episode.obs_scene["policy_phases"]
+    phases = episode["obs/extra/policy_phase"].ravel()
+    order = [int(number) for number, _ in itertools.groupby(phases)]
+    assert order[0] == numbers["navigate"] and order[-1] == numbers["lift"] and order.count(numbers["navigate"]) == 1
+    base = episode["obs/extra/robot_base_pose"]
+    driven = np.linalg.norm(base[phases == numbers["navigate"]][-1, :2] - base[0, :2])
+    assert driven > 1
 
 
 @pytest.mark.parametrize("name", ["nav_to_obj+pick", "open+pick"])

@@ -14,12 +14,17 @@
 #include "mjsense/policies/planner/manipulation_planner.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
+#include "mjsense/rollout/nav_and_pick_planner.h"
 
 namespace mjsense::rollout {
 namespace {
 
 std::unique_ptr<episode::PlannerPolicy> make_manipulation() {
   return std::make_unique<policies::ManipulationPlanner>();
+}
+
+std::unique_ptr<episode::PlannerPolicy> make_nav_and_pick() {
+  return std::make_unique<NavAndPickPlanner>();
 }
 
 struct Planners {
@@ -30,6 +35,7 @@ struct Planners {
       {"close", [] { return std::make_unique<policies::OpeningPlanner>(); }},
       {"door_open", [] { return std::make_unique<policies::DoorPlanner>(); }},
       {"nav_to_obj", [] { return std::make_unique<policies::NavPlanner>(); }},
+      {"nav_and_pick", make_nav_and_pick},
       {"pick_and_place", make_manipulation},
       {"pick_and_place_next_to", make_manipulation},
       {"pick_and_place_color", make_manipulation},
@@ -104,9 +110,10 @@ class TopDownPlanner final : public episode::PlannerPolicy {
   std::vector<char> uses_any_direction_;  // [B], 1: the episode uses any_direction_
 };
 
-// The first child of the task that a planner exists for. Tasks without such a child are returned
-// unchanged.
+// The task itself if it has a planner, or the first child that a planner exists for. Tasks without
+// such a child are returned unchanged.
 episode::Task& first_plannable(episode::Task& task) {
+  if (has_its_own(task)) return task;
   for (const auto& child : task.children()) {
     if (has_planner(*child)) return *child;
   }

@@ -60,6 +60,7 @@ std::unique_ptr<episode::Task> pick_and_place(episode::TaskCfg cfg) {
 }
 
 std::unique_ptr<episode::Task> any_of(std::string_view name, episode::TaskCfg cfg);
+std::unique_ptr<episode::Task> nav_and_pick(episode::TaskCfg cfg);
 
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
@@ -81,8 +82,17 @@ Registry<TaskFactory>& tasks() {
         [](episode::TaskCfg c) { return std::make_unique<tasks::DoorOpeningTask>(std::move(c)); }},
        {"nav_to_obj",
         [](episode::TaskCfg c) { return std::make_unique<tasks::NavToObjTask>(std::move(c)); }},
+       {"nav_and_pick", nav_and_pick},
        {"multi_task", [](episode::TaskCfg c) { return any_of("multi_task", std::move(c)); }}});
   return all;
+}
+
+std::unique_ptr<episode::Task> nav_and_pick(episode::TaskCfg cfg) {
+  if (cfg.scene.empty()) cfg.scene = default_scene("nav_and_pick");
+  std::vector<std::unique_ptr<episode::Task>> children;
+  for (const char* part : {"nav_to_obj", "pick"}) children.push_back(tasks().at(part)(cfg));
+  return std::make_unique<tasks::MultiTask>("nav_and_pick", std::move(cfg), std::move(children),
+                                            tasks::Combination::kNavAndPick);
 }
 
 // Combines several tasks in the scene of the first one.

@@ -19,6 +19,7 @@ constexpr Defaults kDefaults[] = {
     {"close", kUsualRobot, 200, 0, 0, 0},
     {"door_opening", "rby1", 400, 0, 0, 0},
     {"nav_to_obj", "rby1", 500, 200, 2, 2},
+    {"nav_and_pick", "mobile_franka", 1200, 0, 0, 0},  // of 66 ms: 79 s
 };
 // For the other tasks with a robot of such a long control period: 400 steps of 100 ms are 40 s.
 // TaskCfg's 500 steps of 66 ms are 33 s.
@@ -55,7 +56,8 @@ std::string_view default_scene(std::string_view task) {
       {"open", "kitchen"},
       {"close", "kitchen"},
       {"door_opening", "room_with_door"},
-      {"nav_to_obj", "floor"}};
+      {"nav_to_obj", "floor"},
+      {"nav_and_pick", "floor"}};
   const auto* found = std::ranges::find(kScenes, task, [](const auto& s) { return s.first; });
   return found == std::end(kScenes) ? "" : found->second;
 }

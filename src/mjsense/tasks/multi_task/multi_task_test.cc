@@ -193,6 +193,43 @@ TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
   EXPECT_GT(bodies.size(), 2u);
 }
 
+TEST(MultiTask, NavAndPickConcernsOneObjectAndSucceedsIfItIsPicked) {
+  episode::TaskCfg mobile = cfg("floor");
+  mobile.robot = robots::robot_cfg("mobile_franka");
+  std::vector<std::unique_ptr<episode::Task>> children;
+  children.push_back(std::make_unique<NavToObjTask>(mobile));
+  children.push_back(std::make_unique<PickTask>(mobile));
+  MultiTask task("nav_and_pick", mobile, std::move(children), Combination::kNavAndPick);
+  EXPECT_EQ(task.type(), "nav_and_pick");
+  scene::Scene scene(task.scene_cfg_with_robot());
+  const mjModel* model = scene.model();
+  task.initialize(model, 1);
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  const World w{.id = 0, .model = model, .data = data.get()};
+  std::set<int> bodies;
+  for (int episode = 0; episode < 4; ++episode) {
+    mj_resetData(model, data.get());
+    task.sample(0, episode, robots::state_row(data.get()));
+    mj_forward(model, data.get());
+    task.begin(w);
+    const int body = task.child(0).objects(0)[0].body;
+    bodies.insert(body);
+    ASSERT_EQ(task.objects(0).size(), 1u);
+    EXPECT_EQ(task.child(1).objects(0)[0].body, body);
+    EXPECT_THAT(task.description(0), HasSubstr(" and pick it up"));
+    EXPECT_THAT(task.instruction(0), HasSubstr(" it")) << task.instruction(0);
+
+    // Next to the object, which hangs in the air without a grasp.
+    const auto& nav = static_cast<const NavToObjTask&>(task.child(0));
+    data->qpos[model->jnt_qposadr[model->body_jntadr[body]] + 2] += 0.3;
+    mj_forward(model, data.get());
+    const double drive = nav.evaluate(w).reward;
+    EXPECT_NEAR(task.evaluate(w).reward, drive + 0.3, 1e-6);
+    EXPECT_FALSE(task.evaluate(w).success) << "the robot does not hold it";
+  }
+  EXPECT_GT(bodies.size(), 1u);
+}
+
 TEST(MultiTask, InvalidCombinationsThrow) {
   const auto message = [](std::vector<std::unique_ptr<episode::Task>> children) -> std::string {
     try {

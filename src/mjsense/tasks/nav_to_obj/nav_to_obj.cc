@@ -23,7 +23,6 @@ constexpr std::string_view kScene = "floor";
 constexpr const char* kCamera = "head_camera";
 constexpr int kPoints = 16;
 constexpr double kFarStart = 2.0;  // m, preferred minimum distance of the start from the target
-constexpr double kArrived = 1.35;  // m, a start is playable if a path ends this close to the target
 constexpr int kStarts = 30;        // maximum number of sampled base placements
 constexpr std::array<const char*, 13> kSentences{
     "Navigate to {}",     "Drive to {}",        "Go to {}",          "Move to {}",
@@ -110,6 +109,7 @@ std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const robots
   // Try further objects if the text of the first is not unique or the robot cannot get near it.
   for (int k = 0; k < n; ++k) {
     const int target = (first + k) % n;
+    if (graspable_ && scene().objects()[target].receptacle) continue;
     placed = scene().sample(world, target, cfg().seed, number, rng, state);
     set_target(world, target);
     if (!alone(world, target)) continue;
@@ -131,8 +131,8 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed,
     if (attempt < kStarts / 2 && distance(x, y) < kFarStart) continue;
     if (!routes_->free(from)) continue;
     const auto path = routes_->find(
-        from, [&](const scenes::BasePose& p) { return distance(p.x, p.y) < kArrived; },
-        [&](double px, double py) { return std::max(0.0, distance(px, py) - kArrived); });
+        from, [&](const scenes::BasePose& p) { return distance(p.x, p.y) < arrived_; },
+        [&](double px, double py) { return std::max(0.0, distance(px, py) - arrived_); });
     if (!path.empty()) return Pose{{x, y, placed.p.z}, axis_angle({0, 0, 1}, from.yaw)};
   }
   return {};

@@ -25,6 +25,12 @@ class NavToObjTask final : public scenes::ObjectTask {
   std::string_view name() const override { return "nav_to_obj"; }
   std::string_view type() const override { return "nav_to_obj"; }
 
+  // Selects only objects that can be picked up and to which a path leads that ends this close. [m]
+  void require_graspable_within(double distance) {
+    graspable_ = true;
+    arrived_ = distance;
+  }
+
   // Also rejects starts in which several objects have the target's text, or in which the target is
   // not visible from any base pose that the robot can drive to.
   std::string start_error(const World& world) const override;
@@ -63,6 +69,8 @@ class NavToObjTask final : public scenes::ObjectTask {
   std::optional<Pose> start_place(int world, const Pose& placed, const robots::StateRow& state,
                                   Rng& rng) const;
 
+  bool graspable_ = false;  // targets are objects that can be picked up
+  double arrived_ = 1.35;   // m, a start is playable if a path ends this close to the target
   LineOfSight line_of_sight_;
   std::vector<std::vector<Vec3>> points_;          // surface points of each object, body frame
   std::unique_ptr<scenes::BasePlanner> routes_;    // null if the base cannot drive

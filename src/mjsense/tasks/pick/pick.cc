@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/referring_expressions.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
@@ -70,6 +71,16 @@ void PickTask::choose_goal(int world, Rng& rng, const robots::StateRow& state) {
   const int target = scene().draw(world, here, robot(), rng);
   set_target(world, target);
   scene().set_target(world, target, state);
+}
+
+void PickTask::choose_object(int world, int body, const robots::StateRow& state) {
+  adopt_scene(world, state);
+  const auto found = std::ranges::find(things_, body, [this](int i) { return objects_[i].body; });
+  if (found == things_.end())
+    throw ValueError(fmt::format("{}: '{}' cannot be picked up", context(),
+                                 mjsense::scene::name_of(model(), mjOBJ_BODY, body)));
+  set_target(world, *found);
+  scene().set_target(world, *found, state);
 }
 
 void PickTask::set_target(int world, int target) {

@@ -22,6 +22,10 @@ class PickTask final : public scenes::ObjectTask, public episode::GraspScene {
   std::string_view name() const override { return "pick"; }
   std::string_view type() const override { return "pick"; }
 
+  // In a state that another task has sampled: makes this body the object of the episode. Throws
+  // ValueError if it cannot be picked up.
+  void choose_object(int world, int body, const robots::StateRow& state);
+
   // Reward: height above the start (m) while no other body supports the object.
   episode::Evaluation evaluate(const World& world) const override;
 
