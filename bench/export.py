@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Export to LeRobot; reading and writing: mjs.Dataset compared with LeRobot's loader, and the recorder's encoder with LeRobot's writer.
 
-    python bench/export.py [--width 640 --height 368] [--episodes 8] [--keep FOLDER] [--lerobot PYTHON]
+    python bench/export.py [--width 640 --height 368] [--episodes 8] [--keep FOLDER] [--lerobot PYTHON] [--only-export]
 
 A sample contains the state, the action and one frame of each of two cameras. Every case starts with empty caches. The two loaders run in
 turn, each in a process of its own; LeRobot's environment is the one that tests/python/test_lerobot.py makes. Rates are per second of wall
@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from mjsense.export import Source
@@ -23,6 +24,7 @@ from mjsense.export import Source
 import mjsense as mjs
 
 ROOT = Path(__file__).parents[1]
+REPEATS = 4  # of each episode in an export, whose beginning takes as long as 16 episodes
 STREAMS = ["obs/agent/qpos", "actions/joint_pos", "obs/sensor_data/*"]
 
 
@@ -39,17 +41,17 @@ def read(root: Path, order: str, seconds: float, cache_mb: float) -> None:
     print(n / (time.perf_counter() - begun), n / (time.process_time() - cpu))
 
 
-def export(root: Path, out: Path, frames: int) -> None:
+def export(root: Path, out: Path, frames: int | Literal["key"]) -> None:
     shutil.rmtree(out, ignore_errors=True)
     mjs.export_lerobot(root, out / "warm", episodes=[0])  # imports the libraries
     shutil.rmtree(out)
-    begun, cpu = time.perf_counter(), time.process_time()
-    mjs.export_lerobot(root, out, statistics_frames=frames)
-    wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
     dataset = mjs.Dataset(root)
+    begun, cpu = time.perf_counter(), time.process_time()
+    mjs.export_lerobot(root, out, statistics_frames=frames, episodes=[*range(len(dataset.episodes))] * REPEATS)
+    wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
     cameras = sum(stream.kind == "video" and len(stream.shape) == 3 for stream in dataset.streams.values())
-    images = len(dataset) * cameras
-    about = "all frames" if frames == 0 else f"{frames} frame per video"
+    images = len(dataset) * cameras * REPEATS
+    about = "key frames" if frames == "key" else "all frames"
     print(f"export, statistics of {about:20} {images / wall:9.0f} ({images / cpu:.0f}) frames/s")
 
 
@@ -90,6 +92,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=60, help="steps that are written")
     parser.add_argument("--keep", help="folder of the recording, which is used again if it exists")
     parser.add_argument("--lerobot", default=str(ROOT / "build/lerobot_0.4.4/bin/python"), help="Python of LeRobot's environment")
+    parser.add_argument("--only-export", action="store_true", help="measure the export only")
     parser.add_argument("--read", nargs=2, help=argparse.SUPPRESS)  # a process of one case
     args = parser.parse_args()
     if args.read:
@@ -99,8 +102,10 @@ def main() -> None:
         root, out = Path(args.keep or folder, "recording"), Path(args.keep or folder, "lerobot")
         if not list(root.glob("house_*/*.h5")):
             mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, worlds=2)
-        for frames in (1, 0):
+        for frames in ("key", 0):
             export(root, out, frames)
+        if args.only_export:
+            return
         loaders = {
             name: [sys.executable, __file__, "--seconds", str(args.seconds), "--cache-mb", str(cache_mb), "--read", str(root)]
             for name, cache_mb in (("mjs.Dataset", args.cache_mb), ("mjs.Dataset, small cache", 8))

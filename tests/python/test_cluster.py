@@ -17,7 +17,7 @@ import pytest
 pytest.importorskip("ray", reason="Ray is not installed")
 h5py = pytest.importorskip("h5py")
 
-from mjsense.cluster import Job, export_on_ray, exporting, record_on_ray, render_on_ray
+from mjsense.cluster import Job, export_on_ray, exporting, record_on_ray, render_on_ray, tasks
 from mjsense.cluster import driver as driver_module
 from mjsense.cluster.job import Shard, ShardResult
 
@@ -231,7 +231,19 @@ def test_user_code_and_errors(tmp_path):
     lock = threading.Lock()
     with pytest.raises(TypeError, match="record: policy cannot be sent to the workers"):
         record_on_ray(Job(str(tmp_path / "b"), {**ARGUMENTS, "policy": lambda obs: lock}), episodes=1)
+    with pytest.raises(mjs.UnknownNameError, match="unknown option 'horizn'; did you mean horizon"):
+        record_on_ray(Job(str(tmp_path / "b"), {**ARGUMENTS, "horizn": 3}), episodes=1)
     assert not Path(tmp_path / "b").exists()
+
+
+def test_local_starts_a_cluster_of_its_own(monkeypatch):
+    """Without an address, Ray would join a cluster that runs on this machine."""
+    given = {}
+    monkeypatch.setattr("ray.is_initialized", lambda: False)
+    monkeypatch.setattr("ray.init", lambda **options: given.update(options))
+    monkeypatch.setattr("ray.shutdown", lambda: None)
+    with tasks.cluster("local"):
+        assert given["address"] == "local"
 
 
 CRASH = """

@@ -38,9 +38,9 @@ def export_on_ray(
 ) -> Path:
     """Writes a recording in the format of another program, on Ray. The result is that of ``export_FORMAT``.
 
-    Of ``lerobot`` and ``lerobot21``, workers compute the statistics of images, which take most of the time, and the driver writes the
-    files. Of the other formats, workers decode and write parts with some episodes each in the folder ``OUT.parts``, and the driver joins
-    them without encoding the data again.
+    Of ``lerobot`` and ``lerobot21``, workers compute the statistics of images, which take most of the time if they use all frames, and the
+    driver writes the files. Of the other formats, workers decode and write parts with some episodes each in the folder ``OUT.parts``, and
+    the driver joins them without encoding the data again.
 
     Args:
         format: Name of the format.

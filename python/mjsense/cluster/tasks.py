@@ -97,7 +97,15 @@ class Tasks:
         try:
             result = self._ray.get(ref)
         except self._ray.exceptions.RayTaskError as error:
+            if isinstance(error.cause, self._ray.exceptions.RaySystemError):
+                reason = str(error.cause).splitlines()[0].removeprefix("System error: ")
+                raise RuntimeError(f"The workers cannot load the arguments of the task {self._function.__name__}: {reason}. Send its folder with "
+                                   "working_dir (--ray-working-dir), or install its package with pip (--ray-pip)") from None  # fmt: skip
             raise (error.cause if isinstance(error.cause, Exception) else error) from None
+        except self._ray.exceptions.RuntimeEnvSetupError as error:
+            lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+            reason = next((line for line in reversed(lines) if line.startswith("ERROR: ")), lines[-1])
+            raise RuntimeError(f"Ray cannot make the environment of the workers (runtime_env): {reason}") from None
         except self._lost as error:
             call.crashes += isinstance(error, self._crashed)
             self._start(call)
