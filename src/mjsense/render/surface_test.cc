@@ -262,6 +262,70 @@ TEST(Surface, OnlyTheTopOfABoxReflects) {
   expect_pixel(s.center({0, -3, 0.5}, {1, 0, 0}, {0, 0.7 / n, 2 / n}, 1), {0, 0, 51});  // the front
 }
 
+// A mirrored camera has a left-handed frame, in which the corners of triangles run the other way.
+TEST(Surface, AMirrorShowsTheFrontsOfAMesh) {
+  const auto shoot = [](const std::string& block) {
+    TestRenderer s(std::string(kDark) +
+                   R"(<asset><material name="mirror" rgba="0 0 0 1" reflectance="1"/>
+      <mesh name="block" vertex="-.3 -.2 -.1 .3 -.2 -.1 -.3 .2 -.1 .3 .2 -.1
+      -.3 -.2 .1 .3 -.2 .1 -.3 .2 .1 .3 .2 .1"/></asset><worldbody>
+      <light pos="1 -4 1" dir="-.2 1 -.1" type="directional" diffuse="1 1 1" ambient=".2 .2 .2"/>
+      <geom type="plane" size="5 5 1" material="mirror"/><geom pos="0 1 1" euler="20 30 10" )" +
+                   block + "/></worldbody>");
+    s.options.reflections = true;
+    const double h = std::sqrt(0.5);
+    return s.shoot({0, -1, 1}, {1, 0, 0}, {0, h, h}, 64, 30);  // down at 45 degrees
+  };
+  const auto box = shoot("type='box' size='.3 .2 .1'"), mesh = shoot("type='mesh' mesh='block'");
+  int shown = 0, different = 0;
+  for (std::size_t i = 0; i < box.size(); ++i) {
+    shown += box[i] > 0;
+    different += std::abs(box[i] - mesh[i]) > 2;
+  }
+  EXPECT_GT(shown, 1000);
+  EXPECT_LT(different, 30);  // edges that move by rounding
+}
+
+// As in OpenGL, multisampling changes edges only, also in a mirror: its texture is not averaged.
+TEST(Surface, MultisamplingChangesOnlyTheEdgesInAMirror) {
+  TestRenderer s(
+      std::string(kFlat) +
+      R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="0 0 0" rgb2="0 1 0" width="64" height="64"/>
+    <material name="mirror" texture="t" texrepeat="40 40" reflectance=".5"/></asset><worldbody>
+    <geom type="plane" size="5 5 1" material="mirror"/>
+    <geom type="box" size="2 .1 9" pos="2 3 0" rgba="1 0 0 1"/></worldbody>)");
+  s.options.reflections = true;
+  s.update();
+  ViewBuilder builder(s.model.get(), *s.assets, s.options);
+  const double h = std::sqrt(0.5);
+  PixelGrid grid = grid_from_fovy(64, 64, 30, false);
+  grid.left -= 4.25f * grid.dx;  // the wall's edge goes through column 35
+  const View& view = s.view(builder, {0, -1, 1}, {1, 0, 0}, {0, h, h}, grid);
+  const auto shoot = [&](bool multisampled) {
+    std::vector<std::uint8_t> rgb(3 * 64 * 64);
+    ImageTargets targets;
+    targets.rgb = rgb.data();
+    targets.samples = multisampled ? 4 : 1;
+    targets.multisampled = multisampled;
+    s.draw(view, targets);
+    return rgb;
+  };
+  const auto plain = shoot(false), smooth = shoot(true);
+  // The left half shows the checker, the right half also the red wall.
+  int softened = 0;
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const int at = 3 * (64 * y + x);
+      if (x == 35 || x == 36) {
+        softened += smooth[at] != plain[at];
+        continue;
+      }
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(smooth[at + c], plain[at + c]) << x << " " << y;
+    }
+  }
+  EXPECT_GT(softened, 0);
+}
+
 // The four rays of a pixel have four different heights, so an edge along the rows is softened too.
 TEST(Surface, SamplesSoftenEdgesInBothDirections) {
   TestRenderer s(std::string(kFlat) +

@@ -131,6 +131,21 @@ struct SampledPixels {
   }
 };
 
+// Sets the window of packet `q` to that of its lanes.
+inline void set_window(Tile& tile, int q) {
+  Pixels& p = tile.pixels[q];
+  const float* places[2] = {p.x, p.y};
+  for (int axis = 0; axis < 2; ++axis) {
+    Float low = splat(kInfinity), high = splat(-kInfinity);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      low = min(low, load(places[axis] + k));
+      high = max(high, load(places[axis] + k));
+    }
+    p.window[2 * axis] = tile.window[2 * axis][q] = lane_min(low);
+    p.window[2 * axis + 1] = tile.window[2 * axis + 1][q] = lane_max(high);
+  }
+}
+
 // Starts a tile whose lanes are the samples of the pixels.
 inline void start_samples(const View& view, const Tile& centers, const SampledPixels& pixels,
                           Tile& out) {
@@ -150,25 +165,17 @@ inline void start_samples(const View& view, const Tile& centers, const SampledPi
       fill(p.x + k, samples, from.x[pixels.lane[i]]);
       fill(p.y + k, samples, from.y[pixels.lane[i]]);
     }
-    Float low[2] = {splat(kInfinity), splat(kInfinity)};
-    Float high[2] = {splat(-kInfinity), splat(-kInfinity)};
     for (int k = 0; k < kLanes; k += kWidth) {
       const Float x = fma(load(shift_x + k), splat(view.grid.dx), load(p.x + k));
       const Float y = fma(load(shift_y + k), splat(view.grid.dy), load(p.y + k));
       store(p.x + k, x);
       store(p.y + k, y);
       store(p.near + k, splat(view.near));
-      low[0] = min(low[0], x);
-      high[0] = max(high[0], x);
-      low[1] = min(low[1], y);
-      high[1] = max(high[1], y);
     }
-    for (int axis = 0; axis < 2; ++axis) {
-      const float a = lane_min(low[axis]), b = lane_max(high[axis]);
-      p.window[2 * axis] = out.window[2 * axis][q] = a;
-      p.window[2 * axis + 1] = out.window[2 * axis + 1][q] = b;
-      out.around[2 * axis] = a < out.around[2 * axis] ? a : out.around[2 * axis];
-      out.around[2 * axis + 1] = b > out.around[2 * axis + 1] ? b : out.around[2 * axis + 1];
+    set_window(out, q);
+    for (int c = 0; c < 4; c += 2) {
+      out.around[c] = p.window[c] < out.around[c] ? p.window[c] : out.around[c];
+      out.around[c + 1] = p.window[c + 1] > out.around[c + 1] ? p.window[c + 1] : out.around[c + 1];
     }
     out.farthest[q] = far;
     clear(out.hits[q], far);
@@ -177,35 +184,61 @@ inline void start_samples(const View& view, const Tile& centers, const SampledPi
   out.depth = far;
 }
 
-// Lanes of packet `q` of the samples whose pixels have samples that do not see the surface of the
-// centre.
-inline std::uint32_t differing(const View& view, const Tile& centers, const SampledPixels& pixels,
-                               int q, const Hits& hits) {
-  alignas(64) int geom[kLanes];
-  alignas(64) float center[kLanes], nearness[kLanes];
-  const int samples = pixels.samples;
-  for (int k = 0; k < kLanes; k += samples) {
-    const int i = pixels.pixel(q, k);
-    const Hits& from = centers.hits[pixels.packet[i]];
-    fill(geom + k, samples, from.geom[pixels.lane[i]]);
-    fill(center + k, samples, from.t[pixels.lane[i]]);
-  }
-  std::uint32_t other = 0;
-  for (int k = 0; k < kLanes; k += kWidth) {
-    other |= bits(~(load(geom + k) == load(hits.geom + k))) << k;
-    store(center + k, splat(1.0f) / load(center + k));
-    store(nearness + k, splat(1.0f) / load(hits.t + k));
-  }
+// Copies lane `k` of a packet to lane `to_k` of another.
+inline void copy_lane(const Pixels& pixels, const Hits& hits, int k, Pixels& to, Hits& to_hits,
+                      int to_k) {
+  to.x[to_k] = pixels.x[k];
+  to.y[to_k] = pixels.y[k];
+  to_hits.t[to_k] = hits.t[k];
+  to_hits.id[to_k] = hits.id[k];
+  to_hits.geom[to_k] = hits.geom[k];
+  to_hits.prim[to_k] = hits.prim[k];
+  to_hits.u[to_k] = hits.u[k];
+  to_hits.v[to_k] = hits.v[k];
+  for (int c = 0; c < 3; ++c) to_hits.n[c][to_k] = hits.n[c][k];
+}
+
+// Removes the pixels all of whose samples see the surface of the centre, unless they are among the
+// lanes `always` of their packets, and moves the samples of the others to the first lanes.
+inline void keep_differing(const View& view, const Tile& centers, const std::uint32_t* always,
+                           SampledPixels& pixels, Tile& tile) {
+  const int samples = pixels.samples, packets = pixels.packets();
   const float maximum = kBend * view.grid.dx;
-  std::uint32_t lanes = 0;
-  for (int k = 0; k < kLanes; k += samples) {
-    const std::uint32_t mine = ((1u << samples) - 1) << k;
-    float mean = 0;
-    for (int i = k; i < k + samples; ++i) mean += nearness[i];
-    const float bend = mean / samples - center[k];
-    if (other & mine || (bend < 0 ? -bend : bend) > maximum * center[k]) lanes |= mine;
+  int kept = 0;  // pixels
+  for (int q = 0; q < packets; ++q) {
+    const Hits& hits = tile.hits[q];
+    alignas(64) float nearness[kLanes];
+    for (int k = 0; k < kLanes; k += kWidth) store(nearness + k, splat(1.0f) / load(hits.t + k));
+    for (int k = 0; k < kLanes; k += samples) {
+      const int i = q * (kLanes / samples) + k / samples;
+      if (i >= pixels.count) break;
+      const int packet = pixels.packet[i], lane = pixels.lane[i];
+      const int geom = centers.hits[packet].geom[lane];
+      const float center = 1 / centers.hits[packet].t[lane];
+      bool differs = always[packet] >> lane & 1u;
+      float mean = 0;
+      for (int j = k; j < k + samples; ++j) {
+        mean += nearness[j];
+        differs |= hits.geom[j] != geom;
+      }
+      const float bend = mean / samples - center;
+      if (!differs && (bend < 0 ? -bend : bend) <= maximum * center) continue;
+      for (int j = 0; j < samples; ++j) {
+        const int to = kept * samples + j;
+        copy_lane(tile.pixels[q], hits, k + j, tile.pixels[to / kLanes], tile.hits[to / kLanes],
+                  to % kLanes);
+      }
+      pixels.packet[kept] = packet;
+      pixels.lane[kept++] = lane;
+    }
   }
-  return lanes;
+  pixels.count = kept;
+  for (int k = kept * samples; k < pixels.packets() * kLanes; ++k) {
+    Hits& hits = tile.hits[k / kLanes];
+    hits.t[k % kLanes] = kInfinity;
+    hits.id[k % kLanes] = hits.geom[k % kLanes] = -1;
+  }
+  for (int q = 0; q < pixels.packets(); ++q) set_window(tile, q);
 }
 
 }  // namespace

@@ -154,40 +154,20 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
 // the surface of its centre keeps its colour, unless it is among the lanes `always` of its packet.
 inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
-                          const SampledPixels& pixels, const std::uint32_t* always,
-                          TileScratch& scratch, Tile& tile, Reflection& reflection,
-                          Colors* colors) {
+                          const std::uint32_t* always, SampledPixels& pixels, TileScratch& scratch,
+                          Tile& tile, Reflection& reflection, Colors* colors) {
   start_samples(view, centers, pixels, tile);
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  keep_differing(view, centers, always, pixels, tile);
+  if (!pixels.count) return;
   const int packets = pixels.packets(), samples = pixels.samples;
-  PacketMask shaded = 0;
-  std::uint32_t lanes[kTilePackets] = {};
-  for (int q = 0; q < packets; ++q) {
-    Hits& hits = tile.hits[q];
-    lanes[q] = differing(view, centers, pixels, q, hits);
-    for (int k = 0; k < kLanes; k += samples) {
-      const int pixel = pixels.pixel(q, k);
-      if (always[pixels.packet[pixel]] >> pixels.lane[pixel] & 1u)
-        lanes[q] |= ((1u << samples) - 1) << k;
-    }
-    if (lanes[q]) shaded |= 1u << q;
-    for (int k = 0; k < kLanes; k += kWidth) {
-      const Mask m = mask_of(lanes[q] >> k & kAllLanes);
-      store(hits.t + k, select(m, load(hits.t + k), splat(kInfinity)));
-      store(hits.geom + k, select(m, load(hits.geom + k), int_of(-1)));
-      store(hits.id + k, select(m, load(hits.id + k), int_of(-1)));
-    }
-  }
-  if (!shaded) return;
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
   if (view.reflection) trace_reflection(view, packets, tile, reflection);
-  for (; shaded; shaded &= shaded - 1) {
-    const int q = __builtin_ctz(shaded);
+  for (int q = 0; q < packets; ++q) {
     Colors sampled;
     shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, sampled);
     for (int k = 0; k < kLanes && q * kLanes + k < pixels.count * samples; k += samples) {
-      if (!(lanes[q] >> k & 1u)) continue;
       const int pixel = pixels.pixel(q, k);
       for (int c = 0; c < 3; ++c) {
         float sum = 0;
@@ -247,12 +227,12 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
       pixels.packet[pixels.count] = q;
       pixels.lane[pixels.count++] = __builtin_ctz(lanes);
       if (pixels.count < pixels.maximum()) continue;
-      shade_samples(view, lists, tile, pixels, always, scratch, sampled, reflection, colors);
+      shade_samples(view, lists, tile, always, pixels, scratch, sampled, reflection, colors);
       pixels.count = 0;
     }
   }
   if (pixels.count)
-    shade_samples(view, lists, tile, pixels, always, scratch, sampled, reflection, colors);
+    shade_samples(view, lists, tile, always, pixels, scratch, sampled, reflection, colors);
   for (int q = 0; q < packets; ++q)
     write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
 }
