@@ -412,7 +412,7 @@ def test_options_that_the_backend_lacks_are_errors():
 def test_ray_sensors_refuse_flexes():
     cloth = """
     <mujoco><worldbody><body name="trunk"><freejoint/><geom size=".1"/></body>
-      <flexcomp name="cloth" type="grid" dim="2" count="3 3 1" spacing=".1 .1 .1" mass="1" pos="0 0 1"/></worldbody></mujoco>"""
+      <flexcomp name="cloth" type="grid" dim="2" count="3 3 1" spacing=".1 .1 .1" mass="1" pos="0 0 1"><edge equality="true"/></flexcomp></worldbody></mujoco>"""
     scan = mjs.RayCastSensorCfg("scan", frame=mjs.ObjRef("body", "trunk"), pattern=mjs.GridPatternCfg())
     with pytest.raises(ValueError, match="sensor 'scan': a model with flexes is not available with backend='warp'"):
         mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=cloth, sensors=[scan])), 2, backend="warp", device="cpu")
