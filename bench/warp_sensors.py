@@ -76,6 +76,7 @@ def mjlab(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable
     from mjlab.sensor import CameraSensorCfg, GridPatternCfg, ObjRef, RayCastSensorCfg
     from mjlab.sim import Simulation, SimulationCfg
 
+    torch.set_num_threads(1)  # threads that wait for each other take long with arrays of this size
     trunk = ObjRef(type="body", name="trunk", entity="robot")
     configs = {
         "height scan": RayCastSensorCfg(

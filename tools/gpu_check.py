@@ -479,19 +479,25 @@ def speed(device: str, worlds: int, count: int = 20) -> list[str]:
         "| --- | --- | --- | --- |",
     ]
     reference, ours = pair(SceneOfCheck(plane), worlds, device)
-    for name, sim in {"cpu": reference, "warp": ours}.items():
+    for name, sim in {"cpu": reference, "warp": ours, "warp, with a recorder": ours}.items():
         sim.reset(key="init_state")
         sensors = [sensor for sensor in sim.scene.sensors.values() if sensor.cfg is not None]
-        for step in range(count + 3):
-            if step == 3:
-                began = time.perf_counter()
-            sim.step()
-            for sensor in sensors:
-                sensor.data
-            if step in (2, count + 2) and name == "warp":
-                wait(device)
-        rate = count * worlds / (time.perf_counter() - began)
-        lines.append(f"| {name} | {device if name == 'warp' else f'{sim.threads} threads'} | {worlds:,} | {rate:,.0f} |")
+        with tempfile.TemporaryDirectory() as folder:
+            recorder = mjs.Recorder(folder, sim, sensors) if name.endswith("recorder") else None
+            if recorder:
+                recorder.begin_episode(0, 0)
+            for step in range(count + 3):
+                if step == 3:
+                    began = time.perf_counter()
+                sim.step()
+                for sensor in sensors:
+                    sensor.data
+                if recorder:
+                    recorder.append()  # the rows of all worlds
+                if step in (2, count + 2) and sim is ours:
+                    wait(device)
+            rate = count * worlds / (time.perf_counter() - began)
+        lines.append(f"| {name} | {device if sim is ours else f'{sim.threads} threads'} | {worlds:,} | {rate:,.0f} |")
     return lines
 
 

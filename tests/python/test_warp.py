@@ -210,16 +210,19 @@ def test_code_of_the_pages():
     docs = Path(__file__).parents[2] / "docs"
 
     def blocks(page):
-        return "\n".join(re.findall(r"^```python\n(.*?)^```$", (docs / page).read_text(), re.MULTILINE | re.DOTALL))
+        return re.findall(r"^```python\n(.*?)^```$", (docs / page).read_text(), re.MULTILINE | re.DOTALL)
 
     page = {}
-    exec(blocks("warp.md"), page)
+    first, training = blocks("warp.md")
+    exec(first, page)
     assert host(page["scene"]["feet"].data.force).shape == (16, 4, 3)
     pytest.importorskip("torch")
+    exec(training, page)
+    assert page["reward"].shape == (16,)
     feet = []
     for backend in ("cpu", "warp"):
         names = {}
-        exec(blocks("mjlab.md").replace("model=scene.compile()", f"model=scene.compile(), backend='{backend}'"), names)
+        exec("\n".join(blocks("mjlab.md")).replace("model=scene.compile()", f"model=scene.compile(), backend='{backend}'"), names)
         feet.append(host(names["scene"]["height"].data))
     np.testing.assert_allclose(feet[1], feet[0], atol=1e-5)
 
@@ -304,6 +307,21 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
     for name, values in rows[0].items():
         if getattr(values, "dtype", np.dtype(bool)).kind == "f":
             np.testing.assert_allclose(values, rows[1][name], atol=1e-2, err_msg=name)
+
+
+@needs_warp
+def test_a_recorder_copies_the_rows_to_the_host_at_once(monkeypatch):
+    import warp
+
+    sim = simulation(touch(), Height())
+    rows = sim._host_rows([sim.scene[name] for name in ("touch", "gyro", "height")])
+    copied, read = [], []
+    copy, numpy = warp.copy, warp.array.numpy
+    monkeypatch.setattr(warp, "copy", lambda target, *options: (copied.append(target), copy(target, *options))[1])
+    monkeypatch.setattr(warp.array, "numpy", lambda array: (read.append(array), numpy(array))[1])
+    rows.read()
+    assert len(rows.handles) > 3 and sum(target is rows._host for target in copied) == 1
+    assert read == [rows._host]
 
 
 @needs_warp

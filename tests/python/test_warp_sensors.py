@@ -409,6 +409,18 @@ def test_options_that_the_backend_lacks_are_errors():
             simulations("primitives", cfg)
 
 
+def test_ray_sensors_refuse_flexes():
+    cloth = """
+    <mujoco><worldbody><body name="trunk"><freejoint/><geom size=".1"/></body>
+      <flexcomp name="cloth" type="grid" dim="2" count="3 3 1" spacing=".1 .1 .1" mass="1" pos="0 0 1"><edge equality="true"/></flexcomp></worldbody></mujoco>"""
+    scan = mjs.RayCastSensorCfg("scan", frame=mjs.ObjRef("body", "trunk"), pattern=mjs.GridPatternCfg())
+    with pytest.raises(ValueError, match="sensor 'scan': a model with flexes is not available with backend='warp'"):
+        mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=cloth, sensors=[scan])), 2, backend="warp", device="cpu")
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=cloth)), 2, backend="warp", device="cpu")
+    sim.step()  # the physics has them
+    assert sim.qpos[0, 9] < 0
+
+
 def test_a_camera_refuses_other_fields_of_view():
     _, warp = simulations(
         "primitives", mjs.CameraSensorCfg("x", parent_body="robot/trunk", width=8, height=8, data_types=("depth",))
