@@ -48,8 +48,8 @@ environment() { # PYTHON NAME
     "") tests+=(tests/python/test_rl.py) ;;
   esac
   check "$what: tests" "$venv/bin/python" -m pytest -q -p no:cacheprovider "${tests[@]}"
-  # Images against this version's OpenGL renderer.
-  [ -z "$mujoco" ] || check "$what: images" "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_renderer.py -k look_as_in_opengl
+  # Images against this version's OpenGL renderer, and in the subprocesses of Gymnasium, Stable-Baselines3 and PyTorch where they are installed.
+  [ -z "$mujoco" ] || check "$what: images" "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_renderer.py -k "look_as_in_opengl or processes or workers"
 }
 
 for each in "${pythons[@]}"; do

@@ -28,6 +28,7 @@ ENVIRONMENTS: dict[str, list[str]] = {
     "gymnasium-robotics": ["gymnasium-robotics>=1.4", "mujoco==3.8.*"],
     "viewers": ["rerun-sdk>=0.22", "viser>=0.2"],
     "trainers": ["rsl-rl-lib", "stable-baselines3"],
+    "trainers of pixels": ["stable-baselines3", "gymnasium[mujoco]", "dm_control", "robosuite", "mujoco==3.8.*"],
 }
 """Name -> requirements in addition to those of mjsense."""
 

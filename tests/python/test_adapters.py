@@ -2,7 +2,7 @@
 """mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
 The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
-another robosuite, and build/warp. MJSENSE_TEST_ADAPTERS=adapters,libero,warp makes them.
+another robosuite, build/mjlab and build/warp. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp makes them.
 """
 
 import os
@@ -39,6 +39,7 @@ PACKAGES = {
         "nanobind-backend>=1.0",
         "PyOpenGL",
     ),
+    "mjlab": ("mjlab==1.6.0", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
     "warp": ("mujoco==4.0.0", "mujoco-warp==4.0.0", "gymnasium==1.4.0", "nanobind-backend>=1.0"),
 }
 """Name -> packages of the environments."""
@@ -123,6 +124,10 @@ for data, qpos, image in zip(datas, worlds.qpos.numpy(), images, strict=True):
 assert worlds.qpos.numpy().ctypes.data == worlds.qpos.ptr
 """
     run(environment("warp"), "-c", block + check)
+
+
+def test_code_of_the_page_on_mjlab_gives_the_same_with_mjlab_itself(environment):
+    run(environment("mjlab"), Path(__file__).parent / "adapters/mjlab_page.py", ROOT / "docs/mjlab.md")
 
 
 def test_every_page_is_tested():

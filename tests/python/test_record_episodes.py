@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+from mjsense.export.mapping import Source
 
 import mjsense as mjs
 
@@ -100,6 +101,21 @@ def test_a_single_environment(tmp_path):
     row = data[7]  # the third of the second episode
     assert row["obs/extra/info/distance"] == 1.0 and row["obs/extra/info/deep/flag"] and row["obs/extra/info/word"] == "go"
     assert abs(int(episode.video("view")[3].mean()) - 30) <= 2
+
+
+def test_an_export_has_the_observation_without_images_and_the_action(tmp_path):
+    with mjs.RecordEpisodes(Counter(), tmp_path, episodes=1) as env:
+        env.action_space.seed(0)
+        env.reset(seed=0)
+        actions = [env.action_space.sample() for _ in range(4)]
+        for action in actions:
+            env.step(action)
+    source = Source(tmp_path)
+    rows = source.rows(source.episodes[0])
+    assert {name.removeprefix("obs/extra/observation/") for name in source.features["state"].streams} == {"count", "pair/0", "pair/1", "inner/state"}
+    count = source.features["state"].parts["count"]
+    np.testing.assert_array_equal(rows["state"][:, count].ravel(), range(5))
+    np.testing.assert_array_equal(rows["action"], actions)
 
 
 def test_infos_that_cannot_be_stored_are_named_once(tmp_path):

@@ -377,6 +377,26 @@ def test_processes():
         np.testing.assert_array_equal(pool.apply(child_image), expected)
 
 
+class Images:
+    """A data set whose workers draw its images."""
+
+    def __len__(self):
+        return 4
+
+    def __getitem__(self, index):
+        return child_image()
+
+
+@pytest.mark.parametrize("context", ["fork", "spawn"])
+def test_dataloader_workers(context):
+    data = pytest.importorskip("torch.utils.data")
+    expected = child_image()
+    loader = data.DataLoader(Images(), batch_size=2, num_workers=2, multiprocessing_context=context)
+    for batch in loader:
+        for image in batch.numpy():
+            np.testing.assert_array_equal(image, expected)
+
+
 def test_images_of_another_size_are_those_of_a_renderer_of_that_size():
     model, data = load(SHAPES, 20)
     with mjs.Renderer(model, 60, 80) as renderer, mjs.Renderer(model, 33, 47) as other:
@@ -601,6 +621,22 @@ def test_gymnasium_subprocesses(context):
     env.reset(seed=3)
     np.testing.assert_array_equal(images[0], env.render())
     assert images[1].shape == (32, 32, 3)
+
+
+@pytest.mark.parametrize("context", ["fork", "spawn"])
+def test_stable_baselines3_subprocesses(context):
+    pytest.importorskip("glfw")
+    vector = pytest.importorskip("stable_baselines3.common.vec_env")
+    envs = vector.SubprocVecEnv([cheetah, cheetah], start_method=context)
+    try:
+        envs.seed(3)
+        envs.reset()
+        images = envs.get_images()
+    finally:
+        envs.close()
+    env = cheetah()
+    env.reset(seed=3)
+    np.testing.assert_array_equal(images[0], env.render())
 
 
 def test_gymnasium_environments_without_mujoco_are_refused():

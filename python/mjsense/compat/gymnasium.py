@@ -14,7 +14,12 @@ from __future__ import annotations
 from typing import Any
 
 import mujoco
-from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer
+
+try:
+    from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer
+except ModuleNotFoundError as error:
+    message = f"Gymnasium's MuJoCo environments need {error.name}: pip install 'gymnasium[mujoco]' ({error})"
+    raise ModuleNotFoundError(message, name=error.name) from error
 
 from mjsense.compat._opengl import depth_buffer
 from mjsense.renderer import Renderer, camera_of_name

@@ -29,10 +29,12 @@ class Mapping:
     """Streams of a recording by feature. A name stands for a stream or for a group of streams, in the order of their names; the
     numbers of all streams of a feature are concatenated."""
 
-    state: tuple[str, ...] = ("obs/agent/qpos",)
-    """Streams of the robot's state."""
+    state: tuple[str, ...] | None = None
+    """Streams of the robot's state; None: ``obs/agent/qpos``, and in recordings of :class:`mjsense.RecordEpisodes` the observation without
+    its images."""
     action: tuple[str, ...] | None = None
-    """Streams of the action; None: ``actions/joint_pos``, and ``actions/commanded_action`` of move groups without joint targets."""
+    """Streams of the action; None: ``actions/joint_pos``, and ``actions/commanded_action`` of move groups without joint targets; in
+    recordings of :class:`mjsense.RecordEpisodes` ``actions/action``."""
     cameras: dict[str, str] | None = None
     """Cameras by exported name; None: all colour cameras with their own names."""
     features: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -137,7 +139,9 @@ class Source:
         self.robot: str = str(self.episodes[0].settings.get("robot", ""))
         """Name of the robot; empty if the recording does not state it."""
         known = dict(chosen.streams)
-        wanted = {"state": mapping.state, "action": _default_action(known) if mapping.action is None else mapping.action, **mapping.features, **_FLAGS}
+        state = _default_state(known) if mapping.state is None else mapping.state
+        action = _default_action(known) if mapping.action is None else mapping.action
+        wanted = {"state": state, "action": action, **mapping.features, **_FLAGS}
         self.features: dict[str, Feature] = {name: _feature(chosen, name, streams, known) for name, streams in wanted.items()}
         """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features."""
         self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
@@ -216,7 +220,16 @@ def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[s
     return Feature(name, np.result_type(*(known[s].dtype for s in found)), tuple(names), parts, tuple(found), of_step.pop())
 
 
+def _default_state(known: dict[str, Stream]) -> tuple[str, ...]:
+    if any(name.startswith("obs/agent/qpos") for name in known):
+        return ("obs/agent/qpos",)
+    observed = [name for name in known if f"{name}/".startswith("obs/extra/observation/") and len(known[name].shape) < 2]
+    return tuple(observed) or ("obs/agent/qpos",)
+
+
 def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:
+    if any(f"{name}/".startswith("actions/action/") for name in known):
+        return ("actions/action",)
     commands = "actions/commanded_action/"
     groups = {name[len(commands) :] for name in known if name.startswith(commands) and "/given/" not in name} - {"success"}
     return "actions/joint_pos", *(commands + group for group in sorted(groups) if _JOINTS + group not in known)

@@ -13,6 +13,7 @@ from mjsense import configs
 from mjsense.compat.mjlab._data import Data
 from mjsense.compat.mjlab._tensors import ids
 from mjsense.compat.mjlab.scene import scene_of
+from mjsense.compat.mjlab.sensor.sensor_context import SensorContext
 
 
 @dataclass
@@ -81,6 +82,11 @@ class Simulation:
         return self.scene.native.model  # the object by which scene_of() knows the scene
 
     @property
+    def model(self) -> Any:
+        """The model of the worlds: mujoco_warp's with ``backend="warp"``, otherwise ``mj_model``."""
+        return getattr(self.native, "warp_model", self.mj_model)
+
+    @property
     def data(self) -> Data:
         """Fields of mjData as tensors."""
         return self._data
@@ -92,6 +98,9 @@ class Simulation:
     def forward(self) -> None:
         """Computes the derived quantities of the current state."""
         self.native.forward()
+
+    def set_sensor_context(self, ctx: SensorContext) -> None:
+        """Has no effect: the sensors know the worlds."""
 
     def sense(self) -> None:
         """Has no effect: cameras and rays are computed from the current state when they are read."""
