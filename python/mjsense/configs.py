@@ -310,6 +310,9 @@ class CameraSensorCfg(SensorCfg):
     """Draw the textures of materials and the skybox."""
     use_shadows: bool = False
     """Draw the shadows of lights that cast shadows."""
+    shadow_samples: int = 1
+    """Soft shadows: number of points of a light with a position at which its shadows are computed, within the ball of
+    the model's ``light_bulbradius``. 1: hard shadows. A view has at most 32 lights and points."""
     enabled_geom_groups: Sequence[int] = (0, 1, 2)
     """Geom groups (0 to 5) that are visible."""
     orthographic: bool = False

@@ -37,6 +37,7 @@ def record(
     segmentation: bool = False,
     samples: int = 1,
     shadows: bool = True,
+    shadow_samples: int = 1,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
     policy_dt_ms: int | None = None,
@@ -101,6 +102,8 @@ def record(
         segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
         samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
         shadows: Draw shadows.
+        shadow_samples: Points of each lamp at which shadows are computed; more than 1 gives soft shadows and takes
+            longer.
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.

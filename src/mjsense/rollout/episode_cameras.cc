@@ -117,6 +117,7 @@ sensors::CameraSensorCfg camera_sensor_cfg(const cameras::CameraSystem& system, 
   out.data_types = {"rgb", "segmentation"};
   if (recorded.depth) out.data_types.push_back("depth");
   out.use_shadows = cfg.shadows;
+  out.shadow_samples = cfg.shadow_samples;
   out.samples = cfg.samples;
   return out;
 }
@@ -128,6 +129,7 @@ sensors::CameraSensorCfg default_view(const episode::Task& task, const RolloutCf
   out.width = cfg.width.value_or(robot.image_width);
   out.height = cfg.height.value_or(robot.image_height);
   out.use_shadows = cfg.shadows;
+  out.shadow_samples = cfg.shadow_samples;
   out.samples = cfg.samples;
   if (robot.name.empty()) return out;
   // m, in the robot's base frame: x forward, z up.

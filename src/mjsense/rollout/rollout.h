@@ -71,6 +71,7 @@ struct RolloutCfg {
   bool segmentation = false;
   int samples = 1;
   bool shadows = true;
+  int shadow_samples = 1;
   std::string meshes = "auto";  // one of kMeshes
   std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
@@ -148,6 +149,11 @@ void visit_fields(V& v, RolloutCfg& c) {
       .at_least(1)
       .decides_data();
   v("shadows", c.shadows, "Draw shadows.").decides_data();
+  v("shadow_samples", c.shadow_samples,
+    "Points of each lamp at which shadows are computed; more than 1 gives soft shadows and takes "
+    "longer.")
+      .within(1, 16)
+      .decides_data();
   v("meshes", c.meshes,
     "Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: "
     "the meshes if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their "

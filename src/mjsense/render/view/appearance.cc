@@ -29,7 +29,8 @@ Appearance::Appearance(const mjModel* m, int max_lights)
       rgba_(4 * (m->ngeom + flex_parts_.size() + m->nskin)),
       materials_(m->nmat),
       lights_(max_lights),
-      light_ids_(max_lights) {
+      light_ids_(max_lights),
+      light_radii_(max_lights) {
   copy(m);
 }
 
@@ -65,6 +66,7 @@ void Appearance::copy_lights(const mjModel* m) {
   const auto add = [&](int id, const float* ambient, const float* diffuse,
                        const float* specular) -> ViewLight& {
     light_ids_[num_lights_] = id;
+    light_radii_[num_lights_] = id < 0 ? 0 : m->light_bulbradius[id];
     ViewLight& light = lights_[num_lights_++];
     light = {};
     std::copy_n(ambient, 3, light.ambient);

@@ -42,7 +42,8 @@ class Appearance {
   const Sky& sky() const { return sky_; }
   // Active lights, without poses.
   std::span<const ViewLight> lights() const { return {lights_.data(), num_lights_}; }
-  std::span<const int> light_ids() const { return light_ids_; }  // -1: the headlight
+  std::span<const int> light_ids() const { return light_ids_; }        // -1: the headlight
+  std::span<const float> light_radii() const { return light_radii_; }  // m
 
  private:
   void copy_lights(const mjModel* model);
@@ -54,6 +55,7 @@ class Appearance {
   Sky sky_;
   std::vector<ViewLight> lights_;
   std::vector<int> light_ids_;
+  std::vector<float> light_radii_;
   std::size_t num_lights_ = 0;
 };
 

@@ -9,6 +9,7 @@
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/render/view/appearance.h"
 #include "mjsense/render/view/frustum.h"
+#include "mjsense/render/view/soft_lights.h"
 
 namespace mjsense::render {
 namespace {
@@ -80,7 +81,8 @@ double longest_shadow(const rays::RayWorld& world, const Extent& extent,
 
 }  // namespace
 
-void reach_lights(const rays::RayWorld& world, const Appearance& appearance, Frustum& frustum) {
+void reach_lights(const rays::RayWorld& world, const Appearance& appearance, int samples,
+                  Frustum& frustum) {
   const Extent extent = extent_of(world.boxes());
   if (!(extent.low[0] <= extent.high[0])) return;  // only planes
   bool any = false;
@@ -91,7 +93,12 @@ void reach_lights(const rays::RayWorld& world, const Appearance& appearance, Fru
     any = true;
     const rays::RayLight& source = world.lights()[id];
     if (light.kind != LightKind::kDirectional) {
-      frustum.reach(source.pos);
+      const int count = light_samples(appearance, i, samples);
+      for (int k = 0; k < count; ++k) {
+        double from[3] = {source.pos[0], source.pos[1], source.pos[2]};
+        if (count > 1) sample_position(source.pos, appearance.light_radii()[i], k, count, from);
+        frustum.reach(from);
+      }
       continue;
     }
     const double length = std::sqrt(dot(source.dir, source.dir));

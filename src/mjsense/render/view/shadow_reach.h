@@ -14,6 +14,8 @@ class Frustum;
 
 // Extends the frustum until everything that may cast a shadow into it is inside. The world must
 // have no skins, because their bounding boxes are not stored.
-void reach_lights(const rays::RayWorld& world, const Appearance& appearance, Frustum& frustum);
+// `samples`: ViewOptions::shadow_samples.
+void reach_lights(const rays::RayWorld& world, const Appearance& appearance, int samples,
+                  Frustum& frustum);
 
 }  // namespace mjsense::render

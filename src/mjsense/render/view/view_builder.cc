@@ -14,6 +14,7 @@
 #include "mjsense/render/view/frustum.h"
 #include "mjsense/render/view/image_window.h"
 #include "mjsense/render/view/shadow_reach.h"
+#include "mjsense/render/view/soft_lights.h"
 
 namespace mjsense::render {
 namespace {
@@ -68,7 +69,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
       options_(options),
       unsorted_(max_geoms(model) + options.markers),
       sorted_(unsorted_.size()),
-      light_space_(options.shadows ? model->nlight : 0, unsorted_.size()),
+      light_space_(options.shadows ? options.shadow_samples * model->nlight : 0, unsorted_.size()),
       soft_surfaces_(assets.num_flex_parts() + model->nskin) {
   order_.reserve(unsorted_.size());
   candidates_.resize((static_cast<std::size_t>(model->ngeom + model->nflex) + 63) / 64);
@@ -164,7 +165,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
     for (int i = 0; i < id; ++i) add_geom(i);
   } else {
     Frustum frustum(grid, position, rotation);
-    if (options_.shadows) reach_lights(world, appearance, frustum);
+    if (options_.shadows) reach_lights(world, appearance, options_.shadow_samples, frustum);
     find_candidates(world.boxes(), frustum, candidates_);
     for (std::size_t word = 0; word < candidates_.size(); ++word) {
       for (std::uint64_t bits = candidates_[word]; bits != 0; bits &= bits - 1) {
@@ -469,21 +470,30 @@ void ViewBuilder::set_sky(const rays::RayGeom* plane, const Sky& sky, const doub
 
 void ViewBuilder::set_lights(const rays::RayWorld& world, const Appearance& appearance,
                              const double position[3], const double rotation[9]) {
-  view_.num_lights = static_cast<int>(appearance.lights().size());
+  view_.num_lights = 0;
   // As in MuJoCo, so that the image is not black.
-  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;
-  for (int i = 0; i < view_.num_lights; ++i) {
-    ViewLight& light = view_.lights[i];
-    light = appearance.lights()[i];
+  view_.global_ambient = appearance.lights().empty() ? 0.3f : 0.0f;
+  for (std::size_t i = 0; i < appearance.lights().size(); ++i) {
+    ViewLight light = appearance.lights()[i];
     const int id = appearance.light_ids()[i];
     if (id < 0) {  // the headlight shines in the camera's viewing direction
       double d[3] = {0, 0, -1};
       if (!own_headlight_) rotate_back(rotation, headlight_, d);
       for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(d[k]);
+      view_.lights[view_.num_lights++] = light;
       continue;
     }
     const rays::RayLight& source = world.lights()[id];
-    place_light(source.pos, source.dir, position, rotation, light);
+    const int count = light_samples(appearance, i, options_.shadow_samples);
+    for (float* rgb : {light.ambient, light.diffuse, light.specular}) {
+      for (int k = 0; k < 3 && count > 1; ++k) rgb[k] /= static_cast<float>(count);
+    }
+    for (int k = 0; k < count; ++k) {
+      double from[3] = {source.pos[0], source.pos[1], source.pos[2]};
+      if (count > 1) sample_position(source.pos, appearance.light_radii()[i], k, count, from);
+      place_light(from, source.dir, position, rotation, light);
+      view_.lights[view_.num_lights++] = light;
+    }
   }
 }
 

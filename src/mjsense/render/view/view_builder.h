@@ -27,6 +27,7 @@ struct ViewOptions {
   unsigned groups = 0x7;  // bit g: geoms of group g
   bool textures = true;
   bool shadows = false;
+  int shadow_samples = 1;  // lights that are drawn for a light with a radius
   bool reflections = false;
   bool layered = false;  // View::layered
   float near = 0, far = 0;

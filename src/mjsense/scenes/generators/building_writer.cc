@@ -41,12 +41,13 @@ void BuildingWriter::capsule(Vec3 from, Vec3 to, double radius, std::string_view
 }
 
 void BuildingWriter::lamp(std::string_view name, Vec3 at, double brightness, double reach) {
-  text_.add(fmt::format(
-      "<light name=\"{}\" type=\"spot\" cutoff=\"88\" exponent=\"1\" pos=\"{:.4g} {:.4g} {:.4g}\" "
-      "dir=\"0 0 -1\" diffuse=\"{:.4g} {:.4g} {:.4g}\" specular=\"0.15 0.15 0.15\" "
-      "attenuation=\"1 0 {:.4g}\" castshadow=\"true\"/>",
-      name, at.x, at.y, at.z, brightness, 0.97 * brightness, 0.91 * brightness,
-      1 / (reach * reach)));
+  text_.add(
+      fmt::format("<light name=\"{}\" type=\"spot\" bulbradius=\"0.12\" cutoff=\"88\" "
+                  "exponent=\"1\" pos=\"{:.4g} {:.4g} {:.4g}\" "
+                  "dir=\"0 0 -1\" diffuse=\"{:.4g} {:.4g} {:.4g}\" specular=\"0.15 0.15 0.15\" "
+                  "attenuation=\"1 0 {:.4g}\" castshadow=\"true\"/>",
+                  name, at.x, at.y, at.z, brightness, 0.97 * brightness, 0.91 * brightness,
+                  1 / (reach * reach)));
 }
 
 BuildingWriter::Local::Local(BuildingWriter& building, std::string_view name, Vec3 at, double yaw)

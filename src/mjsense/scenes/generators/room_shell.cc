@@ -68,12 +68,14 @@ void write_shell(RoomWriter& room, const ShellCfg& s) {
   room.box("", "lamp_glass", {x, y, s.height - 0.02}, {0.22, 0.22, 0.02},
            "contype=\"0\" conaffinity=\"0\"");
   room.add(
-      fmt::format("<light name=\"lamp\" type=\"point\" pos=\"{} {} {}\" diffuse=\"0.52 0.50 "
+      fmt::format("<light name=\"lamp\" type=\"point\" bulbradius=\"0.12\" pos=\"{} {} {}\" "
+                  "diffuse=\"0.52 0.50 "
                   "0.47\" specular=\"0.25 0.25 0.25\" attenuation=\"1 0 0\" castshadow=\"true\"/>",
                   x, y, s.height - 0.16));
   const double window = s.window_wide > 0 ? s.window_x : x;
   room.add(
-      fmt::format("<light name=\"daylight\" type=\"point\" pos=\"{} {} {}\" diffuse=\"0.30 0.32 "
+      fmt::format("<light name=\"daylight\" type=\"point\" bulbradius=\"0.35\" pos=\"{} {} {}\" "
+                  "diffuse=\"0.30 0.32 "
                   "0.35\" specular=\"0.1 0.1 0.1\" attenuation=\"1 0 0\" castshadow=\"true\"/>",
                   window, s.y1 - 0.5, s.sill + 0.8 * s.window_high));
   write_bounce_light(room);

@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/files/png.h"
@@ -60,7 +64,7 @@ double grain(double u, double v, std::uint32_t seed) {
 }
 
 template <class F>
-std::string picture(int size, F colour_at) {
+std::string draw_picture(int size, F colour_at) {
   std::vector<std::uint8_t> pixels(3 * static_cast<std::size_t>(size) * size);
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
@@ -73,6 +77,34 @@ std::string picture(int size, F colour_at) {
   }
   const std::vector<std::uint8_t> png = encode_png(pixels, size, size, 3, kFast);
   return {png.begin(), png.end()};
+}
+
+// Keeps the files of the last houses, because a program often makes the same scene many times.
+// `key` must determine the pixels.
+template <class F>
+std::string picture(std::string key, int size, F colour_at) {
+  static std::mutex mutex;
+  static std::map<std::string, std::string> kept;
+  constexpr std::size_t kKept = 128;
+  {
+    const std::lock_guard lock(mutex);
+    if (const auto found = kept.find(key); found != kept.end()) return found->second;
+  }
+  std::string png = draw_picture(size, colour_at);
+  const std::lock_guard lock(mutex);
+  if (kept.size() >= kKept) kept.clear();
+  return kept[std::move(key)] = std::move(png);
+}
+
+// The arguments of a function as a key.
+template <class... Args>
+std::string key_of(std::string_view function, const Args&... args) {
+  std::string key(function);
+  const auto add = [&](const auto& value) {
+    key.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  (add(args), ...);
+  return key;
 }
 
 }  // namespace
@@ -89,12 +121,13 @@ Colour brighter(Colour c, double factor) {
 }
 
 std::string wood_png(Colour colour, std::uint32_t seed, int size) {
-  return picture(
-      size, [&](double u, double v) { return brighter(colour, 1 + 0.16 * grain(u, v, seed)); });
+  return picture(key_of("wood_png", colour, seed, size), size, [&](double u, double v) {
+    return brighter(colour, 1 + 0.16 * grain(u, v, seed));
+  });
 }
 
 std::string boards_png(Colour colour, int boards, std::uint32_t seed, int size) {
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("boards_png", colour, boards, seed, size), size, [&](double u, double v) {
     const int row = std::min(boards - 1, static_cast<int>(v * boards));
     const double side = std::min(v * boards - row, row + 1 - v * boards) / boards;
     const double tone = 0.90 + 0.2 * cell(row, 1, seed);
@@ -106,7 +139,7 @@ std::string boards_png(Colour colour, int boards, std::uint32_t seed, int size) 
 }
 
 std::string planks_png(Colour colour, int boards, std::uint32_t seed, int size) {
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("planks_png", colour, boards, seed, size), size, [&](double u, double v) {
     const int row = std::min(boards - 1, static_cast<int>(v * boards));
     // Two boards per row, whose ends are shifted by a different amount in each row.
     double along = u + cell(row, 0, seed);
@@ -123,25 +156,26 @@ std::string planks_png(Colour colour, int boards, std::uint32_t seed, int size) 
 
 std::string tiles_png(Colour colour, Colour joint, int count, bool bricks, std::uint32_t seed,
                       int size) {
-  return picture(size, [&](double u, double v) {
-    const int rows = bricks ? 2 * count : count;
-    const int row = std::min(rows - 1, static_cast<int>(v * rows));
-    double x = u * count + (bricks && row % 2 == 1 ? 0.5 : 0.0);
-    const int column = static_cast<int>(x) % count;
-    x -= std::floor(x);
-    const double y = v * rows - row;
-    const double wide = 1.0 / count, high = 1.0 / rows;
-    const double edge = std::min(std::min(x, 1 - x) * wide, std::min(y, 1 - y) * high);
-    const double width = 0.012 / std::sqrt(static_cast<double>(count));
-    const double rough = cloud(u, v, 24, 24, 3, seed) - 0.5;
-    if (edge < width) return brighter(joint, 1 + 0.15 * rough);
-    const double tone = 0.94 + 0.10 * cell(column, row, seed + 1) + 0.06 * rough;
-    return brighter(colour, edge < 1.8 * width ? 0.9 * tone : tone);
-  });
+  return picture(
+      key_of("tiles_png", colour, joint, count, bricks, seed, size), size, [&](double u, double v) {
+        const int rows = bricks ? 2 * count : count;
+        const int row = std::min(rows - 1, static_cast<int>(v * rows));
+        double x = u * count + (bricks && row % 2 == 1 ? 0.5 : 0.0);
+        const int column = static_cast<int>(x) % count;
+        x -= std::floor(x);
+        const double y = v * rows - row;
+        const double wide = 1.0 / count, high = 1.0 / rows;
+        const double edge = std::min(std::min(x, 1 - x) * wide, std::min(y, 1 - y) * high);
+        const double width = 0.012 / std::sqrt(static_cast<double>(count));
+        const double rough = cloud(u, v, 24, 24, 3, seed) - 0.5;
+        if (edge < width) return brighter(joint, 1 + 0.15 * rough);
+        const double tone = 0.94 + 0.10 * cell(column, row, seed + 1) + 0.06 * rough;
+        return brighter(colour, edge < 1.8 * width ? 0.9 * tone : tone);
+      });
 }
 
 std::string stone_png(Colour colour, std::uint32_t seed, int size) {
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("stone_png", colour, seed, size), size, [&](double u, double v) {
     const double large = cloud(u, v, 4, 4, 4, seed) - 0.5, speck = noise(u, v, 96, 96, seed + 9);
     const double grain = speck > 0.83 ? 0.22 : speck < 0.14 ? -0.2 : 0.0;
     return brighter(colour, 1 + 0.3 * large + grain);
@@ -149,14 +183,14 @@ std::string stone_png(Colour colour, std::uint32_t seed, int size) {
 }
 
 std::string plaster_png(Colour colour, std::uint32_t seed, int size) {
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("plaster_png", colour, seed, size), size, [&](double u, double v) {
     return brighter(colour, 1 + 0.05 * (cloud(u, v, 8, 8, 5, seed) - 0.5) +
                                 0.025 * (noise(u, v, 128, 128, seed + 3) - 0.5));
   });
 }
 
 std::string cloth_png(Colour colour, std::uint32_t seed, int size) {
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("cloth_png", colour, seed, size), size, [&](double u, double v) {
     const double weave =
         0.5 * (std::sin(2 * std::numbers::pi * 48 * u) + std::sin(2 * std::numbers::pi * 48 * v));
     return brighter(colour, 1 + 0.07 * weave + 0.12 * (cloud(u, v, 6, 6, 4, seed) - 0.5));
@@ -164,7 +198,7 @@ std::string cloth_png(Colour colour, std::uint32_t seed, int size) {
 }
 
 std::string brushed_png(Colour colour, std::uint32_t seed, int size) {
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("brushed_png", colour, seed, size), size, [&](double u, double v) {
     return brighter(colour, 1 + 0.10 * (noise(u, v, 4, 128, seed) - 0.5) +
                                 0.06 * (cloud(u, v, 3, 3, 3, seed + 5) - 0.5));
   });
@@ -180,7 +214,7 @@ std::string landscape_png(std::uint32_t seed, int size) {
   const Colour field = mix({0.80, 0.70, 0.42}, {0.58, 0.62, 0.38}, draw(3, 0, 1));
   const double ridges = draw(4, 0.42, 0.52), hills = draw(5, 0.60, 0.70);
   const double sun_u = draw(6, 0.2, 0.8), sun_v = draw(7, 0.15, 0.3);
-  return picture(size, [&](double u, double v) {
+  return picture(key_of("landscape_png", seed, size), size, [&](double u, double v) {
     const double stroke = 0.96 + 0.08 * noise(u, v, 64, 64, seed);
     const auto edge = [&](int n, std::uint32_t which) {
       return noise(u, 0, n, 1, seed + which) - 0.5;

@@ -38,6 +38,7 @@ render::ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
   options.textures = cfg.use_textures;
   const bool colors = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
   options.shadows = cfg.use_shadows && colors;
+  options.shadow_samples = cfg.shadow_samples;
   options.reflections = colors;
   options.near = static_cast<float>(near);
   options.far = static_cast<float>(cfg.far);

@@ -133,6 +133,7 @@ struct CameraSensorCfg : SensorCfg {
   std::vector<std::string> data_types{"rgb"};
   bool use_textures = true;
   bool use_shadows = false;
+  int shadow_samples = 1;
   std::vector<int> enabled_geom_groups{0, 1, 2};
   bool orthographic = false;
   bool clone_data = false;  // used by the Python package
@@ -185,6 +186,11 @@ void visit_fields(V& v, CameraSensorCfg& c) {
   v("data_types", c.data_types, "The image types to compute.").one_of(kCameraDataTypes).not_empty();
   v("use_textures", c.use_textures, "Draw the textures of materials and the skybox.");
   v("use_shadows", c.use_shadows, "Draw the shadows of lights that cast shadows.");
+  v("shadow_samples", c.shadow_samples,
+    "Soft shadows: number of points of a light with a position at which its shadows are computed, "
+    "within the ball of the model's ``light_bulbradius``. 1: hard shadows. A view has at most 32 "
+    "lights and points.")
+      .within(1, 16);
   v("enabled_geom_groups", c.enabled_geom_groups, "Geom groups (0 to 5) that are visible.")
       .within(0, 5)
       .not_empty();
