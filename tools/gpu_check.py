@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares simulations with ``backend="warp"`` with those on the CPU, measures their speed, and writes the tables of docs/warp.md.
 
-    python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 30] [--long 1000] [--write]
+    python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 10] [--long 1000] [--write]
 
 Both simulations step from the same states with the same controls. Then the states of the CPU are copied, so that they are the same again,
 and every field of every sensor is compared. Forces and accelerations are compared in worlds in which mujoco_warp finds the same contacts
@@ -540,7 +540,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--device", help="cpu, cuda:0 and so on; by default the first CUDA device, or the CPU without one.")
     parser.add_argument("--worlds", type=int, default=64, help="Number of worlds.")
-    parser.add_argument("--steps", type=int, default=30, help="Number of control steps for each scene.")
+    parser.add_argument("--steps", type=int, default=10, help="Number of control steps for each scene.")
     parser.add_argument(
         "--long", type=int, default=1000, help="Number of control steps of the comparison of air times and history; 0: none."
     )
