@@ -176,7 +176,7 @@ class Renderer:
             "fog_slope": 1 / (extent * max(map_.fogend - map_.fogstart, 1e-6)),
             "fog_rgb": tuple(float(x) for x in rgba.fog[:3]),
             "line_width": float(model.vis.global_.linewidth),
-            # 3.12 wraps 2D textures around spheres, cylinders and so on; earlier versions project them along z.
+            # 3.12 wraps 2D textures around spheres, cylinders and so on, and repeats those of meshes; earlier versions project them along z.
             "projected_textures": tuple(int(x) for x in self._mujoco.mj_versionString().split(".")[:2]) < (3, 12),
         }
         # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.

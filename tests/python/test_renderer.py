@@ -566,6 +566,18 @@ def test_geoms_near_a_light_cast_shadows_as_in_opengl(opengl, light, distance):
     assert 10 * np.log10(255**2 / np.mean((theirs.astype(float) - ours) ** 2)) > 30
 
 
+@pytest.mark.parametrize(("repeat", "uniform"), [(1, "true"), (3, "false"), (3, "true")])
+def test_textured_meshes_look_as_in_opengl(opengl, repeat, uniform):
+    model, data = (
+        load(f"""<mujoco><asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
+        <material name="m" texture="t" texrepeat="{repeat} {repeat}" texuniform="{uniform}"/>
+        <mesh name="prism" vertex="0 0 0  1 0 0  0 1 0  0 0 -1  1 0 -1  0 1 -1" texcoord="0 0  1 0  0 1  .5 .5  1 .5  .5 1"
+         face="0 1 2  3 5 4  0 4 1  0 3 4  1 4 5  1 5 2  0 2 5  0 5 3"/></asset>
+        <worldbody><light pos="0 0 3" castshadow="false"/><camera name="view" pos="0 0 3"/><geom type="mesh" mesh="prism" material="m"/></worldbody></mujoco>""")
+    )
+    compare(both(model, data, "view"), 31)
+
+
 @pytest.mark.parametrize("skin", [0, 1])
 def test_flexes_look_as_in_opengl(opengl, skin):
     option = mujoco.MjvOption()

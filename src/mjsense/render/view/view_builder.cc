@@ -421,6 +421,7 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
     s.repeat[i] = material->repeat[i];
     if (s.repeat[i] <= 0 && !s.from_above) s.repeat[i] = 1;
     if (uniform && extent[i] > 0) s.repeat[i] *= extent[i];
+    if (projected_ && s.mapped) s.repeat[i] = 1;
     if (s.from_above || endless) s.shift[i] = -0.5f;
     if (s.from_above && g.object == mjOBJ_SKIN)  // the texture stays fixed in the world
       s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);

@@ -59,7 +59,8 @@ struct DrawnScene {
   Sky sky;
   bool haze;
   Fog fog;
-  // 2D textures are projected along z onto all shapes, as MuJoCo did before 3.12.
+  // 2D textures are projected along z onto all shapes, except onto triangles with texture coordinates,
+  // where they are not repeated, as MuJoCo did before 3.12.
   bool projected_textures;
 };
 
