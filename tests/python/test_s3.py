@@ -31,7 +31,13 @@ def listens(port):
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def cache(tmp_path_factory):
+    """Folder of the local copies of remote files."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, cache):
     """A function that runs Python with these words, with a bucket ``bucket``, and returns what it prints."""
     if not (PACKAGES / "complete").exists():
         if os.environ.get("MJSENSE_TEST_S3", "0") == "0":
@@ -47,14 +53,13 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("s3")
     path = os.pathsep.join([str(PACKAGES), str(Path(__file__).parent), *filter(None, sys.path)])
     account = {"AWS_ACCESS_KEY_ID": "key", "AWS_SECRET_ACCESS_KEY": "secret", "AWS_DEFAULT_REGION": "us-east-1", "AWS_EC2_METADATA_DISABLED": "true"}
-    environment = {**os.environ, **account, "PYTHONPATH": path, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "MJSENSE_CACHE": str(folder / "cache")}
+    environment = {**os.environ, **account, "PYTHONPATH": path, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "MJSENSE_CACHE": str(cache)}
 
     def call(*words, code=0):
         done = subprocess.run([sys.executable, *map(str, words)], env=environment, capture_output=True, text=True, timeout=300)
         assert done.returncode == code, done.stdout[-2000:] + done.stderr[-3000:]
         return done.stdout + done.stderr
 
-    call.cache = folder / "cache"
     with open(folder / "log", "w") as log:
         server = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)], env=environment, stdout=log, stderr=log)
         try:
@@ -72,7 +77,7 @@ def tree(root):
     return {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
 
 
-def test_record_read_repair_and_export_at_an_address(run, tmp_path):
+def test_record_read_repair_and_export_at_an_address(run, cache, tmp_path):
     mjs.record(**ARGUMENTS, out=tmp_path / "alone", num_attempts=4)
     run("-m", "mjsense", *RECORD)
     compare = "import sys; from test_cluster import content; print(content(sys.argv[1]) == content(sys.argv[2]))"
@@ -90,7 +95,7 @@ def test_record_read_repair_and_export_at_an_address(run, tmp_path):
 
     damage = "import s3fs; s3 = s3fs.S3FileSystem(); f = s3.glob('bucket/pick/shard_1/house_0/*.h5')[0]; s3.pipe_file(f, s3.cat_file(f)[:5000])"
     run("-c", damage)
-    shutil.rmtree(run.cache)  # it contains the intact shard
+    shutil.rmtree(cache)  # it contains the intact shard
     assert "shard_1" in run("-m", "mjsense", "repair", "s3://bucket/pick")
     run("-m", "mjsense", *RECORD, "--resume")
     assert run("-m", "mjsense", "verify", "s3://bucket/pick").startswith("intact: ")
