@@ -3,8 +3,8 @@
 
 The network receives the images of the outer camera of `close_up` and of the wrist camera (128x96), the pose of the tool, the opening of
 the gripper, and the words of the instruction. It receives no pose of an object. It returns a chunk: the poses of the tool in the next 12
-steps, relative to the present one, and whether the gripper closes. Two auxiliary losses use what recordings contain: in which pixels the
-object is, and at which pose of the tool the demonstration closed the gripper.
+steps, relative to the present one, and whether the gripper closes. Two auxiliary losses use what recordings contain: where in the images
+the objects are, and at which pose of the tool the demonstration closed the gripper.
 
     pip install "mjsense[torch,dataset]"
     python examples/07_learn_from_pictures.py [--episodes 200] [--steps 3500] [--judged 200]
@@ -27,11 +27,7 @@ import mjsense as mjs
 CAMERAS = ("exo_camera_1", "wrist_camera")
 MODELS = Path(__file__).resolve().parents[1] / "models/robots/franka"
 WIDTH, HEIGHT = 128, 96  # pixels
-CELL = {
-    "exo_camera_1": 8,
-    "wrist_camera": 4,
-}  # pixels; the network works on a grid of cells, and finds the object most exactly from close by
-GAPS = {"exo_camera_1": (1, 2), "wrist_camera": (1, 2, 4)}  # dilations of the convolutions
+CELL = {"exo_camera_1": 8, "wrist_camera": 4}  # pixels; a network works on a grid of cells
 SHIFT = {"exo_camera_1": 4, "wrist_camera": 2}  # pixels; images are shifted at random in training
 CHUNK = 12  # steps that the network predicts
 STEPS = 120  # of an episode that is judged; the planner needs 60 to 110
@@ -102,40 +98,55 @@ def record(out, episodes):
 class Demonstrations:
     """All observations of a recording, with the actions that followed.
 
-    ``images[camera]`` uint8 ``[N, H, W, 3]``, ``points[camera]`` ``[N, 2]``: the middle of the object in pixels, NaN if not visible;
-    ``state`` ``[N, 10]``, ``words`` ``[N, V]``; ``moves`` ``[N, CHUNK + 1, 6]`` to the next targets of the tool and to the one at which
-    the gripper closes, ``close`` ``[N, CHUNK]``; ``before`` ``[N]``: whether the gripper has yet to close.
+    ``images[camera]`` uint8 ``[N, H, W, 3]``; ``points[camera]`` ``[N, K, 2]``: where the K objects are in the image, in pixels, NaN if
+    they are absent; ``kinds`` ``[K, V]``: the words of their instructions; ``kind`` ``[N]``: the object of the instruction; ``state``
+    ``[N, 10]``; ``moves`` ``[N, CHUNK + 1, 6]`` to the next targets of the tool and to the one at which the gripper closes; ``close``
+    ``[N, CHUNK]``: whether the gripper closes; ``before`` ``[N]``: whether it has yet to close.
     """
 
     def __init__(self, path, episodes=None):
         chosen = mjs.Dataset(path).episodes[:episodes]
         self.vocabulary = sorted({word for episode in chosen for word in sentence(episode).split()})
+        sentences = {target(episode): sentence(episode) for episode in chosen}
+        self.kinds = torch.as_tensor(np.stack([bag(text, self.vocabulary) for text in sentences.values()]))
         self.images, self.points = {}, {}
         for camera in CAMERAS:
             self.images[camera] = np.concatenate([episode.video(camera)[: episode.length - 1] for episode in chosen])
-            points = np.concatenate(
-                [episode[f"obs/extra/object_image_points/pickup_obj/{camera}/points"][: episode.length - 1] for episode in chosen]
-            )
-            seen = np.isfinite(points[..., 0])
-            with np.errstate(invalid="ignore"):  # 0 / 0 where no point is visible
-                self.points[camera] = np.where(seen[..., None], points, 0).sum(1) / seen.sum(1)[:, None] * [WIDTH, HEIGHT]
-        states, words, moves, closings, before = [], [], [], [], []
+            self.points[camera] = np.concatenate([image_points(episode, camera, sentences)[:-1] for episode in chosen])
+        states, kinds, moves, closings, before = [], [], [], [], []
         for episode in chosen:
             steps = episode.length - 1
             tool = episode["obs/extra/tcp_pose"].astype(float)[:steps]
-            target, close = episode["actions/ee_pose/arm"], episode["actions/joint_pos/gripper"][:, 0] > CLOSED / 2
+            targets, close = episode["actions/ee_pose/arm"], episode["actions/joint_pos/gripper"][:, 0] > CLOSED / 2
             closes = int(np.argmax(close))
-            # Row t of the actions led to observation t; a chunk repeats the last one.
+            # Row t of the actions led to observation t. The last row has no target; a chunk repeats the one before.
             rows = np.minimum(np.arange(steps)[:, None] + np.arange(1, CHUNK + 1), steps - 1)
             grasp = np.maximum(rows[:, :1], closes)
-            moves.append(difference(tool[:, None], target[np.concatenate([rows, grasp], 1)]))
+            moves.append(difference(tool[:, None], targets[np.concatenate([rows, grasp], 1)]))
             closings.append(close[rows])
             before.append(np.arange(steps) < closes)
             states.append(state(tool, episode["obs/agent/qpos"]["gripper"][:steps, 0]))
-            words.append(np.tile(bag(sentence(episode), self.vocabulary), (steps, 1)))
-        self.state, self.words, self.moves, self.close, self.before = (
-            torch.as_tensor(np.concatenate(rows), dtype=torch.float32) for rows in (states, words, moves, closings, before)
+            kinds.append(np.full(steps, list(sentences).index(target(episode))))
+        self.kind = torch.as_tensor(np.concatenate(kinds))
+        self.state, self.moves, self.close, self.before = (
+            torch.as_tensor(np.concatenate(rows), dtype=torch.float32) for rows in (states, moves, closings, before)
         )
+
+
+def image_points(episode, camera, actors):
+    """Where the origins of objects are in the images of a camera, in pixels: ``[T, K, 2]``."""
+    states = episode["env_states/actors"]
+    absent = np.full((episode.length, 13), np.nan)
+    places = np.stack([states.get(actor, absent)[:, :3] for actor in actors], 1)
+    matrix, intrinsic = (episode[f"obs/sensor_param/{camera}/{name}"] for name in ("extrinsic_cv", "intrinsic_cv"))
+    places = np.einsum("tij,tkj->tki", matrix[..., :3], places) + matrix[:, None, :, 3]
+    places = np.einsum("tij,tkj->tki", intrinsic, places)
+    return np.where(places[..., 2:] > 0, places[..., :2] / places[..., 2:], np.nan)
+
+
+def target(episode):
+    """Name of the object that the instruction asks for."""
+    return episode.obs_scene["objects"]["pickup_obj"]["actor"]
 
 
 def sentence(episode):
@@ -153,7 +164,7 @@ def bag(text, vocabulary):
 class Encoder(nn.Module):
     """Finds the object of the instruction in the images of one camera, and describes the images by points and features."""
 
-    def __init__(self, words, cell, gaps, channels=32, points=12):
+    def __init__(self, words, cell, channels=32, points=12, gaps=(1, 2, 4)):
         super().__init__()
         self.cell, self.rows, self.columns = cell, HEIGHT // cell, WIDTH // cell
         self.first = nn.Conv2d(3 * cell**2, channels, 3, padding=1)
@@ -190,9 +201,10 @@ class Network(nn.Module):
     def __init__(self, vocabulary, mean, scale, width=384):
         super().__init__()
         self.vocabulary = vocabulary
-        self.encoders = nn.ModuleDict({camera: Encoder(len(vocabulary), CELL[camera], GAPS[camera]) for camera in CAMERAS})
+        self.encoders = nn.ModuleDict({camera: Encoder(len(vocabulary), CELL[camera]) for camera in CAMERAS})
         inputs = sum(encoder.size for encoder in self.encoders.values()) + len(mean["state"]) + len(vocabulary)
-        self.body = nn.Sequential(nn.Linear(inputs, width), nn.GELU(), nn.Linear(width, width), nn.GELU(), nn.Dropout(0.1))
+        sizes = (inputs, width), (width, width)
+        self.body = nn.Sequential(*(part for size in sizes for part in (nn.Linear(*size), nn.GELU(), nn.Dropout(0.1))))
         self.moves, self.close = nn.Linear(width, (CHUNK + 1) * 6), nn.Linear(width, CHUNK)
         for name in mean:
             self.register_buffer(f"{name}_mean", mean[name])
@@ -215,24 +227,23 @@ def new_network(data, seed=0):
     return Network(data.vocabulary, mean, scale)
 
 
-def augmented(images, points, shift, cell):
-    """Images moved by up to ``shift`` pixels and with other brightness and colour, and the cells that show the object.
-
-    The number of cells stands for an object that is not visible.
-    """
+def augmented(images, shift):
+    """Images moved by up to ``shift`` pixels and with other brightness and colour, and how far they were moved."""
     n = len(images)
     moves = torch.randint(-shift, shift + 1, (n, 2)).numpy()
     padded = np.pad(images, ((0, 0), (shift, shift), (shift, shift), (0, 0)), mode="edge")
-    images = torch.as_tensor(
-        np.stack([padded[i, shift - y : shift - y + HEIGHT, shift - x : shift - x + WIDTH] for i, (x, y) in enumerate(moves)])
-    )
+    starts = enumerate(shift - moves)
+    images = torch.as_tensor(np.stack([padded[i, y : y + HEIGHT, x : x + WIDTH] for i, (x, y) in starts]))
     gain = (1 + torch.empty(n, 1, 1, 1).uniform_(-0.3, 0.3)) * (1 + torch.empty(n, 1, 1, 3).uniform_(-0.1, 0.1))
-    images = (images * gain + torch.empty(n, 1, 1, 1).uniform_(-25, 25)).clamp(0, 255)
-    columns, rows = WIDTH // cell, HEIGHT // cell
-    place = (points + moves) / cell
-    seen = ((place >= 0) & (place < [columns, rows])).all(1)  # False for NaN
-    column, row = np.where(seen[:, None], place, 0).astype(int).T
-    return images, torch.as_tensor(np.where(seen, row * columns + column, rows * columns))
+    return (images * gain + torch.empty(n, 1, 1, 1).uniform_(-25, 25)).clamp(0, 255), moves
+
+
+def cells(points, size):
+    """The cells in which points are: int64 ``[B]``; the number of cells stands for a point outside the image."""
+    columns, rows = WIDTH // size, HEIGHT // size
+    inside = ((points >= 0) & (points < [WIDTH, HEIGHT])).all(1)  # False for NaN
+    column, row = (np.where(inside[:, None], points, 0) / size).astype(int).T
+    return torch.as_tensor(np.where(inside, row * columns + column, rows * columns))
 
 
 def train(network, data, steps, batch=64):
@@ -244,24 +255,28 @@ def train(network, data, steps, batch=64):
         for group in optimizer.param_groups:
             group["lr"] = 1e-3 * min(1, (step + 1) / 200) * (1 - step / steps)
         chosen = torch.randint(len(data.state), (batch,))
-        images, cells = {}, {}
-        for camera in CAMERAS:
-            rows = chosen.numpy()
-            images[camera], cells[camera] = augmented(
-                data.images[camera][rows], data.points[camera][rows], SHIFT[camera], CELL[camera]
-            )
+        rows, kind, other = chosen.numpy(), data.kind[chosen], torch.randint(len(data.kinds), (batch // 2,))
+        images, places, found = {}, {}, 0.0
+        for camera, encoder in network.encoders.items():
+            images[camera], shift = augmented(data.images[camera][rows], SHIFT[camera])
+            points = data.points[camera][rows] + shift[:, None]
+            # An episode has an instruction for one object; where the others are can be learned from it too.
+            _, where = encoder(images[camera][: len(other)], data.kinds[other])
+            found = found + F.nll_loss(where, cells(points[range(len(other)), other], CELL[camera]))
+            places[camera] = cells(points[range(batch), kind], CELL[camera])
         noisy = data.state[chosen] + STATE_NOISE * torch.randn(batch, data.state.shape[1])
-        moves, close, where = network(images, noisy, data.words[chosen])
+        moves, close, where = network(images, noisy, data.kinds[kind])
         error = (moves - (data.moves[chosen] - network.move_mean) / network.move_scale).abs().mean(2)
         before = data.before[chosen]
         losses = {
             "moves": error[:, :CHUNK].mean(),
-            "grasp": (error[:, CHUNK] * before).sum() / before.sum(),
-            "close": F.binary_cross_entropy_with_logits(close, data.close[chosen]),
-            "object": sum(F.nll_loss(where[camera], cells[camera]) for camera in CAMERAS) / 2,
+            "grasp": 0.5 * (error[:, CHUNK] * before).sum() / before.sum(),
+            "close": 0.3 * F.binary_cross_entropy_with_logits(close, data.close[chosen]),
+            "object": 0.1 * sum(F.nll_loss(where[camera], places[camera]) for camera in CAMERAS),
+            "others": 0.1 * found,
         }
         optimizer.zero_grad()
-        (losses["moves"] + 0.5 * losses["grasp"] + 0.3 * losses["close"] + 0.2 * losses["object"]).backward()
+        torch.stack(list(losses.values())).sum().backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
         if step % (steps // 20 + 1) == 0:
@@ -290,9 +305,8 @@ class Follower:
         self.plans.appendleft((moved(tool[:, None], moves), close.sigmoid().numpy()))
         now = [difference(tool, targets[:, age]) for age, (targets, _) in enumerate(self.plans)]
         shut = np.mean([close[:, age] for age, (_, close) in enumerate(self.plans)], 0) > 0.5
-        return np.concatenate([np.clip(np.mean(now, 0), -LIMITS, LIMITS), np.where(shut, CLOSED, 0)[:, None]], 1).astype(
-            np.float32
-        )
+        move = np.clip(np.mean(now, 0), -LIMITS, LIMITS)
+        return np.concatenate([move, np.where(shut, CLOSED, 0)[:, None]], 1).astype(np.float32)
 
 
 def success_rate(network, episodes, scene="", seed=10_000, worlds=50):
@@ -320,9 +334,7 @@ def main():
     arguments.add_argument("--judged", type=int, default=200, help="Number of unseen episodes.")
     arguments.add_argument("--scene", default="", help="Scene of the unseen episodes; by default the task's.")
     arguments.add_argument("--data", type=Path, help="Recording to read instead of a new one.")
-    arguments.add_argument(
-        "--network", type=Path, help="File of the trained network; if it exists, it is evaluated without training."
-    )
+    arguments.add_argument("--network", type=Path, help="File of the trained network; if it exists, it is only evaluated.")
     chosen = arguments.parse_args()
     torch.set_num_threads(1)  # the networks are small
     if chosen.network and chosen.network.exists():
