@@ -32,7 +32,7 @@ SHIFT = {"exo_camera_1": 4, "wrist_camera": 2}  # pixels; images are shifted at 
 CHUNK = 12  # steps that the network predicts
 STEPS = 120  # of an episode that is judged; the planner needs 60 to 110
 HELD = 5  # steps; an object that is knocked over may be off the table for a moment
-# Disturbs the state in training. Otherwise the network reads the goal from the path of the tool, and confirms its own errors.
+# Disturbs the state in training, so that the network does not read the goal from the path of the tool, which would confirm its own errors.
 STATE_NOISE = torch.tensor([0.04, 0.04, 0.005] + [0.1] * 6 + [0.03])
 OPENING, CLOSED = 0.8, 255.0  # rad of the closed fingers, command that closes them
 LIMITS = np.array([0.15] * 3 + [1.0] * 3)  # of a move: m, rad
