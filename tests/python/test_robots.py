@@ -112,6 +112,7 @@ def test_no_code_knows_a_robot_by_its_name():
         ("task_defaults.cc", 'constexpr std::string_view kUsualRobot = "franka";'),
         ("task_defaults.cc", '{"door_opening", "rby1", 400, 0, 0, 0},'),
         ("task_defaults.cc", '{"nav_to_obj", "rby1", 500, 200, 2, 2},'),
+        ("task_defaults.cc", '{"nav_and_pick", "mobile_franka", 1200, 0, 0, 0},'),
         ("rollout.h", '"the meshes if the robot\'s environment variable (``MJSENSE_FRANKA_MESHES``) names their "'),
     }
     for path in (ROOT / "src/mjsense").rglob("*"):
