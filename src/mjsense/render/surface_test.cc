@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "mjsense/render/testing/test_renderer.h"
 #include "mjsense/render/view/fixed_layer.h"
@@ -240,7 +241,7 @@ TEST(Surface, OwnColourOverridesTheMaterials) {
 TEST(Surface, PlaneFromBelowIsTranslucent) {
   TestRenderer s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom size=".5" pos="2 0 2" rgba="0 0 1 1"/></worldbody>)");
-  const int veil = static_cast<int>(255 * (1 - 0.7 * 0.7) + 0.5);
+  const int veil = static_cast<int>(std::lround(255 * (1 - 0.7 * 0.7)));
   const auto up = [&](double x) { return s.center({x, 0, -2}, {1, 0, 0}, {0, -1, 0}, 1); };
   expect_pixel(up(0), {veil, veil, veil});
   expect_pixel(up(2), {veil, veil, 255}, 2);  // the ball behind it is visible through the veil

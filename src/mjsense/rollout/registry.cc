@@ -106,6 +106,7 @@ std::unique_ptr<episode::Task> any_of(std::string_view name, episode::TaskCfg cf
         parts[0]));
   }
   std::vector<std::unique_ptr<episode::Task>> children;
+  children.reserve(parts.size());
   for (const std::string& part : parts) children.push_back(tasks().at(part)(cfg));
   return std::make_unique<tasks::MultiTask>(std::string(name), std::move(cfg), std::move(children));
 }

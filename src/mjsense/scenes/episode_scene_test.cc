@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -449,8 +450,7 @@ TEST(EpisodeScene, AbsentObjectsAreInert) {
   played.sim->reset();
   played.start(1, 2);  // a start that is drawn again
   played.start(0, 1);
-  std::vector<Vec3> before;
-  for (int i = 0; i < 3; ++i) before.push_back(played.at(i));
+  const std::array before{played.at(0), played.at(1), played.at(2)};
   for (int k = 0; k < 200; ++k) played.sim->step();
   const double* qvel = robots::state_row(played.sim->worlds(), 0).qvel;
   const mjModel* m = played.sim->model();

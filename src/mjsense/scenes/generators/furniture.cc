@@ -280,7 +280,8 @@ void write_dining_table(BuildingWriter& out, const std::string& name, int chairs
   four_legs(out, half_x - 0.06, half_y - 0.06, 0, height - 0.03, 0.028, "dark_wood");
   for (int i = 0; i < chairs; ++i) {
     const double side = i % 2 == 0 ? 1 : -1;
-    const double x = (i / 2 - 0.25 * (chairs - 2)) * 0.60;
+    const int row = i / 2;
+    const double x = (row - 0.25 * (chairs - 2)) * 0.60;
     BuildingWriter::Local seat(out, "", {x, side * (half_y + 0.22 + rng.uniform(-0.06, 0.06)), 0},
                                (side > 0 ? 0 : pi) + rng.uniform(-0.12, 0.12));
     chair(out, rng);

@@ -140,7 +140,7 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed,
 
 // An object behind furniture may be close to a path without being visible from any point of it.
 std::string NavToObjTask::start_error(const World& world) const {
-  const std::string fault = scenes::ObjectTask::start_error(world);
+  std::string fault = scenes::ObjectTask::start_error(world);
   if (!fault.empty()) return fault;
   if (!alone(world.id, targets_[world.id]))
     return fmt::format(
