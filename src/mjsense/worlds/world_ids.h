@@ -15,10 +15,10 @@ inline constexpr AllWorlds all_worlds;
 class WorldIds {
  public:
   WorldIds(AllWorlds) : all_(true) {}
+  // A WorldIds does not convert to a span, so this constructor does not replace the copy constructor.
   template <class List>
-  requires(std::convertible_to<List&&, std::span<const int>> &&
-           !std::same_as<std::remove_cvref_t<List>, WorldIds>) WorldIds(List&& ids)
-      : ids_(ids) {}
+  // NOLINTNEXTLINE(bugprone-forwarding-reference-overload)
+  requires std::convertible_to<List&&, std::span<const int>> WorldIds(List&& ids) : ids_(ids) {}
 
   bool all() const { return all_; }
   std::span<const int> list() const { return ids_; }  // empty if all()
