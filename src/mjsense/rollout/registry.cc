@@ -11,6 +11,7 @@
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
 #include "mjsense/tasks/multi_task/multi_task.h"
+#include "mjsense/tasks/multi_task/nav_and_pick.h"
 #include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 #include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -60,7 +61,6 @@ std::unique_ptr<episode::Task> pick_and_place(episode::TaskCfg cfg) {
 }
 
 std::unique_ptr<episode::Task> any_of(std::string_view name, episode::TaskCfg cfg);
-std::unique_ptr<episode::Task> nav_and_pick(episode::TaskCfg cfg);
 
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
@@ -82,17 +82,13 @@ Registry<TaskFactory>& tasks() {
         [](episode::TaskCfg c) { return std::make_unique<tasks::DoorOpeningTask>(std::move(c)); }},
        {"nav_to_obj",
         [](episode::TaskCfg c) { return std::make_unique<tasks::NavToObjTask>(std::move(c)); }},
-       {"nav_and_pick", nav_and_pick},
+       {"nav_and_pick",
+        [](episode::TaskCfg c) {
+          if (c.scene.empty()) c.scene = default_scene("nav_and_pick");
+          return std::make_unique<tasks::NavAndPickTask>(c);
+        }},
        {"multi_task", [](episode::TaskCfg c) { return any_of("multi_task", std::move(c)); }}});
   return all;
-}
-
-std::unique_ptr<episode::Task> nav_and_pick(episode::TaskCfg cfg) {
-  if (cfg.scene.empty()) cfg.scene = default_scene("nav_and_pick");
-  std::vector<std::unique_ptr<episode::Task>> children;
-  for (const char* part : {"nav_to_obj", "pick"}) children.push_back(tasks().at(part)(cfg));
-  return std::make_unique<tasks::MultiTask>("nav_and_pick", std::move(cfg), std::move(children),
-                                            tasks::Combination::kNavAndPick);
 }
 
 // Combines several tasks in the scene of the first one.

@@ -8,8 +8,6 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/named.h"
-#include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
-#include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense::tasks {
 namespace {
@@ -17,25 +15,12 @@ namespace {
 constexpr std::array<const char*, 4> kIntroductions{"", "Do one of these. ", "Choose one. ",
                                                     "One of these will do. "};
 constexpr std::array<const char*, 3> kJoints{"Or: ", "Alternatively: ", "Otherwise: "};
-constexpr double kWithinReach = 0.85;  // m, of the base from an object that is picked up
-constexpr std::array<const char*, 6> kThenPick{" and pick it up",   ", then pick it up",
-                                               " and lift it",      " and grab it",
-                                               ", then lift it up", " and take it"};
-
-// "Can you go to the mug?" and " and lift it" are "Can you go to the mug and lift it?".
-std::string then(std::string sentence, std::string_view more) {
-  sentence.insert(sentence.size() - (sentence.ends_with('?') ? 1 : 0), more);
-  return sentence;
-}
 
 }  // namespace
 
 MultiTask::MultiTask(std::string name, episode::TaskCfg cfg,
-                     std::vector<std::unique_ptr<episode::Task>> children, Combination combination)
-    : episode::Task(std::move(cfg)),
-      name_(std::move(name)),
-      combination_(combination),
-      children_(std::move(children)) {
+                     std::vector<std::unique_ptr<episode::Task>> children)
+    : episode::Task(std::move(cfg)), name_(std::move(name)), children_(std::move(children)) {
   if (size() < 2)
     throw ValueError(
         fmt::format("task '{}' consists of {} task, at least two are required", name_, size()));
@@ -56,8 +41,6 @@ MultiTask::MultiTask(std::string name, episode::TaskCfg cfg,
     children_[i]->whole_ = this;
   }
   std::ranges::sort(names_);
-  if (in_sequence())
-    dynamic_cast<NavToObjTask&>(*children_[0]).require_graspable_within(kWithinReach);
 }
 
 void MultiTask::initialize_task() {
@@ -83,17 +66,17 @@ void MultiTask::collect_objects(int world) {
 std::optional<Pose> MultiTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
   for (const auto& child : children_) child->reseed(cfg().seed);
   const std::optional<Pose> base = children_[0]->sample_scene(world, rng, state);
-  if (in_sequence()) {
-    dynamic_cast<PickTask&>(*children_[1])
-        .choose_object(world, children_[0]->objects(world)[0].body, state);
-  }
-  for (int i = 1; i < size() && !in_sequence(); ++i) {
+  choose_goals(world, state);
+  collect_objects(world);
+  return base;
+}
+
+void MultiTask::choose_goals(int world, const robots::StateRow& state) {
+  for (int i = 1; i < size(); ++i) {
     Rng goal(cfg().seed, static_cast<std::uint32_t>(i), stream_of("task/goal"),
              static_cast<std::uint64_t>(episode(world)));
     children_[i]->choose_goal(world, goal, state);
   }
-  collect_objects(world);
-  return base;
 }
 
 void MultiTask::begin(const World& world) {
@@ -116,14 +99,6 @@ void MultiTask::advance() {
 
 episode::Evaluation MultiTask::combined(int world, std::span<const episode::Evaluation> of_children,
                                         std::size_t stride) const {
-  if (in_sequence()) {
-    const episode::Evaluation &drive = of_children[0], &pick = of_children[stride];
-    success_[world] = pick.success ? 1 : 0;
-    episode::Evaluation both = make_evaluation(world, drive.reward + pick.reward, pick.success,
-                                               drive.terminal || pick.terminal);
-    both.missing = pick.missing;
-    return both;
-  }
   double reward = of_children[0].reward;
   bool success = false, over = false;
   for (std::size_t i = 0; i < of_children.size(); i += stride) {
@@ -131,27 +106,32 @@ episode::Evaluation MultiTask::combined(int world, std::span<const episode::Eval
     success = success || of_children[i].success;
     over = over || of_children[i].terminal;
   }
-  success_[world] = success ? 1 : 0;
   episode::Evaluation all = make_evaluation(world, reward, success, over);
   if (!success) all.missing = of_children[0].missing;
+  return all;
+}
+
+episode::Evaluation MultiTask::judge(int world, std::span<const episode::Evaluation> of_children,
+                                     std::size_t stride) const {
+  const episode::Evaluation all = combined(world, of_children, stride);
+  success_[world] = all.success ? 1 : 0;
   return all;
 }
 
 episode::Evaluation MultiTask::evaluate(const World& world) const {
   std::vector<episode::Evaluation> found;
   for (const auto& child : children_) found.push_back(child->evaluate(world));
-  return combined(world.id, found, 1);
+  return judge(world.id, found, 1);
 }
 
 void MultiTask::evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) {
   const std::span<episode::Evaluation> all(found_);
   const auto B = static_cast<std::size_t>(num_worlds());
   for (int i = 0; i < size(); ++i) children_[i]->evaluate_all(worlds, all.subspan(i * B, B));
-  for (int w : worlds.ids()) out[w] = combined(w, all.subspan(w), B);
+  for (int w : worlds.ids()) out[w] = judge(w, all.subspan(w), B);
 }
 
 std::string MultiTask::description(int world) const {
-  if (in_sequence()) return then(children_[0]->description(world), kThenPick[0]);
   std::string text;
   for (const auto& child : children_)
     text += (text.empty() ? "" : " OR ") + child->description(world);
@@ -160,19 +140,19 @@ std::string MultiTask::description(int world) const {
 
 // The children's sentences, such as "Either of the two will do. Drive to the mug. Or: Lift the pear".
 std::string MultiTask::paraphrase(const World& world, Rng& rng) const {
-  if (in_sequence()) {
-    const std::string drive = children_[0]->paraphrase(world, rng);
-    return drive.empty() ? "" : then(drive, kThenPick[rng.below(kThenPick.size())]);
-  }
   std::string text = kIntroductions[rng.below(kIntroductions.size())];
   const char* joint = kJoints[rng.below(kJoints.size())];
   for (int i = 0; i < size(); ++i) {
-    std::string part = children_[i]->paraphrase(world, rng);
+    std::string part = paraphrase_of(i, world, rng);
     if (part.empty()) part = children_[i]->description(world.id);
     if (i > 0) text += text.ends_with('?') ? " " : ". ";
     text += i > 0 ? joint + part : part;
   }
   return text;
+}
+
+std::string MultiTask::paraphrase_of(int child, const World& world, Rng& rng) const {
+  return children_[child]->paraphrase(world, rng);
 }
 
 episode::Task::Referrals MultiTask::referrals(int world) const {

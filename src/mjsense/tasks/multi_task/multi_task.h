@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A task made of several child tasks in one scene: one of them, or driving to an object and picking
-// it up.
+// A task made of several child tasks in one scene. It succeeds if any child succeeds; its reward is
+// the maximum of the children's rewards.
 
 #include <memory>
 #include <span>
@@ -13,23 +13,15 @@
 
 namespace mjsense::tasks {
 
-// kAny: it succeeds if any child succeeds; its reward is the maximum of the children's rewards.
-// kNavAndPick: the children are nav_to_obj and pick with the same object. It succeeds if pick does;
-// its reward is the sum of the children's rewards.
-enum class Combination { kAny, kNavAndPick };
-
-class MultiTask final : public episode::Task {
+class MultiTask : public episode::Task {
  public:
   // The first child samples the scene and provides the cameras; the others choose goals in that
   // scene. All children share this task's robot, policy and episodes. Throws ValueError for fewer
   // than two children, or if their scenes or robots differ.
   MultiTask(std::string name, episode::TaskCfg cfg,
-            std::vector<std::unique_ptr<episode::Task>> children,
-            Combination combination = Combination::kAny);
+            std::vector<std::unique_ptr<episode::Task>> children);
   std::string_view name() const override { return name_; }
-  std::string_view type() const override {
-    return in_sequence() ? std::string_view("nav_and_pick") : std::string_view("multi_task");
-  }
+  std::string_view type() const override { return "multi_task"; }
   scene::SceneCfg scene_cfg() const override { return children_[0]->scene_cfg(); }
   std::string robot_entity() const override { return children_[0]->robot_entity(); }
   robots::ActuatorGroups robot_groups() const override { return children_[0]->robot_groups(); }
@@ -52,8 +44,7 @@ class MultiTask final : public episode::Task {
   // Objects of the first child, then those of later children. A later child's object is dropped if
   // its role is already taken. Referrals and sensors are merged in the same manner.
   std::span<const episode::TaskObject> objects(int world) const override { return objects_[world]; }
-  // The children's, joined by " OR "; "Navigate to the mug and pick it up".
-  std::string description(int world) const override;
+  std::string description(int world) const override;  // the children's, joined by " OR "
   std::vector<int> absentees() const override { return children_[0]->absentees(); }
   bool present(int world, int body) const override { return children_[0]->present(world, body); }
   Referrals referrals(int world) const override;
@@ -74,17 +65,21 @@ class MultiTask final : public episode::Task {
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
+  std::string paraphrase_of(int child, const World& world, Rng& rng) const;
+  // Chooses the goals of the later children in the scene that the first one has sampled.
+  virtual void choose_goals(int world, const robots::StateRow& state);
+  // Evaluation of the whole; that of child i is `of_children[i * stride]`.
+  virtual episode::Evaluation combined(int world, std::span<const episode::Evaluation> of_children,
+                                       std::size_t stride) const;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
   void collect_objects(int world);
   const episode::Task& with_role(std::string_view role) const;
-  bool in_sequence() const { return combination_ == Combination::kNavAndPick; }
-  episode::Evaluation combined(int world, std::span<const episode::Evaluation> of_children,
-                               std::size_t stride) const;
+  episode::Evaluation judge(int world, std::span<const episode::Evaluation> of_children,
+                            std::size_t stride) const;
 
   std::string name_;
-  Combination combination_;
   std::vector<std::unique_ptr<episode::Task>> children_;
   std::vector<std::pair<std::string, int>> names_;  // unique names, sorted, with the child's index
   std::vector<std::vector<episode::TaskObject>> objects_;  // [B]

@@ -12,6 +12,7 @@
 #include "mjsense/episode/policy.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
+#include "mjsense/tasks/multi_task/nav_and_pick.h"
 #include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 #include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -196,11 +197,7 @@ TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
 TEST(MultiTask, NavAndPickConcernsOneObjectAndSucceedsIfItIsPicked) {
   episode::TaskCfg mobile = cfg("floor");
   mobile.robot = robots::robot_cfg("mobile_franka");
-  std::vector<std::unique_ptr<episode::Task>> children;
-  children.push_back(std::make_unique<NavToObjTask>(mobile));
-  children.push_back(std::make_unique<PickTask>(mobile));
-  MultiTask task("nav_and_pick", mobile, std::move(children), Combination::kNavAndPick);
-  EXPECT_EQ(task.type(), "nav_and_pick");
+  NavAndPickTask task(mobile);
   scene::Scene scene(task.scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task.initialize(model, 1);
