@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from mjsense.cluster import export_on_ray
 from mjsense.commands import run as run_command
 
 import mjsense as mjs
@@ -87,6 +88,11 @@ def test_trimmed_episodes(waiting):
     assert len(list(short.replay())) == short.length
     with pytest.raises(ValueError, match="is trimmed; only the complete episode"):
         short.replay("actions")
+
+
+def test_export_on_ray_does_not_trim(waiting, tmp_path):
+    with pytest.raises(ValueError, match="export on Ray does not trim episodes; leave out --ray, or trim_idle"):
+        export_on_ray("zarr", waiting, tmp_path / "out", trim_idle=True)
 
 
 def test_moving_objects_and_idle_steps_at_the_end_stay(tmp_path):
