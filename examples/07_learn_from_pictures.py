@@ -231,7 +231,7 @@ def augmented(images, shift):
     """Images moved by up to ``shift`` pixels and with other brightness and colour, and how far they were moved."""
     n = len(images)
     moves = torch.randint(-shift, shift + 1, (n, 2)).numpy()
-    padded = np.pad(images, ((0, 0), (shift, shift), (shift, shift), (0, 0)), mode="edge")
+    padded = np.pad(images, np.array([(0, 0), (shift, shift), (shift, shift), (0, 0)]), mode="edge")
     starts = enumerate(shift - moves)
     images = torch.as_tensor(np.stack([padded[i, y : y + HEIGHT, x : x + WIDTH] for i, (x, y) in starts]))
     gain = (1 + torch.empty(n, 1, 1, 1).uniform_(-0.3, 0.3)) * (1 + torch.empty(n, 1, 1, 3).uniform_(-0.1, 0.1))
