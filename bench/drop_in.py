@@ -4,14 +4,15 @@
     python bench/drop_in.py [--sizes 84 256 640x480] [--json FILE] [--pictures FOLDER] [ENVIRONMENT ...]
 
 Needs the packages of the environments (those of tests/python/test_adapters.py), PyOpenGL and EGL; environments that cannot be made are skipped.
-Both renderers draw the same states, after one step each, through the environment's own function. The columns "step" are the CPU times of a
-step and its image. --pictures writes the last image of each environment and size, the package's own at the left, mjsense's at the right.
+Both renderers draw the same states, after one step each with a random action, through the environment's own function. Times are medians of
+the images that differ from the one before. The columns "step" are the CPU times of a step and its image. --pictures writes the last image of each environment and size, the package's own at the left, mjsense's at the right.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import itertools
 import json
 import logging
 import os
@@ -57,6 +58,12 @@ ENVIRONMENTS = (
 )
 
 
+def random_step(env: Any) -> None:
+    *_, terminated, truncated, _ = env.step(env.action_space.sample())
+    if terminated or truncated:
+        env.reset()
+
+
 def gymnasium_env(name: str, size: Size, use: bool) -> Made:
     arguments = {"id": name, "render_mode": "rgb_array", "width": size[0], "height": size[1], "disable_env_checker": True}
     if name.startswith("Meta-World/"):
@@ -70,7 +77,7 @@ def gymnasium_env(name: str, size: Size, use: bool) -> Made:
         adapter.use(env)
     env.reset(seed=0)
     env.action_space.seed(0)
-    return env, lambda: env.step(env.action_space.sample()), lambda: np.asarray(env.render())
+    return env, lambda: random_step(env), lambda: np.asarray(env.render())
 
 
 def aloha_env(name: str, size: Size, use: bool) -> Made:
@@ -84,7 +91,7 @@ def aloha_env(name: str, size: Size, use: bool) -> Made:
         adapter.use(env.unwrapped._env)  # pyright: ignore[reportAttributeAccessIssue]  # gym-aloha's
     env.reset(seed=0)
     env.action_space.seed(0)
-    return env, lambda: env.step(env.action_space.sample()), lambda: np.asarray(env.render())
+    return env, lambda: random_step(env), lambda: np.asarray(env.render())
 
 
 def dm_control_env(name: str, size: Size, use: bool) -> Made:
@@ -190,7 +197,11 @@ def measure(name: str, size: Size, use: bool, count: int) -> Measured:
     env.close()
     del env, step, render
     gc.collect()  # frees OpenGL's contexts here, not in a later measurement
-    return Measured(np.array(rows[1:]), 1e3 * statistics.median(image_times), 1e3 * statistics.median(step_times), 1e3 * first)
+    moved = [not np.array_equal(rows[i], rows[i + 1]) for i in range(count)]
+    if sum(moved) < count / 2:
+        raise ValueError(f"only {sum(moved)} of {count} images differ from the one before")
+    image_ms, step_ms = (1e3 * statistics.median(itertools.compress(times, moved)) for times in (image_times, step_times))
+    return Measured(np.array(rows[1:]), image_ms, step_ms, 1e3 * first)
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:

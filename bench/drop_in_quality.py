@@ -3,7 +3,7 @@
 
     python bench/drop_in_quality.py [--size 256] [--pictures FOLDER] [--json FILE] [ENVIRONMENT ...]
 
-Needs what bench/drop_in.py needs. The colours are those of the environment's own function after two steps; depth and segmentation are those of
+Needs what bench/drop_in.py needs; LIBERO needs an environment of its own, because it needs another robosuite. The colours are those of the environment's own function after two steps; depth and segmentation are those of
 mujoco.Renderer and mjsense.Renderer with the same model, data and camera. Each environment is drawn in a process of its own. The last line
 but one lists the medians, the last one the environments below the bounds. --pictures writes both images and their difference.
 """
@@ -34,6 +34,7 @@ DM_CONTROL = """acrobot/swingup ball_in_cup/catch cartpole/swingup cheetah/run d
     manipulator/bring_ball quadruped/walk reacher/easy swimmer/swimmer6 walker/walk"""
 ROBOSUITE = """Door/agentview Lift/agentview Lift/robot0_eye_in_hand NutAssembly/agentview PickPlace/agentview PickPlace/robot0_eye_in_hand
     Stack/agentview ToolHang/agentview Wipe/agentview"""
+LIBERO = "libero_spatial/0/agentview libero_object/0/agentview libero_goal/0/agentview libero_10/0/robot0_eye_in_hand"
 ENVIRONMENTS = [
     *GYMNASIUM.split(),
     *(f"Meta-World/{name}" for name in META_WORLD.split()),
@@ -41,6 +42,7 @@ ENVIRONMENTS = [
     "gym_aloha/AlohaTransferCube-v0",
     "gym_aloha/AlohaInsertion-v0",
     *(f"robosuite/{name}" for name in ROBOSUITE.split()),
+    *(f"libero/{name}" for name in LIBERO.split()),
 ]
 
 BOUNDS = {"psnr": 36.0, "ssim": 0.985, "depth_mm": 1.0, "segmentation": 99.5}
@@ -131,7 +133,7 @@ def main() -> None:
     if rows:
         median = {key: float(np.median([row[key] for row in rows])) for key in BOUNDS}
         print(row_of({"environment": f"median of {len(rows)}", **median}))
-        low = [row["environment"] for row in rows if row["psnr"] < 30 or row["ssim"] < 0.95
+        low = [row["environment"] for row in rows if row["psnr"] < BOUNDS["psnr"] or row["ssim"] < BOUNDS["ssim"]
                or row["depth_mm"] > BOUNDS["depth_mm"] or row["segmentation"] < BOUNDS["segmentation"]]  # fmt: skip
         print("outliers:", *low)
     if arguments.json:

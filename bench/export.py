@@ -16,7 +16,6 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from mjsense.export import Source
@@ -41,18 +40,19 @@ def read(root: Path, order: str, seconds: float, cache_mb: float) -> None:
     print(n / (time.perf_counter() - begun), n / (time.process_time() - cpu))
 
 
-def export(root: Path, out: Path, frames: int | Literal["key"]) -> None:
+def export(root: Path, out: Path) -> None:
+    """Exports all episodes to the folder ``complete`` of ``out``, and those without idle steps, whose videos are encoded again, to ``trimmed``."""
     shutil.rmtree(out, ignore_errors=True)
     mjs.export_lerobot(root, out / "warm", episodes=[0])  # imports the libraries
     shutil.rmtree(out)
-    dataset = mjs.Dataset(root)
-    begun, cpu = time.perf_counter(), time.process_time()
-    mjs.export_lerobot(root, out, statistics_frames=frames, episodes=[*range(len(dataset.episodes))] * REPEATS)
-    wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
-    cameras = sum(stream.kind == "video" and len(stream.shape) == 3 for stream in dataset.streams.values())
-    images = len(dataset) * cameras * REPEATS
-    about = "key frames" if frames == "key" else "all frames"
-    print(f"export, statistics of {about:20} {images / wall:9.0f} ({images / cpu:.0f}) frames/s")
+    for name, trim_idle, repeats in (("complete", False, REPEATS), ("trimmed", True, 1)):
+        dataset = mjs.Dataset(root, trim_idle=trim_idle)
+        begun, cpu = time.perf_counter(), time.process_time()
+        mjs.export_lerobot(root, out / name, episodes=[*range(len(dataset.episodes))] * repeats, trim_idle=trim_idle)
+        wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
+        cameras = sum(stream.kind == "video" and len(stream.shape) == 3 for stream in dataset.streams.values())
+        images = len(dataset) * cameras * repeats
+        print(f"export {name:29} {images / wall:9.0f} ({images / cpu:.0f}) frames/s")
 
 
 def encode(root: Path, steps: int) -> float:
@@ -102,15 +102,14 @@ def main() -> None:
         root, out = Path(args.keep or folder, "recording"), Path(args.keep or folder, "lerobot")
         if not list(root.glob("house_*/*.h5")):
             mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, worlds=2)
-        for frames in ("key", 0):
-            export(root, out, frames)
+        export(root, out)
         if args.only_export:
             return
         loaders = {
             name: [sys.executable, __file__, "--seconds", str(args.seconds), "--cache-mb", str(cache_mb), "--read", str(root)]
             for name, cache_mb in (("mjs.Dataset", args.cache_mb), ("mjs.Dataset, small cache", 8))
         } | {
-            "LeRobot": [args.lerobot, str(ROOT / "bench/peers/lerobot_loader.py"), str(out)],
+            "LeRobot": [args.lerobot, str(ROOT / "bench/peers/lerobot_loader.py"), str(out / "complete")],
         }
         for order in ("sequential", "random"):
             for name, command in loaders.items():
@@ -118,7 +117,7 @@ def main() -> None:
                 done = subprocess.run(words, capture_output=True, text=True, check=True)
                 wall, cpu = map(float, done.stdout.split()[-2:])
                 print(f"{order:11} {name:24} {wall:9.1f} ({cpu:.1f}) samples/s")
-        compare_writers(root, out, root.parent, args.lerobot, args.steps)
+        compare_writers(root, out / "complete", root.parent, args.lerobot, args.steps)
 
 
 if __name__ == "__main__":

@@ -71,6 +71,7 @@ def picture(scene: Path, name: str) -> np.ndarray:
     camera.lookat = data.xpos[body]
     camera.distance = 3.2 * max(np.linalg.norm(data.geom_xpos[g] - data.xpos[body]) + model.geom_rbound[g] for g in geoms)
     camera.azimuth, camera.elevation = 120, -35
+    model.vis.headlight.ambient, model.vis.headlight.diffuse = 0.3, 0.6  # not only the lamps of the episode
     renderer = mjs.Renderer(model, SIZE, SIZE)
     renderer.update_scene(data, camera)
     image = renderer.render()

@@ -3,8 +3,8 @@
 
     python bench/warp_sensors.py [--device cuda:0] [--worlds 64]
 
-Both programs have the same worlds in the same states, and take turns. A time is that of one update of the sensor for all worlds; on
-a CUDA device, without a graph. mjlab 1.6 asks for mujoco_warp 3.11; it works with 4.0 (pip install --no-deps).
+Both programs have the same worlds in the same states, and take turns. A time is that of one update of the sensor for all worlds: CPU
+time of the process, or, on a CUDA device, time until the device has finished, without a graph. mjlab 1.6 asks for mujoco_warp 3.11; it works with 4.0 (pip install --no-deps).
 """
 
 from __future__ import annotations
@@ -39,20 +39,34 @@ def robot() -> mujoco.MjSpec:
     )
 
 
+def add_boxes(body: mujoco.MjsBody, count: int) -> None:
+    """Adds flat boxes at random places."""
+    rng = np.random.default_rng(1)
+    for _ in range(count):
+        pos, size = (*rng.uniform(-5, 5, 2), 0.0), rng.uniform(0.05, 0.4, 3) * (1, 1, 0.2)
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, contype=0, conaffinity=0)
+
+
 def ground(boxes: int) -> Callable[[mujoco.MjSpec], None]:
     """Adds a plane and flat boxes to the world."""
 
     def add(spec: mujoco.MjSpec) -> None:
-        rng = np.random.default_rng(1)
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 1))
-        for _ in range(boxes):
-            pos, size = (*rng.uniform(-5, 5, 2), 0.0), rng.uniform(0.05, 0.4, 3) * (1, 1, 0.2)
-            spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=pos, size=size, contype=0, conaffinity=0)
+        add_boxes(spec.worldbody, boxes)
 
     return add
 
 
-def ours(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
+def furniture() -> mujoco.MjSpec:
+    """An entity with a fixed base and 200 flat boxes."""
+    spec = mujoco.MjSpec()
+    add_boxes(spec.worldbody.add_body(name="boxes"), 200)
+    return spec
+
+
+def ours(
+    specs: dict[str, Any], add_ground: Any, worlds: int, device: str
+) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
     trunk = mjs.ObjRef(type="body", name="trunk", entity="robot")
     sensors = (
         mjs.RayCastSensorCfg(
@@ -63,13 +77,16 @@ def ours(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[
             data_types=("depth",),
         ),
     )  # fmt: skip
-    cfg = mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model=robot())}, sensors=sensors, spec_fn=add_ground)
+    entities = {name: mjs.EntityCfg(model=spec()) for name, spec in specs.items()}
+    cfg = mjs.SceneCfg(entities=entities, sensors=sensors, spec_fn=add_ground)
     sim: Any = mjs.Simulation(mjs.Scene(cfg), worlds, backend="warp", device=device)
-    calls = {cfg.name: sim._sensors[cfg.name].update for cfg in sensors}
+    calls = {cfg.name: sim._sensors.by_name[cfg.name].update for cfg in sensors}
     return calls, lambda qpos: sim.set_state(qpos=qpos), lambda name: sim.scene[name].fields
 
 
-def mjlab(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
+def mjlab(
+    specs: dict[str, Any], add_ground: Any, worlds: int, device: str
+) -> tuple[dict[str, Callable[[], None]], Callable[[Any], None], Any]:
     import torch
     from mjlab.entity import EntityCfg
     from mjlab.scene import Scene, SceneCfg
@@ -89,7 +106,7 @@ def mjlab(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable
     }  # fmt: skip
     calls, writers, readers = {}, [], {}
     for name, cfg in configs.items():
-        entities = {"robot": EntityCfg(spec_fn=robot)}
+        entities = {name: EntityCfg(spec_fn=spec) for name, spec in specs.items()}
         scene = Scene(SceneCfg(num_envs=worlds, entities=entities, sensors=(cfg,), spec_fn=add_ground), device=device)
         sim = Simulation(num_envs=worlds, cfg=SimulationCfg(), model=scene.compile(), device=device)
         scene.initialize(sim.mj_model, sim.model, sim.data)
@@ -115,11 +132,12 @@ def mjlab(add_ground: Any, worlds: int, device: str) -> tuple[dict[str, Callable
 
 def measure(call: Callable[[], None], device: str) -> float:
     wp.synchronize_device(device)
-    begin = time.perf_counter()
+    clock = time.process_time if device == "cpu" else time.perf_counter
+    begin = clock()
     for _ in range(5):
         call()
     wp.synchronize_device(device)
-    return (time.perf_counter() - begin) / 5 * 1e3
+    return (clock() - begin) / 5 * 1e3
 
 
 def main() -> None:
@@ -135,8 +153,13 @@ def main() -> None:
     else:
         programs["mjlab"] = mjlab
     rng = np.random.default_rng(0)
-    for boxes in (0, 200):
-        made = {name: make(ground(boxes), options.worlds, options.device) for name, make in programs.items()}
+    fixed = {"robot": robot, "boxes": furniture}
+    for title, specs, boxes in (
+        ("plane", {"robot": robot}, 0),
+        ("200 boxes of the world", {"robot": robot}, 200),
+        ("200 boxes of an entity", fixed, 0),
+    ):
+        made = {name: make(specs, ground(boxes), options.worlds, options.device) for name, make in programs.items()}
         qpos = np.tile([0, 0, 0.35, 1, 0, 0, 0, 0, 0, 0, 0], (options.worlds, 1)).astype(np.float32)
         qpos[:, :2] += rng.uniform(-3, 3, (options.worlds, 2))
         for _, write, _ in made.values():
@@ -151,7 +174,7 @@ def main() -> None:
                 mine, other = (made[name][2](sensor) for name in ("mjsense", "mjlab"))
                 field = "distances" if "distances" in mine else "depth"
                 row += f", largest difference {np.abs(on_host(mine[field]) - on_host(other[field])).max():.1e} m"
-            print(f"{boxes} boxes, {sensor}, {options.worlds} worlds on {options.device}: {row}", flush=True)
+            print(f"{title}, {sensor}, {options.worlds} worlds on {options.device}: {row}", flush=True)
 
 
 if __name__ == "__main__":

@@ -66,6 +66,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/robots/base_placement.h
   mjsense/robots/controllers/controller.h
   mjsense/robots/controllers/controller_cfg.h
+  mjsense/robots/hands.h
   mjsense/robots/kinematics.h
   mjsense/robots/link.h
   mjsense/robots/load_robot.h
@@ -95,6 +96,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scenes/scene_file.h
   mjsense/scenes/scene_task.h
   mjsense/scenes/scene_variation.h
+  mjsense/scenes/world_field.h
   mjsense/sensors/builtin/builtin_sensor.h
   mjsense/sensors/camera/camera_sensor_cfg.h
   mjsense/sensors/contact/contact_match.h

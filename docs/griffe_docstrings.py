@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Griffe extension: turns the reStructuredText marks of our docstrings (roles, double backticks, `::`) into Markdown, and gives the
-configurations (`mjsense._dataclass`) the signature that their fields make."""
+"""Griffe extension: turns the reStructuredText marks of our docstrings (roles, double backticks, `::`) into Markdown, gives the
+configurations (`mjsense._dataclass`) the signature that their fields make, and shows components of the state (`_State("text")`) as arrays.
+Members of a private base class in the same module are shown as those of the class."""
 
+import copy
 import re
 from typing import Any
 
@@ -9,9 +11,15 @@ import griffe
 
 ROLE = re.compile(r":(?:class|func|meth|mod|attr):`~?([\w.]+)`")
 
+STATES = {"_State": ("float64", "NDArray[float64]"), "Component": ("float32, on the device", "Any")}
+
 
 class Docstrings(griffe.Extension):
     def on_object(self, *, obj: griffe.Object, loader: Any, **kwargs: Any) -> None:
+        if isinstance(obj, griffe.Attribute) and (state := re.fullmatch(r"(_State|Component)\(['\"](.+)['\"]\)", str(obj.value))):
+            about, obj.annotation = STATES[state[1]]
+            obj.docstring = griffe.Docstring(f"{state[2]} Live, {about}; call `forward()` after writing.", parent=obj)
+            obj.value = None
         if obj.docstring is None:
             return
         text = ROLE.sub(lambda match: reference(match[1], obj), obj.docstring.value)
@@ -23,6 +31,9 @@ class Docstrings(griffe.Extension):
             for cls in module.classes.values() if not module.is_alias else ():
                 if cls.is_alias:
                     continue
+                for base in [base for base in cls.mro() if base.parent is module and base.name[0] == "_"]:
+                    for name in base.members.keys() - cls.members.keys():
+                        cls.set_member(name, copy.copy(base.members[name]))
                 cls.bases = [base for base in cls.bases if "._" not in getattr(base, "canonical_path", "")]  # private ones
                 if any("_dataclass.dataclass" in d.callable_path for d in cls.decorators):
                     parameters = [griffe.Parameter(f.name, annotation=f.annotation, kind=griffe.ParameterKind.positional_or_keyword,

@@ -309,9 +309,10 @@ class Follower:
         return np.concatenate([move, np.where(shut, CLOSED, 0)[:, None]], 1).astype(np.float32)
 
 
-def success_rate(network, episodes, scene="", seed=10_000, worlds=50):
-    """Share of unseen episodes in which the robot held the object above the table for HELD steps without a break."""
-    won = []
+def evaluate(network, episodes, scene="", seed=10_000, worlds=50):
+    """For each of some unseen episodes, whether the robot held the object above the table for HELD steps without a break, and whether the
+    training contained all words of the instruction: two bool arrays ``[episodes]``."""
+    won, known = [], []
     with closing(mjs.make_vec("pick", "franka", scene=scene, num_envs=min(worlds, episodes), arm_controller=CONTROLLER, horizon=STEPS + 1, width=WIDTH,
                               height=HEIGHT, camera_system="close_up", instructions="canonical", action_noise=False,
                               observations=[*CAMERAS, "qpos", "tcp_pose"])) as env:  # fmt: skip
@@ -324,7 +325,8 @@ def success_rate(network, episodes, scene="", seed=10_000, worlds=50):
                 held = np.where(info["success"], held + 1, 0)
                 lifted |= held >= HELD
             won.extend(lifted)
-    return np.mean(won)
+            known.extend(set(text.lower().split()) <= set(network.vocabulary) for text in env.instructions)
+    return np.array(won), np.array(known)
 
 
 def main():
@@ -343,8 +345,10 @@ def main():
         network = trained(chosen)
         if chosen.network:
             torch.save(network, chosen.network)
-    rate = success_rate(network, chosen.judged, chosen.scene)
-    print(f"trained: {rate:.1%} of {chosen.judged} unseen episodes", flush=True)
+    won, known = evaluate(network, chosen.judged, chosen.scene)
+    print(f"trained: {won.mean():.1%} of {len(won)} unseen episodes", flush=True)
+    if not known.all():
+        print(f"  {won[~known].sum()} of {np.sum(~known)} whose instructions have unknown words, {won[known].sum()} of {known.sum()} others")
 
 
 def trained(chosen):
@@ -353,7 +357,7 @@ def trained(chosen):
         data = Demonstrations(chosen.data or record(out, chosen.episodes), chosen.episodes)
     print(f"{chosen.episodes} demonstrations, {len(data.state)} steps", flush=True)
     network = new_network(data)
-    print(f"untrained: {success_rate(network.eval(), min(50, chosen.judged), chosen.scene):.0%}", flush=True)
+    print(f"untrained: {evaluate(network.eval(), min(50, chosen.judged), chosen.scene)[0].mean():.0%}", flush=True)
     return train(network, data, chosen.steps)
 
 

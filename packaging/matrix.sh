@@ -32,7 +32,7 @@ environment() { # PYTHON NAME
   rm -rf "$venv"
   "$1" -m venv "$venv"
   mapfile -t others < <(cd packaging && "$python" -c 'import resolve, sys; [print(r) for r in resolve.ENVIRONMENTS[sys.argv[1]]]' "$2")
-  if ! "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py PyOpenGL "${others[@]}"; then
+  if ! "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py PyOpenGL imageio "${others[@]}"; then
     failures+=("$what: pip install")
     return
   fi
@@ -49,7 +49,7 @@ environment() { # PYTHON NAME
   esac
   check "$what: tests" "$venv/bin/python" -m pytest -q -p no:cacheprovider "${tests[@]}"
   # Images against this version's OpenGL renderer, and in the subprocesses of Gymnasium, Stable-Baselines3 and PyTorch where they are installed.
-  [ -z "$mujoco" ] || check "$what: images" "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_renderer.py -k "look_as_in_opengl or processes or workers"
+  [ -z "$mujoco" ] || check "$what: images" "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_renderer.py tests/python/test_renderer_opengl.py -k "look_as_in_opengl or processes or workers"
 }
 
 for each in "${pythons[@]}"; do

@@ -310,7 +310,7 @@ class Generator:
             text += '\n\ndef replace(cfg: Any, **changes: Any) -> Any:\n    """A copy of a configuration with some fields changed."""\n'
             text += "    return dataclasses.replace(cfg, **changes)\n"
             names = ["replace", *wanted]
-            text += "\n\n__all__ = [\n" + "".join(f"    {quoted(n)},\n" for n in sorted(names)) + "]\n"
+            text += "\n\n" + exported(names)
         return text + "\nshow_field_docs(__name__)\n"
 
     def data_classes(self) -> str:
@@ -321,8 +321,7 @@ class Generator:
             text += f"\n\n@dataclass(slots=True, repr=False, frozen=True)\nclass {name}(SensorData):\n{body}\n"
         kinds = "".join(f"    {quoted(k)}: {v},\n" for k, v in self.data_of_kind.items())
         text += f"\n\nDATA_OF_KIND: dict[str, type] = {{\n{kinds}}}\n\"\"\"By a sensor's kind; others return an array.\"\"\"\n"
-        names = ["DATA_OF_KIND", "SensorData", "make_data", *self.data]
-        text += "\n__all__ = [" + ", ".join(quoted(n) for n in sorted(names)) + "]\n"
+        text += "\n" + exported(["DATA_OF_KIND", "SensorData", "make_data", *self.data])
         return text + "\nshow_field_docs(__name__)\n"
 
     # --------------------------------------------------------------------------------------------------- signatures
@@ -380,7 +379,7 @@ class Generator:
             option, default, text = f["option"].replace("_", "-"), f["default"], markdown(field_text(f))
             if f["type"]["kind"] == "bool":
                 shown = f"--no-{option}" if default else f"--{option}"
-                text = f"Not: {text[0].lower()}{text[1:]}" if default and not f["hidden"] else text
+                text = f"Do not {text[0].lower()}{text[1:]}" if default and not f["hidden"] else text
                 default = ""
             else:
                 shown = f"--{option}"
@@ -414,6 +413,12 @@ class Generator:
 
 def quoted(text: str) -> str:
     return json.dumps(text)
+
+
+def exported(names: list[str]) -> str:
+    """The list ``__all__``."""
+    lines = textwrap.wrap(", ".join(map(quoted, sorted(names))), WIDTH - 4)
+    return "__all__ = [\n" + textwrap.indent("\n".join(lines), "    ") + ",\n]  # fmt: skip\n"
 
 
 def literal(words: list[str]) -> str:

@@ -10,6 +10,7 @@ repeated alone.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import tempfile
 from pathlib import Path
@@ -41,14 +42,19 @@ def check(task: str, robot: str, episodes: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def row(r: dict[str, Any]) -> str:
-    return (f"| `{r['task']}` | {r['robot']} | {r['episodes']} | {r['steps']} | {r['stepwise']} of {r['episodes']} | {r['open_loop']} of {r['episodes']} | "
-            f"{r['equal']} of {r['streams']} |")  # fmt: skip
+def row(results: list[dict[str, Any]]) -> str:
+    """The row of a task: sums over its robots."""
+    robots = ", ".join(r["robot"] for r in results)
+    episodes, steps, stepwise, open_loop, equal, streams = (
+        sum(r[key] for r in results) for key in ("episodes", "steps", "stepwise", "open_loop", "equal", "streams")
+    )
+    counts = f"{episodes} | {steps} | {stepwise} of {episodes} | {open_loop} of {episodes} | {equal} of {streams}"
+    return f"| `{results[0]['task']}` | {robots} | {counts} |"
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    head = ["| task | robot | episodes | steps | stepwise | open loop | streams |", "| --- | --- | ---: | ---: | ---: | ---: | ---: |"]
-    return "\n".join([*head, *map(row, results)])
+    head = ["| task | robots | episodes | steps | stepwise | open loop | streams |", "| --- | --- | ---: | ---: | ---: | ---: | ---: |"]
+    return "\n".join([*head, *(row(list(group)) for _, group in itertools.groupby(results, lambda r: r["task"]))])
 
 
 def main() -> None:
@@ -64,7 +70,7 @@ def main() -> None:
             kept.write_text(json.dumps(check(task, robot, arguments.episodes)))
         if kept.exists():
             results.append(json.loads(kept.read_text()))
-            print(row(results[-1]), *results[-1]["deviations"][:5], sep="\n  ", flush=True)
+            print(row(results[-1:]), *results[-1]["deviations"][:5], sep="\n  ", flush=True)
     before, rest = PAGE.read_text().split(BEGIN, 1)
     PAGE.write_text(f"{before}{BEGIN}\n{table(results)}\n{END}{rest.split(END, 1)[1]}")
 

@@ -43,7 +43,7 @@ VIEWS = {
     "scene_shelf": View("pick", "shelf", pos=(-1.1, -1.1, 1.6), target=(0.6, 0.0, 0.85)),
     "scene_kitchen": in_kitchen("open"),
     "scene_kitchen_1": View("close", "kitchen:1", pos=(-1.9, 0.9, 1.6), target=(0.3, 0.0, 0.95)),
-    "scene_room_with_door": View("door_opening", "room_with_door", "rby1", steps=3, pos=(-3.0, 1.2, 1.75), target=(0.0, -0.2, 0.9)),
+    "scene_room_with_door": View("door_opening", "room_with_door", "rby1", steps=3, pos=(-3.1, 1.3, 1.75), target=(0.0, -0.15, 0.95), seed=4),
     "scene_floor": View("nav_to_obj", "floor", "rby1", steps=3, pos=(0.4, 0.4, 2.4), target=(4.0, 3.5, 0.3)),
     "scene_libero_kitchen": View("pick", "libero/kitchen", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
     "scene_libero_table": View("pick", "libero/table", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),

@@ -4,15 +4,13 @@
     python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT]] [--perturb]
 
 Plays every pair of CASES without cameras. Each attempt is an episode with a different seed; failures are recorded, too. Scenes of
-packages that are not installed are skipped with a message. Results are stored in .cache/tasks, so that a part can be repeated
-alone.
+packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page.
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
-import json
 import sys
 import tempfile
 from pathlib import Path
@@ -29,13 +27,25 @@ for build in ("release", "dev"):
 
 import mjsense as mjs
 
-PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "tasks"
+PAGE = ROOT / "docs" / "tasks.md"
 BEGIN, END = "<!-- task table -->", "<!-- end -->"
 HOUSES = 30
 # (task, robot, scene). Scene "": the task's default; "name:*": HOUSES houses with some episodes in each.
 CASES = (
     *(("pick", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
-    *(("pick", "franka", scene) for scene in ("table", "tableware", "clutter", "shelf", "kitchen:*", "libero/kitchen", "libero/study", "libero/living_room")),
+    *(
+        ("pick", "franka", scene)
+        for scene in (
+            "table",
+            "tableware",
+            "clutter",
+            "shelf",
+            "kitchen:*",
+            "libero/kitchen",
+            "libero/study",
+            "libero/living_room",
+        )
+    ),
     ("pick", "i2rt_yam", "clutter"),
     ("pick", "i2rt_yam", "shelf"),
     ("pick", "rby1", "clutter"),
@@ -114,20 +124,25 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
     }  # fmt: skip
 
 
+def label(task: str, robot: str, scene: str) -> str:
+    """The first two cells of a row."""
+    where = f" in `{scene}`" if scene else ""
+    if scene.endswith(":*"):
+        where = f" in {HOUSES} of `{scene[:-2]}`"
+    return f"| `{task}`{where} | {robot} |"
+
+
 def row(r: dict[str, Any]) -> str:
-    scene = f" in `{r['scene']}`" if r["scene"] else ""
-    if r["scene"].endswith(":*"):
-        scene = f" in {HOUSES} of `{r['scene'][:-2]}`"
     slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
-    return (f"| `{r['task']}`{scene} | {r['robot']} | {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
+    return (f"{label(r['task'], r['robot'], r['scene'])} {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
             f"{slanted} | {r['first_action_ms']:.0f} | {r['steps_per_second']:.0f} | {why} |")  # fmt: skip
 
 
-def table(results: list[dict[str, Any]]) -> str:
+def table(rows: list[str]) -> str:
     head = ["| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | failures |",
             "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |"]  # fmt: skip
-    return "\n".join([*head, *map(row, results)])
+    return "\n".join([*head, *rows])
 
 
 def main() -> None:
@@ -135,23 +150,24 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--only", default="", help="TASK, TASK/ROBOT or TASK/ROBOT/SCENE")
     arguments = parser.parse_args()
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    results = []
-    for task, robot, scene in CASES:
-        kept = RESULTS / f"{task}-{robot}-{scene.replace('/', '.').replace(':*', '-houses') or 'own'}.json"
+    text = PAGE.read_text()
+    before, rest = text.split(BEGIN, 1)
+    old, after = rest.split(END, 1)
+    rows = []
+    for case in CASES:
+        task, robot, scene = case
+        kept = [line for line in old.splitlines() if line.startswith(label(*case))]
         if arguments.only in ("", task, f"{task}/{robot}", f"{task}/{robot}/{scene}"):
             try:
-                kept.write_text(json.dumps(play(task, robot, scene, arguments.episodes)))
+                kept = [row(play(*case, arguments.episodes))]
             except ValueError as error:
                 if "pip install" not in str(error):
                     raise
                 print(f"{task}/{robot} in {scene}: skipped: {error}", flush=True)
-        if kept.exists():
-            results.append(json.loads(kept.read_text()))
-            print(row(results[-1]), flush=True)
-    text = PAGE.read_text()
-    before, rest = text.split(BEGIN, 1)
-    PAGE.write_text(f"{before}{BEGIN}\n{table(results)}\n{END}{rest.split(END, 1)[1]}")
+            else:
+                print(*kept, flush=True)
+        rows += kept
+    PAGE.write_text(f"{before}{BEGIN}\n{table(rows)}\n{END}{after}")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "mjsense/app/list_command.h"
+#include "mjsense/app/text_table.h"
 #include "python/bindings/bindings.h"
 
 namespace mjsense::python {
@@ -24,6 +25,10 @@ void bind_program(nb::module_& m) {
   m.def(
       "objects_json", [] { return app::list_objects(true); },
       "What `mjsense objects --json` prints.");
+  m.def(
+      "tree_text", [](const std::string& folder) { return app::tree_text(folder); },
+      nb::arg("folder"),
+      "The files below a folder and their sizes, as `mjsense record` prints them.");
   m.def(
       "run_program",
       [](const std::vector<nb::bytes>& given,

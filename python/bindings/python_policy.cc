@@ -69,13 +69,13 @@ std::string PythonPolicy::place(const char* method) const {
   return fmt::format("policy '{}': {}()", name_, method);
 }
 
-// For example "(64, 8), or (64, H, 8) for H steps; 8 are arm 7, gripper 1".
+// For example "(64, 8), or (64, H, 8) for H steps, with the columns arm 7, gripper 1".
 std::string PythonPolicy::layout_text() const {
   std::vector<std::string> groups;
   for (std::size_t i = 0; i < group_.size(); ++i)
     groups.push_back(fmt::format("{} {}", task_->robot().groups()[group_[i]].name, width_[i]));
   const int B = task_->num_worlds();
-  return fmt::format("({0}, {1}), or ({0}, H, {1}) for H steps; {1} are {2}", B, n_,
+  return fmt::format("({0}, {1}), or ({0}, H, {1}) for H steps, with the columns {2}", B, n_,
                      fmt::join(groups, ", "));
 }
 

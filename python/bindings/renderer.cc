@@ -86,6 +86,7 @@ render::SoftArrays soft_arrays(const nb::dict& fields) {
   MJSENSE_SOFT(skinvert);
   MJSENSE_SOFT(skinnormal);
 #undef MJSENSE_SOFT
+  soft.num_flexes = static_cast<int>(arrays.at("flexvertadr").rows());
   return soft;
 }
 
@@ -168,7 +169,18 @@ void bind_renderer(nb::module_& m) {
   nb::class_<BoundRenderer>(m, "SceneRenderer")
       .def(nb::init<nb::dict, nb::dict, nb::dict, nb::dict, nb::dict>())
       .def("render", &BoundRenderer::render)
-      .def("reload", [](BoundRenderer& r) { r.renderer.reload(); });
+      .def("reload", [](BoundRenderer& r) { r.renderer.reload(); })
+      .def("prepared", [](const BoundRenderer& r) {
+        const render::PreparedAssets found = r.renderer.prepared();
+        nb::dict out;
+        out["meshes"] = found.meshes;
+        out["clusters"] = found.clusters;
+        out["trees"] = found.trees;
+        out["surfaces"] = found.surfaces;
+        out["textures"] = found.textures;
+        out["levels"] = found.levels;
+        return out;
+      });
 }
 
 }  // namespace mjsense::python

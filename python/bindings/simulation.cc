@@ -3,6 +3,7 @@
 
 #include "mjsense/sim/simulation.h"
 
+#include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -12,6 +13,8 @@
 
 #include <algorithm>
 
+#include "mjsense/core/error.h"
+#include "mjsense/scene/mujoco_log.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/data_copies.h"
 #include "python/bindings/derived_field.h"
@@ -27,6 +30,17 @@ using Ids = std::optional<std::vector<int>>;
 // None selects all worlds.
 worlds::WorldIds worlds_of(const Ids& ids) {
   return ids ? worlds::WorldIds(*ids) : worlds::WorldIds(worlds::all_worlds);
+}
+
+// Computes the values that MuJoCo derives from other fields of the model.
+void set_constants(mjBatch* batch, const std::vector<int>& ids) {
+  const int failed = mjb_setConst(batch, ids.data(), static_cast<int>(ids.size()));
+  scene::drop_warnings(false);  // an error leaves the flag set
+  if (failed == 0) return;
+  const auto world = std::ranges::find_if(ids, [&](int w) { return *mjb_error(batch, w) != 0; });
+  throw ValueError(world == ids.end() ? "MuJoCo cannot use these values"
+                                      : fmt::format("MuJoCo cannot use the values of world {}: {}",
+                                                    *world, mjb_error(batch, *world)));
 }
 
 void step(PySimulation& self, int control_steps) {
@@ -233,9 +247,7 @@ void bind_simulation(nb::module_& m) {
             s.change("randomize", [&](sim::Simulation& sim) {
               const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
               if (checked.empty()) return;  // MuJoCo would interpret an empty list as all worlds
-              if (set_const)
-                mjb_setConst(sim.worlds().batch(), checked.data(),
-                             static_cast<int>(checked.size()));
+              if (set_const) set_constants(sim.worlds().batch(), checked);
               sim.worlds().model_changed();
             });
           },

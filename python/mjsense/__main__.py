@@ -6,14 +6,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from itertools import pairwise
 
 from mjsense import _core, commands
-from mjsense.assets import use_installed_meshes
+from mjsense.assets import use_installed_files
 from mjsense.cluster import program as cluster
 from mjsense.cluster import tools
 from mjsense.commands import quality, record_format
-from mjsense.ffmpeg import use_installed_ffmpeg
 
 
 def main() -> int:
@@ -36,9 +34,7 @@ def main() -> int:
     if words[:2] == ["complete", "--"] and len(words) > 3 and words[2] in commands.COMMANDS:
         print(*commands.completions(words[2:]), sep="\n")
         return 0
-    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
-        use_installed_meshes()
-    use_installed_ffmpeg()
+    use_installed_files(words)
     return _core.run_program([b"mjsense", *map(os.fsencode, words)], list(commands.COMMANDS.items()))
 
 

@@ -7,7 +7,6 @@ once. A call then costs one test per given argument.
 
 from __future__ import annotations
 
-import difflib
 import functools
 import inspect
 import re
@@ -18,6 +17,8 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
+
+from mjsense.errors import did_you_mean
 
 Seed = int
 """A non-negative int of 64 bits."""
@@ -40,6 +41,14 @@ def _is_list(value: Any) -> bool:
     return hasattr(value, "__iter__") and not isinstance(value, (str, bytes))
 
 
+def _is_list_of_str(value: Any) -> bool:
+    return _is_list(value) and all(isinstance(one, str) for one in value)
+
+
+def _is_iterable_of_str(value: Any) -> bool:
+    return _is_list_of_str(value) if hasattr(value, "__len__") else _is_list(value)  # others can be read only once
+
+
 def _is_a(value: Any, name: str) -> bool:
     return any(base.__name__ == name for base in type(value).__mro__)
 
@@ -55,7 +64,8 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Path": (lambda value: isinstance(value, PurePath), "a Path"),
     "Callable": (callable, "a function"),
     "OutputArray": (lambda value: isinstance(value, np.ndarray), "a numpy array"),
-    "Sequence[str]": (lambda value: _is_list(value) and all(isinstance(v, str) for v in value), "a sequence of str"),
+    "Sequence[str]": (_is_list_of_str, "a sequence of str"),
+    "Iterable[str]": (_is_iterable_of_str, "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),
     "Tasks": (lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task") or hasattr(value, "_mjs_compose"), "a mjsense.Task or the name of one"),
@@ -115,15 +125,21 @@ def _short(value: Any) -> str:
     return text if len(text) <= 120 else f"{text[:117]}..."
 
 
-def checked(target: T, owner: str = "") -> T:
-    """Decorates a function, or a class with public methods, to check arguments against their annotations."""
+def checked(target: T, owner: str = "", context: str = "") -> T:
+    """Decorates a function, or a class with public methods, to check arguments against their annotations.
+
+    Args:
+        owner: Name of the class of a method.
+        context: What messages begin with; by default the name of the function, and that of its class.
+    """
     if isinstance(target, type):
         for name, value in list(vars(target).items()):
             if isinstance(value, FunctionType) and (name in ("__init__", "__call__", "__getitem__") or name[0] != "_"):
                 setattr(target, name, checked(value, target.__name__))
         return target
     function: Any = target
-    context = f"{owner}()" if function.__name__ == "__init__" else f"{owner}.{function.__name__}()".lstrip(".")
+    if not context:
+        context = f"{owner}()" if function.__name__ == "__init__" else f"{owner}.{function.__name__}()".lstrip(".")
     parameters = inspect.signature(function).parameters
     checks = {name: _check_of(context, name, p.annotation) for name, p in parameters.items() if p.kind is not p.VAR_KEYWORD}
     if not any(checks.values()):
@@ -138,9 +154,7 @@ def checked(target: T, owner: str = "") -> T:
                 check(value)
         for name, value in kwargs.items():
             if closed and name not in checks:
-                near = difflib.get_close_matches(name, checks, 3)
-                hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-                raise TypeError(f"{context} got an unexpected keyword argument '{name}'{hint}")
+                raise TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, checks)}")
             check = checks.get(name)
             if check is not None:
                 check(value)
@@ -166,8 +180,6 @@ class KnownAttributes:
             and not hasattr(cls, name)
             and cls.__module__.split(".")[0] == "mjsense"
         ):
-            known = {*fields, *self.__dict__, *dir(cls)}
-            near = difflib.get_close_matches(name, [k for k in known if k[0] != "_"], 3)
-            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-            raise AttributeError(f"{cls.__name__} has no attribute '{name}'{hint}")
+            known = {one for one in (*fields, *self.__dict__, *dir(cls)) if one[0] != "_"}
+            raise AttributeError(f"{cls.__name__} has no attribute '{name}'{did_you_mean(name, known)}")
         object.__setattr__(self, name, value)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mjsense import _core, _libmujoco, _mujoco
+from mjsense import _core, _libmujoco, _mujoco_views
 from mjsense._spec import RENUMBERED
 
 _ENUMS = {"actuator_dyntype": "mjtDyn", "actuator_gaintype": "mjtGain", "actuator_biastype": "mjtBias", "eq_type": "mjtEq"}
@@ -34,7 +34,7 @@ _GONE = ("flex", "cam_orthographic", "light_directional")
 
 def package_of(model: Any) -> Any:
     """The ``mujoco`` that this model belongs to; None if it is a view of mjsense. Raises TypeError for other objects."""
-    if isinstance(model, _mujoco.MjModelView):
+    if isinstance(model, _mujoco_views.MjModelView):
         return None
     mujoco = sys.modules.get("mujoco")  # who has a model has imported it
     if mujoco is None or not isinstance(model, mujoco.MjModel):
@@ -63,7 +63,7 @@ def copy_of(model: Any) -> Any:
     for size, what in (("nflex", "flexes"), ("nplugin", "plugins"), ("nhistory", "histories of sensors or actuators")):
         if getattr(model, size, 0):
             raise ValueError(f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {_libmujoco.REQUIREMENT}")
-    view = _mujoco.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
+    view = _mujoco_views.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
     _refuse_unknown(model, view, version)
     for name, place in _core.model_fields(view._address).items():
         if isinstance(place, dict) or name in ("names", "paths", "text_data") or (place[2] == () and not name.startswith("flg_")):

@@ -46,7 +46,7 @@ def installed() -> str:
 
 
 def _error(problem: str, mend: str) -> ImportError:
-    return ImportError(f"mjsense cannot be loaded: {problem}; installed: {installed()}. Mend it with: {mend}")
+    return ImportError(f"mjsense cannot be loaded: {problem}; installed: {installed()}. Repair it with: {mend}")
 
 
 def _series(version: str) -> tuple[int, ...]:

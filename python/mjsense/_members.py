@@ -6,8 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+from mjsense._foreign_sensor import as_sensor
 from mjsense.native_sensor import NativeSensor
-from mjsense.sensor import Sensor, as_sensor
+from mjsense.sensor import Sensor
 
 if TYPE_CHECKING:
     from mjsense.simulation import Simulation

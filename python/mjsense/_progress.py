@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from mjsense._recording import RecordProgress
@@ -40,6 +40,11 @@ class ProgressLine:
             sys.stderr.write(text + "\n")
         sys.stderr.flush()
         self._shown = text
+
+
+def line_of(progress: Any) -> ProgressLine | None:
+    """The line that an argument ``progress`` asks for: True: one; None: one where it can be overwritten; False or a function: none."""
+    return ProgressLine() if progress is True or (progress is None and interactive()) else None
 
 
 def tracked(items: Iterable[T], total: int, what: str, *, enabled: bool | None = None) -> Iterator[T]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjsense import _mujoco
+from mjsense._written_values import numbers
 
 _IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
 """Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
@@ -28,6 +29,8 @@ _FIXED = {
 }  # fmt: skip
 """Floating-point model fields that may not differ between worlds: buffer sizes and data structures depend on them."""
 
+_NOT_NEGATIVE = {"body_mass", "body_inertia", "geom_size", "site_size"}
+
 
 def check_randomizable(model: Any, field: str) -> None:
     """Raises ValueError for a field that is the same in all worlds."""
@@ -41,14 +44,21 @@ def check_randomizable(model: Any, field: str) -> None:
 
 def valid_values(model: Any, field: str, values: Any, like: np.ndarray, worlds: np.ndarray) -> np.ndarray:
     """Values of a model field with the shape and dtype of `like`, a row for each of these worlds."""
+    given = numbers(field, values)
+    with np.errstate(invalid="ignore"):  # NaN has no integer
+        typed = given.astype(like.dtype)
+    if like.dtype.kind in "iu" and (different := typed != given).any():
+        raise ValueError(f"{field}: values must be integers, not {given[different][0]}")
     try:
-        values = np.broadcast_to(np.asarray(values, like.dtype), like.shape)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{field}: values must be of shape {like.shape} or broadcast to it: {error}") from None
+        values = np.broadcast_to(typed, like.shape)
+    except ValueError:
+        raise ValueError(f"{field}: shape {given.shape} does not broadcast to {like.shape}") from None
     if values.dtype.kind == "f" and not np.isfinite(values).all():
-        world, *element = np.argwhere(~np.isfinite(values))[0].tolist()
-        place = f"that of world {worlds[world]}, element {element}"
-        raise ValueError(f"{field}: values must be finite numbers; {place} is {values[(world, *element)]}")
+        place, value = _first(~np.isfinite(values), values, worlds)
+        raise ValueError(f"{field}: values must be finite numbers; {place} is {value}")
+    if field in _NOT_NEGATIVE and (values < 0).any():
+        place, value = _first(values < 0, values, worlds)
+        raise ValueError(f"{field}: values must be at least 0; {place} is {value}")
     if field.endswith("_condim") and not np.isin(values, (1, 3, 4, 6)).all():
         raise ValueError(f"{field}: values must be 1, 3, 4 or 6")
     if field in ("geom_type", "light_type", "cam_projection"):
@@ -65,9 +75,33 @@ def valid_values(model: Any, field: str, values: Any, like: np.ndarray, worlds: 
         if (values < -1).any() or (values >= count).any():
             raise ValueError(f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none")
     if field.endswith("quat") and values.size and (norms := np.linalg.norm(values, axis=-1)).min() < 1e-12:
-        world, *element = np.argwhere(norms < 1e-12)[0].tolist()
-        raise ValueError(f"{field}: values must be quaternions; that of world {worlds[world]}, element {element}, has length 0")
+        place, _ = _first(norms < 1e-12, norms, worlds)
+        raise ValueError(f"{field}: values must be quaternions; {place}, has length 0")
     return values
+
+
+def _first(wrong: np.ndarray, values: np.ndarray, worlds: np.ndarray) -> tuple[str, Any]:
+    """The place of the first of the wrong values, for messages, and the value."""
+    world, *element = np.argwhere(wrong)[0].tolist()
+    return f"that of world {worlds[world]}, element {element}", values[(world, *element)]
+
+
+def bounds_of_meshes(model: Any, ids: np.ndarray, now: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The values of geom_size, geom_aabb and geom_rbound, of which those of meshes fit these ``geom_dataid`` ``[B, ngeom]``.
+
+    MuJoCo has them from the compiler, and misses contacts outside of them.
+    """
+    sizes, boxes, radii = (now[name].copy() for name in ("geom_size", "geom_aabb", "geom_rbound"))
+    meshes = np.broadcast_to(model.geom_type == _mujoco.Geom.MESH, ids.shape)
+    for mesh in np.unique(ids[meshes]):
+        start = model.mesh_vertadr[mesh]
+        vertices = model.mesh_vert[start : start + model.mesh_vertnum[mesh]].astype(np.float64)
+        low, high = vertices.min(0), vertices.max(0)
+        here = meshes & (ids == mesh)
+        sizes[here] = np.maximum(-low, high)
+        boxes[here] = [*(high + low) / 2, *(high - low) / 2]
+        radii[here] = np.linalg.norm(np.maximum(-low, high))
+    return {"geom_size": sizes, "geom_aabb": boxes, "geom_rbound": radii}
 
 
 def _check_types(model: Any, field: str, values: np.ndarray) -> None:

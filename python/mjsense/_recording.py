@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -12,9 +11,9 @@ from typing import Any
 
 from mjsense import _core, _show
 from mjsense._parts import parts_of
-from mjsense._progress import ProgressLine, interactive, of_recording
+from mjsense._progress import line_of, of_recording
 from mjsense.assets import use_installed_meshes
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.simulation import Simulation
 
@@ -77,8 +76,7 @@ def check_names(options: Iterable[str]) -> None:
     known = {"worlds", *(field["name"] for field in json.loads(_core.schema())["structs"]["RecordJobCfg"]["fields"])}
     for name in options:
         if name not in known:
-            near = difflib.get_close_matches(name, known, 3)
-            raise UnknownNameError(f"record: unknown option '{name}'" + (f"; did you mean {', '.join(near)}?" if near else ""))
+            raise UnknownNameError(f"record: unknown option '{name}'{did_you_mean(name, known)}")
 
 
 def record_here(options: dict[str, Any], sensors: Iterable[Any] = (), progress: bool | Callable[[RecordProgress], None] | None = None) -> RecordSummary:
@@ -89,7 +87,7 @@ def record_here(options: dict[str, Any], sensors: Iterable[Any] = (), progress: 
     """
     options = {**PARTS, **options, "out": str(options["out"])}
     objects = parts_of(options, sensors)
-    line = ProgressLine() if progress is True or (progress is None and interactive()) else None
+    line = line_of(progress)
     show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
     report = None if show is None else lambda p: show(RecordProgress(**p))
     if options.get("meshes") == "real":

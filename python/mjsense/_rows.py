@@ -15,6 +15,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mjsense._streams import nest
+
 # dtype in which rows are stored if recordings do not support their own: it can represent every value.
 _KEPT = {"int8": "int32", "int16": "int32", "uint32": "int64", "float16": "float32"}
 _TYPES = {"float32", "float64", "uint8", "uint16", "int32", "int64", "bool"}
@@ -168,10 +170,4 @@ def nested(rows: list[Row], values: list[Any]) -> Any:
     """The inverse of leaves(): the array itself, or a nested dict."""
     if rows and not rows[0].path:
         return values[0]
-    out: dict[str, Any] = {}
-    for row, value in zip(rows, values):
-        inner = out
-        for key in row.path[:-1]:
-            inner = inner.setdefault(key, {})
-        inner[row.path[-1]] = value
-    return out
+    return nest({row.name: row.path for row in rows}, {row.name: value for row, value in zip(rows, values)})

@@ -13,7 +13,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mjsense import _core, _libmujoco
-from mjsense._mujoco import Obj, array_of
+from mjsense._mujoco import Obj
+from mjsense._mujoco_views import array_of
 
 _LISTS = {
     "bodies": Obj.BODY, "geoms": Obj.GEOM, "joints": Obj.JOINT, "sites": Obj.SITE, "cameras": Obj.CAMERA, "lights": Obj.LIGHT,
@@ -76,7 +77,7 @@ class _Owner(_Fields):
     _spec: MjSpecView
 
     def _add(self, kind: Obj, default: Any, given: dict[str, Any]) -> MjsView:
-        parent = 0 if self is self._spec else self._element  # pyright: ignore[reportAttributeAccessIssue]  # of MjsView
+        parent = 0 if self is self._spec else self._element  # of MjsView
         if (address := _core.spec_add(self._spec._address, parent, kind, default)) == 0:
             self._missing(f"add_{kind.name.lower()}")
         made = MjsView(self._spec, address)

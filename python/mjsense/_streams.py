@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from mjsense.errors import did_you_mean
 
 Streams = Mapping[str, tuple[str, Any, Any]]
 """stream name -> (sensor, spec, rows)"""
@@ -25,10 +26,8 @@ def choose_streams(wanted: Sequence[str] | None, streams: Streams, texts: Sequen
     for one in wanted:
         found = [name for name, (sensor, spec, _) in streams.items() if name == one or (sensor == one and not _is_empty(spec))]
         if not found:
-            known = [*dict.fromkeys(sensor for sensor, _, _ in streams.values()), *streams]
-            near = difflib.get_close_matches(one, known, 3)
-            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(streams)}"
-            raise ValueError(f"no sensor or stream '{one}'; {hint}")
+            known = [*(sensor for sensor, _, _ in streams.values()), *streams]
+            raise ValueError(f"no sensor or stream '{one}'{did_you_mean(one, known, 'there are')}")
         names += [name for name in found if name not in names]
     return names
 

@@ -51,7 +51,7 @@ def observe(instance: Any, env: Any, task: Any, world: int) -> Any:
 _RANDOM: Any = np.random  # its type stubs lack get_bit_generator() and set_bit_generator()
 
 
-class Dice:
+class RandomStreams:
     """Replaces NumPy's global random numbers while sensors are computed. Each world and time has its own stream, which does not
     depend on the world's id or on the other worlds. The program's random state is restored afterwards."""
 
@@ -62,13 +62,13 @@ class Dice:
         self._seeds = {world: (seed + occasion) % 2**32 for world, seed in zip(world_ids, seeds)}
         self._before: Any = None
 
-    def __enter__(self) -> Dice:
+    def __enter__(self) -> RandomStreams:
         if self._seeds:
-            if Dice._depth == len(self._own):
+            if RandomStreams._depth == len(self._own):
                 self._own.append(np.random.MT19937(0))
             self._before = _RANDOM.get_bit_generator()
-            _RANDOM.set_bit_generator(self._own[Dice._depth])
-            Dice._depth += 1
+            _RANDOM.set_bit_generator(self._own[RandomStreams._depth])
+            RandomStreams._depth += 1
         return self
 
     def seed(self, world: int) -> None:
@@ -77,7 +77,7 @@ class Dice:
 
     def __exit__(self, *exception: object) -> None:
         if self._seeds:
-            Dice._depth -= 1
+            RandomStreams._depth -= 1
             _RANDOM.set_bit_generator(self._before)
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -13,9 +12,9 @@ from mjsense import _foreign_model
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense._randomizable import check_randomizable
 from mjsense.configs import SceneCfg
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 from mjsense.scene import Scene
-from mjsense.simulation import Simulation, _ids
+from mjsense.simulation import Simulation
 
 _STATE = (
     "time", "qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "qacc_warmstart",
@@ -98,6 +97,9 @@ class Attached(KnownAttributes):
             return "<attached sensors, closed>"
         return f"<attached sensors {list(self._sim.scene.sensors)}, {self.num_worlds} worlds>"
 
+    def __reduce__(self) -> Any:
+        raise TypeError("attached sensors cannot be copied or pickled: attach to the copy of the model and data")
+
     def __enter__(self) -> Attached:
         return self
 
@@ -112,9 +114,7 @@ class Attached(KnownAttributes):
         sensors = self.sensors
         if name in sensors:
             return sensors[name]
-        near = difflib.get_close_matches(str(name), sensors, 3)
-        hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(sensors) or 'none'}"
-        raise UnknownNameError(f"no sensor named '{name}' is attached; {hint}")
+        raise UnknownNameError(f"no sensor named '{name}' is attached{did_you_mean(str(name), sensors, 'there are')}")
 
     def __contains__(self, name: object) -> bool:
         return name in self.sensors
@@ -251,7 +251,7 @@ class Attached(KnownAttributes):
         self._edited = edited
         if writes:
             self._sim._core.model_changed(None, False)
-            self._sim._follow_models()
+            self._sim._models.follow()
 
     def _changes(
         self, model: Any, known: dict[str, np.ndarray], what: str
@@ -280,8 +280,7 @@ class Attached(KnownAttributes):
         return values, rows
 
     def _worlds(self, ids: Sequence[int] | None) -> list[int]:
-        found = _ids(ids)
-        self._sim._rows(found)
+        found = self._sim._ids(ids)
         return list(range(self.num_worlds)) if found is None else found
 
     def _rows(self, worlds: Sequence[int]) -> tuple[np.ndarray, list[float]]:

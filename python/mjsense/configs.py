@@ -374,12 +374,13 @@ class ContactMatch(_config_methods.Config):
     mode: Literal["geom", "body", "subtree"]
     """Type of the matched elements. A subtree is a body and all its descendants."""
     pattern: str | Sequence[str]
-    """With an entity: regular expressions that must match a whole local name. Without: full MuJoCo names, taken
-    literally. Each pattern must match something, and no element may be matched twice."""
+    """With an entity: regular expressions that must match a whole local name. Without: full MuJoCo names; a pattern that
+    is none and has a special character, such as ``*`` or ``[``, is a regular expression that must match a whole full
+    name. Each pattern must match something, and no element may be matched twice."""
     entity: str | None = None
     """Entity that contains the elements."""
     exclude: Sequence[str] = ()
-    """With an entity: names to leave out; an entry with any of ``.*+?[]{}()\\|^$`` is a regular expression that is
+    """Names to leave out; an entry with a special character, such as ``*`` or ``[``, is a regular expression that is
     searched for."""
 
 
@@ -721,7 +722,8 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     description: str = ""
     """Description in one sentence."""
     extends: str | None = None
-    """A scene, by name or file, that provides the values that this file does not set."""
+    """A scene, by name or file, that provides the values that this file does not set. Lists replace those of the base,
+    except ``vary``."""
     base: str | None = None
     """An MJCF file, next to this file, that the scene starts from unchanged: its names get no prefix."""
     generator: str | None = None
@@ -745,7 +747,8 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     robot: SceneRobotCfg = field(default_factory=SceneRobotCfg)
     """Placement of the robot."""
     vary: Sequence[SceneVaryCfg] = ()
-    """What is randomised in every episode."""
+    """What is randomised in every episode. The entries of a scene with ``extends`` follow those of its base; ``vary =
+    []`` removes the base's."""
     moods: Sequence[SceneMoodCfg] = ()
     """Light moods; every episode uses one of them, all with the same probability."""
     sky: SceneSkyCfg | None = None
@@ -858,6 +861,9 @@ class SceneVaryCfg(_config_methods.Config):
     """light: maximum change of its direction; body: half width of the rotation about the vertical, degrees."""
     textures: Sequence[str] = ()
     """material: full names of the textures to choose from."""
+    optional: bool = False
+    """Ignore the entry if nothing matches its pattern, which is an error otherwise. Entries that a scene inherits are
+    optional."""
 
 
 @dataclass
@@ -905,44 +911,12 @@ def replace(cfg: Any, **changes: Any) -> Any:
 
 
 __all__ = [
-    "BuiltinSensorCfg",
-    "CameraIntrinsics",
-    "CameraSensorCfg",
-    "CameraVizCfg",
-    "ContactMatch",
-    "ContactSensorCfg",
-    "ContactVizCfg",
-    "EntityCfg",
-    "GridPatternCfg",
-    "ImuAxis",
-    "ImuModel",
-    "ImuSensorCfg",
-    "LensDistortion",
-    "LidarSensorCfg",
-    "MujocoCfg",
-    "ObjRef",
-    "PinholeCameraPatternCfg",
-    "RayCastSensorCfg",
-    "RayCastVizCfg",
-    "RingPatternCfg",
-    "SceneCfg",
-    "SceneEntityCfg",
-    "SceneFileCfg",
-    "SceneHeadlightCfg",
-    "SceneMoodCfg",
-    "SceneObjectCfg",
-    "SceneRegionCfg",
-    "SceneRobotCfg",
-    "SceneSkyCfg",
-    "SceneVaryCfg",
-    "SensorCfg",
-    "SpinningScanCfg",
-    "SubTerrainCfg",
-    "TableScanCfg",
-    "TerrainCfg",
-    "TerrainHeightSensorCfg",
-    "UserPatternCfg",
-    "replace",
-]
+    "BuiltinSensorCfg", "CameraIntrinsics", "CameraSensorCfg", "CameraVizCfg", "ContactMatch", "ContactSensorCfg",
+    "ContactVizCfg", "EntityCfg", "GridPatternCfg", "ImuAxis", "ImuModel", "ImuSensorCfg", "LensDistortion",
+    "LidarSensorCfg", "MujocoCfg", "ObjRef", "PinholeCameraPatternCfg", "RayCastSensorCfg", "RayCastVizCfg",
+    "RingPatternCfg", "SceneCfg", "SceneEntityCfg", "SceneFileCfg", "SceneHeadlightCfg", "SceneMoodCfg",
+    "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg", "SceneVaryCfg", "SensorCfg", "SpinningScanCfg",
+    "SubTerrainCfg", "TableScanCfg", "TerrainCfg", "TerrainHeightSensorCfg", "UserPatternCfg", "replace",
+]  # fmt: skip
 
 show_field_docs(__name__)

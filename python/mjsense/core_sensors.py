@@ -15,8 +15,6 @@ from mjsense.native_sensor import NativeSensor
 from mjsense.sensor import Sensor
 
 if TYPE_CHECKING:
-    import mujoco
-
     from mjsense.simulation import Simulation
 
 
@@ -85,22 +83,12 @@ def _sim_groups(sim: Simulation, context: str, groups: Mapping[str, Sequence[str
         qpos: list[int] = []
         dofs: list[int] = []
         for joint in joints:
-            i = _id(model, _mujoco.Obj.JOINT, joint, f"{context}: group '{name}'")
-            sizes = {_mujoco.Joint.FREE: (7, 6), _mujoco.Joint.BALL: (4, 3)}
-            nq, nv = sizes.get(_mujoco.Joint(model.jnt_type[i]), (1, 1))
-            qpos += range(model.jnt_qposadr[i], model.jnt_qposadr[i] + nq)
-            dofs += range(model.jnt_dofadr[i], model.jnt_dofadr[i] + nv)
-        out.append((name, [int(a) for a in qpos], [int(a) for a in dofs]))
+            i = _mujoco.known_id(model, _mujoco.Obj.JOINT, joint, f"{context}: group '{name}'")
+            positions, velocities = _mujoco.rows_of_joint(model, i)
+            qpos += range(positions.start, positions.stop)
+            dofs += range(velocities.start, velocities.stop)
+        out.append((name, qpos, dofs))
     return out
-
-
-def _id(model: mujoco.MjModel, kind: _mujoco.Obj, name: str, context: str) -> int:
-    found = _mujoco.name2id(model, kind, name)
-    if found >= 0:
-        return found
-    counts = {_mujoco.Obj.JOINT: model.njnt, _mujoco.Obj.BODY: model.nbody, _mujoco.Obj.CAMERA: model.ncam}
-    names = [_mujoco.id2name(model, kind, i) for i in range(counts[kind])]
-    raise UnknownNameError(_core.unknown_name(context, kind.name.lower(), name, names))
 
 
 @checked
@@ -277,7 +265,7 @@ class CameraParameterSensor(CoreSensor):
     def _build(self, sim: Simulation) -> _core.SensorHandle:
         streams = {} if sim._view is None else {c["name"]: c["mjcf_camera"] for c in sim._view.cameras()}
         camera = streams.get(self._camera, self._camera)
-        _id(sim.model, _mujoco.Obj.CAMERA, camera, f"sensor '{self.name}'")
+        _mujoco.known_id(sim.model, _mujoco.Obj.CAMERA, camera, f"sensor '{self.name}'")
         return _core.make_camera_parameters(self.name, camera, *self._size)
 
 

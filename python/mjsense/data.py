@@ -172,6 +172,8 @@ DATA_OF_KIND: dict[str, type] = {
 }
 """By a sensor's kind; others return an array."""
 
-__all__ = ["CameraData", "ContactData", "DATA_OF_KIND", "ImuData", "RayCastData", "SensorData", "make_data"]
+__all__ = [
+    "CameraData", "ContactData", "DATA_OF_KIND", "ImuData", "RayCastData", "SensorData", "make_data",
+]  # fmt: skip
 
 show_field_docs(__name__)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjsense._written_values import write_component
+
 if TYPE_CHECKING:
     from mjsense.simulation import Simulation
 
@@ -58,7 +60,7 @@ class DerivedFields:
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in STATE:
             raise AttributeError(f"mjData.{name} is computed from the state: write {', '.join(STATE[:4])} ...")
-        self._sim._component(name)[...] = value
+        write_component(name, self._sim._component(name), value)
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):

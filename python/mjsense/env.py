@@ -10,6 +10,7 @@ import numpy as np
 
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Robots, Tasks
+from mjsense._written_values import numbers
 from mjsense.scene import Scene
 from mjsense.vector import TaskVectorEnv, _row, make_vec
 
@@ -41,12 +42,12 @@ class TaskEnv(gymnasium.Env):
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Performs one control step with the action ``[n]``: commands of the move groups; see :meth:`TaskVectorEnv.step`."""
-        return self._single(*self.worlds.step(np.asarray(action)[None]))
+        return self._single(*self.worlds.step(numbers("action", action)[None]))
 
     def step_chunk(self, actions: Any, stop_on_success: bool = False) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Performs several control steps ``[steps, n]`` with one observation after the last; see
         :meth:`TaskVectorEnv.step_chunk`."""
-        return self._single(*self.worlds.step_chunk(np.asarray(actions)[None], stop_on_success))
+        return self._single(*self.worlds.step_chunk(numbers("actions", actions)[None], stop_on_success))
 
     @staticmethod
     def _single(

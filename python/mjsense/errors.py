@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The exception class for unknown names. All other errors are ValueError, TypeError or RuntimeError."""
 
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
 from mjsense._show import printable
 
 
@@ -10,3 +15,17 @@ class UnknownNameError(KeyError):
     def __str__(self) -> str:
         # KeyError would print the repr of its argument, with quotes and escapes.
         return printable(str(self.args[0])) if self.args else ""
+
+
+def did_you_mean(name: str, known: Iterable[str], listing: str = "") -> str:
+    """The end of a message about an unknown name: ``"; did you mean 'qpos' or 'qvel'?"``.
+
+    Args:
+        listing: Words before a list of the first 40 known names, which follows if none is similar: ``"; there are qpos, qvel"``. Without
+            these words the result is then empty.
+    """
+    known = list(dict.fromkeys(known))
+    if near := difflib.get_close_matches(name, known, 3):
+        return f"; did you mean {' or '.join(map(repr, near))}?"
+    names = [*known[:40], "..."] if len(known) > 40 else known or ["none"]
+    return f"; {listing} {', '.join(names)}" if listing else ""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mjsense import _core, _show, data
 from mjsense._arguments import KnownAttributes, checked
+from mjsense._arrays import copied, on_host
 from mjsense.drawing import DebugShapes
 
 
@@ -121,17 +122,6 @@ class NativeSensor(KnownAttributes):
 
 
 _show.help_of_objects(NativeSensor)
-
-
-def copied(array: Any) -> Any:
-    """A copy of an array, or of a tensor on its device; a ``wp.array`` becomes a NumPy array."""
-    return array.clone() if hasattr(array, "clone") else np.array(on_host(array))
-
-
-def on_host(array: Any) -> np.ndarray:
-    """An array, a tensor or a ``wp.array`` as a NumPy array."""
-    array = array.cpu() if hasattr(array, "cpu") else array
-    return array.numpy() if hasattr(array, "numpy") else np.asarray(array)
 
 
 def box_of(spec: _core.SensorSpec) -> gymnasium.spaces.Box:

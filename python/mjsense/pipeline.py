@@ -11,6 +11,7 @@ import numpy as np
 
 from mjsense import _core, effects
 from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense._arrays import ids_of_worlds
 
 
 class _Settings(SimpleNamespace):
@@ -71,31 +72,16 @@ class ObservationPipeline(KnownAttributes):
         Raises:
             ValueError: A setting is out of range.
         """
-        settings = _Settings(
-            enable_corruption=enable_corruption,
-            noise=noise,
-            bias=bias,
-            operation=operation,
-            episode_bias=episode_bias,
-            clip=clip,
-            scale=1.0 if scale is None else scale,
-            nan_policy=nan_policy,
-            delay_min_lag=delay_min_lag,
-            delay_max_lag=delay_max_lag,
-            delay_per_env=delay_per_env,
-            delay_hold_prob=delay_hold_prob,
-            delay_update_period=delay_update_period,
-            delay_per_env_phase=delay_per_env_phase,
-            history_length=history_length,
-            flatten_history_dim=flatten_history_dim,
-        )
+        settings = dict(locals())
+        del settings["self"], settings["num_envs"], settings["seed"]
+        settings["scale"] = 1.0 if scale is None else scale
         self.num_envs = num_envs
-        self._pipeline = _core.ObservationPipeline(settings, num_envs, seed)
+        self._pipeline = _core.ObservationPipeline(_Settings(**settings), num_envs, seed)
         self._complete = True
 
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
-        """Clears the history and the state of the effects in these worlds (None: all)."""
-        self._pipeline.reset(None if world_ids is None else [int(w) for w in world_ids])
+        """Clears the history and the state of the effects in these worlds: ids, a mask, or None for all."""
+        self._pipeline.reset(None if world_ids is None else ids_of_worlds(world_ids, self.num_envs).tolist())
 
     def __call__(self, values: Any) -> np.ndarray:
         """Processes the next rows and returns float32 ``[B, D]``, or ``[B, history * D]`` or ``[B, history, D]``."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense._arguments import Seed, checked
+from mjsense._optional import optional
 from mjsense._show import coloured
 from mjsense.dataset import Dataset, Episode
 from mjsense.errors import UnknownNameError
@@ -76,13 +77,10 @@ def plot(
     """
     if not streams:
         raise ValueError("plot() needs the name of a stream")
-    try:
-        from matplotlib.figure import Figure  # pyright: ignore[reportMissingImports]  # optional
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"Plots need matplotlib: pip install 'mjsense[plot]' ({error})", name=error.name) from error
+    figures = optional("matplotlib.figure", "plot", "plot()")
     source = source_of(thing, seed=seed, **options)
     tracks = _recorded(source, streams, episodes) if isinstance(source, Dataset) else _live(source, streams, world, seconds)
-    figure = _drawn(Figure, tracks, source)
+    figure = _drawn(figures.Figure, tracks)
     if out is not None:
         figure.savefig(out, dpi=110)
     return figure
@@ -152,7 +150,7 @@ def _live(source: LiveSource, names: Sequence[str], world: int, seconds: float) 
     return tracks
 
 
-def _drawn(make: Any, tracks: _Tracks, source: Any) -> Any:
+def _drawn(make: Any, tracks: _Tracks) -> Any:
     groups: list[list[str]] = []  # streams of one axis
     for name, unit in tracks.units.items():
         same = next((g for g in groups if name not in tracks.images and g[0] not in tracks.images and tracks.units[g[0]] == unit), None)

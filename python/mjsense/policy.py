@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense._foreign_sensor import list_of_sensors
 from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.task import episode_rng, group_slices, snake_case
 
@@ -100,7 +101,7 @@ class Policy:
         return {"name": self._mjs_name(), "phases": dict(self.phases)}
 
     def _mjs_make_sensors(self) -> list[Any]:
-        self._mjs_own = list(self.sensors())  # keep a reference, because C++ does not keep them alive
+        self._mjs_own = list_of_sensors(self.sensors())  # keep a reference, because C++ does not keep them alive
         return self._mjs_sensors()
 
     def _mjs_sensors(self) -> list[Any]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from mjsense import _core
 from mjsense._arguments import checked
+from mjsense._arrays import copied, on_host
 from mjsense.data import CameraData, RayCastData
-from mjsense.native_sensor import NativeSensor, copied, on_host
+from mjsense.native_sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):

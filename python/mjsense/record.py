@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Robots, Scenes, Tasks
-from mjsense._progress import ProgressLine, interactive, of_recording
+from mjsense._progress import line_of, of_recording
 from mjsense._recording import RecordProgress, RecordSummary, record_here
 
 
@@ -68,6 +68,7 @@ def record(
     sensors: Iterable[Any] = (),
     format: Literal["mjsense", "lerobot"] = "mjsense",
     map: Any = None,
+    trim_idle: bool | None = None,
     keep_recording: bool = False,
     ray: str | None = None,
     progress: bool | Callable[[RecordProgress], None] | None = None,
@@ -143,6 +144,7 @@ def record(
             error.
         format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
         map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
+        trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
         keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
             data set is complete.
         ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does, which has more
@@ -151,22 +153,22 @@ def record(
             True where stderr is a terminal or a notebook.
     """
     options = dict(locals())
-    for name in ("sensors", "progress", "format", "map", "keep_recording", "ray"):
+    for name in ("sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"):
         del options[name]
     if ray is not None:
-        given = {**options, "map": map, "keep_recording": keep_recording}
-        if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "keep_recording") if given[name]]:
+        given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
+        if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording") if given[name]]:
             raise ValueError(f"record: {refused[0]} cannot be combined with ray")
         return _record_on_ray({**options, "format": format, "sensors": sensors}, ray, progress)
     if format == "mjsense":
-        if map is not None or keep_recording:
-            raise ValueError("record: map and keep_recording are options of format='lerobot'")
+        if map is not None or trim_idle is not None or keep_recording:
+            raise ValueError("record: map, trim_idle and keep_recording are options of format='lerobot'")
         return record_here(options, sensors, progress)
     if shard or append or overwrite:
         raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
     from mjsense.export.record_lerobot import converted
 
-    with converted(out, resume=resume, map=map, keep_recording=keep_recording) as folder:
+    with converted(out, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
         summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))
 
@@ -184,7 +186,7 @@ def _record_on_ray(options: dict[str, Any], address: str, progress: bool | Calla
         return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
                 "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
 
-    line = ProgressLine() if progress is True or (progress is None and interactive()) else None
+    line = line_of(progress)
 
     def show(now: ClusterProgress) -> None:
         about = RecordProgress(**counts(now), seconds_left=math.nan)

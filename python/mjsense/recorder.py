@@ -12,9 +12,11 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import KnownAttributes, Seed, checked
-from mjsense.sensor import Sensor, as_sensor
+from mjsense._arrays import ids_of_worlds
+from mjsense._foreign_sensor import as_sensor
+from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
-from mjsense.suite import SensorSuite
+from mjsense.suite import SensorSuite, add_missing
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -22,16 +24,10 @@ if TYPE_CHECKING:
     from mjsense.warp.simulation import WarpSimulation
 
 
-FILE_OPTIONS: dict[str, Any] = {
-    "episodes": 1,
-    "resume": False,
-    "append": False,
-    "overwrite": False,
-    "house": 0,
-    "batches": 0,
-    "gzip": 4,
-}
-"""Options that the C++ recorder needs in addition to those of the videos, with their defaults."""
+FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "append": False, "overwrite": False, "house": 0, "batches": 0, "gzip": 4}
+"""Options of the C++ recorder for the files, with their defaults."""
+VIDEO_OPTIONS: dict[str, Any] = {"ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
+"""Its options for the videos that it encodes."""
 
 
 @checked
@@ -152,12 +148,13 @@ class Recorder(KnownAttributes):
         """Records the current measurements of these worlds. Call once per observation.
 
         Args:
-            world_ids: Worlds to record; by default all that have an episode.
+            world_ids: Worlds to record, ids or a mask; by default all that have an episode.
             reward, terminated, truncated, success: One value, or one for each of these worlds.
         """
         if self._published:
             raise RuntimeError("append: the recorder is complete; it takes no more rows")
-        ids = [w for w in range(self._num_worlds) if self.recording(w)] if world_ids is None else [int(w) for w in world_ids]
+        worlds = self._num_worlds
+        ids = [w for w in range(worlds) if self.recording(w)] if world_ids is None else ids_of_worlds(world_ids, worlds).tolist()
 
         def column(name: str, value: Any, dtype: Any) -> list[Any]:
             array = np.asarray(value, dtype)
@@ -170,13 +167,8 @@ class Recorder(KnownAttributes):
         if self._rows:
             self._simulation.refresh(self.sensors)
             self._rows.read()
-        self._core.append(
-            ids,
-            column("reward", reward, np.float64),
-            column("terminated", terminated, bool),
-            column("truncated", truncated, bool),
-            column("success", success, bool),
-        )
+        flags = {"terminated": terminated, "truncated": truncated, "success": success}
+        self._core.append(ids, column("reward", reward, np.float64), *(column(name, value, bool) for name, value in flags.items()))
 
     def finish_episode(self, world: int, obs_scene: Mapping[str, Any] | str | None = None, outcome: str = "") -> None:
         """Ends the episode of this world and keeps it.
@@ -242,15 +234,20 @@ class Recorder(KnownAttributes):
 
 def recorded_sensors(simulation: Simulation | WarpSimulation, sensors: Iterable[Any] | None) -> tuple[list[Any], list[Any]]:
     """The sensors and their C++ handles; None: all of the scene. Adds those that belong to no simulation yet."""
-    chosen = list(simulation.scene.sensors.values() if sensors is None else sensors)
-    chosen = [as_sensor(sensor) for sensor in chosen]
-    for sensor in chosen:
-        if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
-            simulation.add(sensor)
-        if isinstance(sensor, Sensor) and not sensor._mjs_fields:
-            raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
+    chosen = [as_sensor(sensor) for sensor in (simulation.scene.sensors.values() if sensors is None else sensors)]
+    add_missing(simulation, chosen)
+    handles = [recorded_handle(sensor) for sensor in chosen]
     SensorSuite(chosen)  # raises if names are not unique
-    return chosen, [sensor._mjs_handle if isinstance(sensor, Sensor) else sensor._handle for sensor in chosen]
+    return chosen, handles
+
+
+def recorded_handle(sensor: Any) -> Any:
+    """The C++ handle of a sensor. Raises ValueError if it has no rows."""
+    if not isinstance(sensor, Sensor):
+        return sensor._handle
+    if not sensor._mjs_fields:
+        raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
+    return sensor._mjs_handle
 
 
 def _rate(fps: float | Fraction | None, simulation: Simulation | WarpSimulation) -> Fraction:

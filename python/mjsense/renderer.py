@@ -35,29 +35,15 @@ _SCENE_ARRAYS = (
     "flexnormal", "flextexcoord", "skinfacenum", "skinvertadr", "skinvertnum", "skinvert", "skinnormal",
 )
 
-# fmt: on
-
 _SIZES = (
-    "nq",
-    "nv",
-    "nbody",
-    "ngeom",
-    "nsite",
-    "ncam",
-    "nlight",
-    "nmesh",
-    "nskin",
-    "nflex",
-    "nflexvert",
-    "ntendon",
-    "nu",
-    "ntex",
-    "nmat",
+    "nq", "nv", "nbody", "ngeom", "nsite", "ncam", "nlight", "nmesh", "nskin", "nflex", "nflexvert", "ntendon", "nu", "ntex", "nmat",
 )
+# fmt: on
 
 # Flags of renderer.scene.flags (mjtRndFlag) by their effect here.
 _REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
 _REFUSED_IF_CLEAR = ("mjRND_CULL_FACE",)
+_SHOWN = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")
 
 
 _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
@@ -152,8 +138,13 @@ class Renderer:
         self._height, self._width = int(height), int(width)
         self._scene = scene
         self._scene_option = mujoco.MjvOption()
+        self._fixed_camera = -1
+        """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
         self._depth = self._segmentation = False
         self._sizes = self._sizes_of(model)
+        flag = mujoco.mjtRndFlag
+        self._flags = {name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)}
+        """Indices into the scene's flags."""
         self._native = self._make_native()
 
     def _make_native(self) -> Any:
@@ -182,15 +173,8 @@ class Renderer:
         # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.
         geoms = self._mujoco.MjvScene.geoms.fget(scene)
         lights, cameras = scene.lights, scene.camera
-        where = {
-            name: _scene_layout.address(value)
-            for name, value in (
-                ("geoms", geoms[0].pos),
-                ("lights", lights[0].pos),
-                ("left_camera", cameras[0].pos),
-                ("right_camera", cameras[1].pos),
-            )
-        }
+        first = {"geoms": geoms[0], "lights": lights[0], "left_camera": cameras[0], "right_camera": cameras[1]}
+        where = {name: _scene_layout.address(element.pos) for name, element in first.items()}
         where["geom_stride"] = _scene_layout.address(geoms[1].pos) - where["geoms"]
         where["light_stride"] = _scene_layout.address(lights[1].pos) - where["lights"]
         return _core.SceneRenderer(arrays, settings, _scene_layout.layouts(), where, soft)
@@ -275,7 +259,7 @@ class Renderer:
             scene_option: visibility of groups and elements; None for MuJoCo's defaults.
 
         Raises:
-            ValueError: if the camera does not exist, or `data` belongs to a model of another size.
+            ValueError: if the camera does not exist, `data` belongs to a model of another size, or ``mj_forward`` was never called for it.
             RuntimeError: after ``close()``.
         """
         self._check_open()
@@ -283,9 +267,16 @@ class Renderer:
         owner = getattr(data, "model", self._model)
         if owner is not self._model:
             self._check_sizes(owner, "`data` belongs to another model")
+        if not data.xmat[0].any():  # MuJoCo has not computed any pose, not even that of the world
+            raise ValueError("Renderer: `data` has no poses yet: call mujoco.mj_forward(model, data) before update_scene()")
         mujoco, view = self._mujoco, self._camera(camera)
+        self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
         # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.
         mujoco.mjv_updateCamera(self._model, data, view, self._scene)
+        if any(camera.frustum_near < 1e-15 for camera in self._scene.camera):  # for which mjv_updateScene ends the process
+            raise ValueError(
+                "Renderer: the near plane of the scene's camera is at 0: set model.vis.map.znear, or renderer.scene.camera for mjCAMERA_USER"
+            )
         mujoco.mjv_updateScene(
             self._model, data, scene_option or self._scene_option, None, view, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene
         )
@@ -375,6 +366,8 @@ class Renderer:
             try:
                 renderer.update_scene(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
+            except ValueError as error:
+                raise ValueError(f"{error} (datas[{index}])") from None
             finally:
                 pool.free.put(renderer)
 
@@ -405,13 +398,14 @@ class Renderer:
     def _draw(
         self, rgb: np.ndarray | None = None, depth: np.ndarray | None = None, segmentation: np.ndarray | None = None
     ) -> None:
-        scene, flag = self._scene, self._mujoco.mjtRndFlag
-        flags = scene.flags
+        scene = self._scene
+        if not 0 <= scene.ngeom <= scene.maxgeom:
+            raise ValueError(f"Renderer: scene.ngeom is {scene.ngeom}: must be in [0, {scene.maxgeom}], which max_geom has set")
+        values = scene.flags.tolist()
+        flags = {name: values[index] for name, index in self._flags.items()}
         if rgb is not None:
-            self._check_scene()
-        shown = [
-            bool(flags[i]) for i in (flag.mjRND_SHADOW, flag.mjRND_REFLECTION, flag.mjRND_SKYBOX, flag.mjRND_HAZE, flag.mjRND_FOG)
-        ]
+            self._check_scene(flags)
+        shown = [bool(flags[name]) for name in _SHOWN]
         shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
         images = [image for image in (rgb, depth, segmentation) if image is not None]
         height, width = images[0].shape[:2] if images else (self._height, self._width)
@@ -423,22 +417,32 @@ class Renderer:
 
     def _with_names(self, message: str) -> str:
         """The message with names instead of MuJoCo's object types and ids."""
+        mujoco, model, scene = self._mujoco, self._model, self._scene
 
-        def name(found: re.Match[str]) -> str:
-            kind, id = int(found[1]), int(found[2])
-            if id < 0 or not (text := self._mujoco.mju_type2Str(kind)):
+        def named(kind: int, id: int) -> str:
+            if id < 0 or not (text := mujoco.mju_type2Str(kind)):
                 return "(decoration)"
-            return f"({text} '{self._mujoco.mj_id2name(self._model, kind, id) or ''}', id {id})"
+            return f"({text} '{mujoco.mj_id2name(model, kind, id) or ''}', id {id})"
 
-        return re.sub(r"\(object type (\d+), id (-?\d+)\)", name, message)
+        def light(found: re.Match[str]) -> str:
+            one = scene.lights[int(found[1])]
+            if not hasattr(one, "id") or one.headlight:  # MuJoCo 3.3 has no ids of lights
+                return found[0]
+            return f"{found[0]} {named(mujoco.mjtObj.mjOBJ_LIGHT.value, one.id)}"
 
-    def _check_scene(self) -> None:
-        """Raises ValueError for settings of the scene that change an image and are not supported."""
+        message = re.sub(r"\(object type (\d+), id (-?\d+)\)", lambda found: named(int(found[1]), int(found[2])), message)
+        message = re.sub(r"light (\d+) of the scene", light, message)
+        if self._fixed_camera >= 0:
+            camera = named(mujoco.mjtObj.mjOBJ_CAMERA.value, self._fixed_camera)
+            message = message.replace("the scene's camera", f"the scene's camera {camera}")
+        return message
+
+    def _check_scene(self, flags: dict[str, int]) -> None:
+        """Raises ValueError for settings of the scene, with these flags, that change an image and are not supported."""
         scene = self._scene
         for names, refused in ((_REFUSED_IF_SET, 1), (_REFUSED_IF_CLEAR, 0)):
             for name in names:
-                index = getattr(self._mujoco.mjtRndFlag, name, None)
-                if index is not None and bool(scene.flags[index]) == refused:
+                if name in flags and bool(flags[name]) == refused:
                     raise ValueError(f"Renderer: scene.flags[{name}] = {refused} is not supported")
         for name in ("stereo", "enabletransform", "framewidth"):
             if getattr(scene, name):
@@ -450,6 +454,9 @@ class Renderer:
         if self._batch is not None and self._batch.process == os.getpid():
             self._batch.threads.shutdown()
         self._batch = None
+
+    def __reduce__(self) -> Any:
+        raise TypeError("Renderer: cannot be copied or pickled; make one in each process, from the model")
 
     def __enter__(self) -> Renderer:
         return self

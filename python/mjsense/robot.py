@@ -189,16 +189,20 @@ def _sensors_of_file(name_or_path: str) -> list[Any]:
     """Creates the sensors that a robot.toml declares as ``class = "module:Class"``."""
     sensors = []
     for name, reference, args in _core.robot_python_sensors(name_or_path):
-        context = f"{name_or_path}: sensor '{name}': class '{reference}'"
-        module, attribute = reference.split(":")
-        try:
-            made: Any = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError) as error:
-            raise ValueError(f"{context} is not found: {error}") from error
-        try:
-            sensor = made(**json.loads(args))
-        except TypeError as error:
-            raise TypeError(f"{context} cannot be made: {error}") from error
+        sensor = sensor_of_class(reference, json.loads(args), f"{name_or_path}: sensor '{name}'")
         sensor.uuid = name
         sensors.append(sensor)
     return sensors
+
+
+def sensor_of_class(reference: str, arguments: dict[str, Any], context: str) -> Any:
+    """An object of the class ``package.module:Class``, made with keyword arguments."""
+    module, _, attribute = reference.partition(":")
+    try:
+        cls: Any = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"{context}: class '{reference}' is not found: {error}") from error
+    try:
+        return cls(**arguments)
+    except TypeError as error:
+        raise TypeError(f"{context}: class '{reference}' cannot be made: {error}") from error

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import warnings
 import weakref
 from collections.abc import Callable, Mapping
@@ -13,15 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core, _mujoco, _show
+from mjsense import _core, _mujoco, _mujoco_views, _show
 from mjsense._arguments import KnownAttributes, checked
+from mjsense._foreign_sensor import as_sensor
 from mjsense.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
 from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.sensor import Sensor, as_sensor
+from mjsense.sensor import Sensor
 
 if TYPE_CHECKING:
     import mujoco
@@ -69,8 +69,11 @@ class Scene(KnownAttributes):
     entity."""
 
     def __init__(self, cfg: SceneCfg) -> None:
+        self._build(cfg)
+
+    def _build(self, cfg: SceneCfg, *address: int) -> None:
         items, edit = self._prepare(cfg)
-        self._core = _core.Scene.make(cfg, self.spec, items, edit)
+        self._core = _core.Scene.make(cfg, self.spec, items, edit, *address)
         self._finish()
 
     def _prepare(self, cfg: SceneCfg) -> tuple[list[Any], Callable[[], None]]:
@@ -96,7 +99,7 @@ class Scene(KnownAttributes):
 
     def _finish(self) -> None:
         for text in self._core.warnings():
-            warnings.warn(text, stacklevel=3)
+            warnings.warn(text, stacklevel=5)  # the line that makes the Scene
         self._register()
 
     def _set_options(self, options: MujocoCfg) -> None:
@@ -120,9 +123,7 @@ class Scene(KnownAttributes):
     def _of_model(cls, cfg: SceneCfg, address: int) -> Scene:
         """A scene over a copy of the compiled model at this address, with the sensors of `cfg`."""
         self = cls.__new__(cls)
-        items, edit = self._prepare(cfg)
-        self._core = _core.Scene.make(cfg, self.spec, items, edit, address)
-        self._finish()
+        self._build(cfg, address)
         return self
 
     def _register(self) -> None:
@@ -162,10 +163,7 @@ class Scene(KnownAttributes):
             return self._sensors[key]
         if key in self.entities:
             return self.entities[key]
-        names = [*self.entities, *self._sensors]
-        near = difflib.get_close_matches(str(key), names, 3)
-        hint = f"Did you mean {' or '.join(map(repr, near))}?" if near else f"Available: {', '.join(names)}"
-        raise UnknownNameError(f"Scene element '{key}' not found. {hint}")
+        raise UnknownNameError(_core.unknown_name("scene", "sensor or entity", str(key), [*self.entities, *self._sensors]))
 
     def builtin(self, name: str) -> BuiltinSensor:
         """``self[name]`` if it is one of MuJoCo's own sensors; raises TypeError for other kinds. The methods below behave
@@ -252,7 +250,7 @@ class Scene(KnownAttributes):
     @cached_property
     def model(self) -> mujoco.MjModel:
         """A copy of the compiled model for look-ups. Changing it does not affect any simulation."""
-        return _mujoco.model_of(self._core.copy_model())
+        return _mujoco_views.model_of(self._core.copy_model())
 
     def to_xml(self) -> str:
         """MJCF that compiles to the same model. If ``assets()`` is not empty, write its files to the same folder."""

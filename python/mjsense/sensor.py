@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 import json
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import gymnasium
@@ -14,9 +14,8 @@ import numpy as np
 
 from mjsense import _core, _show
 from mjsense._rows import Row, leaves, nested, rows_of_space, rows_of_value
-from mjsense._user_code import Dice, SensorError, named, observe, required, takes
+from mjsense._user_code import RandomStreams, SensorError, named, observe, required, takes
 from mjsense.drawing import DebugShapes
-from mjsense.native_sensor import NativeSensor
 
 if TYPE_CHECKING:
     import mujoco
@@ -235,7 +234,7 @@ class Sensor(Generic[T]):
         kept.append(getattr(first, "observation_space", None))
         if "model" in vars(sim.scene):
             kept.append(sim.scene.model)
-        kept += [model for model in (sim._model, *sim._models.values()) if model is not None]
+        kept += sim._models.copies()
         memo = {id(thing): thing for thing in kept if thing is not first}
         try:
             return copy.deepcopy(first, memo)
@@ -267,11 +266,11 @@ class Sensor(Generic[T]):
 
     def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
         if self._mjs_instances is not None and not self._mjs_is_shared():
-            with Dice(seeds, world_ids, 1) as dice:
+            with RandomStreams(seeds, world_ids, 1) as streams:
                 for world in world_ids:
                     reset = getattr(self._mjs_instances[world], "reset", None)
                     self._mjs_faults.pop(world, None)
-                    dice.seed(world)
+                    streams.seed(world)
                     try:
                         with named(self.uuid, "reset", world):
                             if reset is not None:
@@ -302,14 +301,22 @@ class Sensor(Generic[T]):
             with named(self.uuid, "update"):
                 self._mjs_original().update(*((dt, world_ids) if takes(self._mjs_original().update, 2) else (dt,)))
             return []
+
+        def update(env: Any, world: int) -> None:
+            with named(self.uuid, "update", world):
+                self._mjs_instances[world].update(dt)
+
+        return self._mjs_each_world(update, world_ids, seeds, 2)
+
+    def _mjs_each_world(self, call: Callable[[Any, int], None], world_ids: list[int], seeds: Sequence[int], occasion: int) -> list[tuple[int, SensorError]]:
+        """Calls ``call(env, world)`` for these worlds, each with its own random numbers, and returns (world, error) of those that failed."""
         faults = []
-        with self.simulation.env._asked() as env, Dice(seeds, world_ids, 2) as dice:
+        with self.simulation.env._computing_sensors() as env, RandomStreams(seeds, world_ids, occasion) as streams:
             for world in world_ids:
                 env.current_batch_index = world
-                dice.seed(world)
+                streams.seed(world)
                 try:
-                    with named(self.uuid, "update", world):
-                        self._mjs_instances[world].update(dt)
+                    call(env, world)
                 except SensorError as error:
                     faults.append((world, error))
         return faults
@@ -322,28 +329,18 @@ class Sensor(Generic[T]):
         if self._mjs_sim_ref is None:
             return []  # the simulation is under construction and initialize() has not been called
         by_world = self._mjs_instances is not None
-        faults = self._mjs_compute_worlds(world_ids, seeds) if by_world else self._mjs_compute_batch(world_ids)
+        faults = self._mjs_each_world(self._mjs_compute_world, world_ids, seeds, 0) if by_world else self._mjs_compute_batch(world_ids)
         if len(faults) < len(world_ids):
             self._mjs_worked = True
         elif not self._mjs_worked and faults:
             raise faults[0][1]  # it has never worked, so the fault is not limited to single episodes
         return faults
 
-    def _mjs_compute_worlds(self, world_ids: list[int], seeds: Sequence[int]) -> list[tuple[int, SensorError]]:
-        faults = []
-        with self.simulation.env._asked() as env, Dice(seeds, world_ids, 0) as dice:
-            for world in world_ids:
-                env.current_batch_index = world
-                dice.seed(world)
-                try:
-                    if world in self._mjs_faults:
-                        raise self._mjs_faults.pop(world)
-                    with named(self.uuid, "get_observation", world):
-                        value = observe(self._mjs_instances[world], env, env.task, world)
-                        self._mjs_put(world, value)
-                except SensorError as error:
-                    faults.append((world, error))
-        return faults
+    def _mjs_compute_world(self, env: Any, world: int) -> None:
+        if world in self._mjs_faults:
+            raise self._mjs_faults.pop(world)
+        with named(self.uuid, "get_observation", world):
+            self._mjs_put(world, observe(self._mjs_instances[world], env, env.task, world))
 
     def _mjs_observe(self, env: Any, task: Any, world: int) -> Any:
         """Computes the current value of this world with its instance."""
@@ -420,7 +417,7 @@ class Sensor(Generic[T]):
             return
         probe = self._mjs_copy(sim, self._mjs_original())
         try:
-            with sim.env._asked() as env:
+            with sim.env._computing_sensors() as env:
                 env.current_batch_index = 0
                 value = observe(probe, env, env.task, 0)
         except Exception as error:
@@ -444,6 +441,9 @@ class Sensor(Generic[T]):
         """Specs of the rows for C++."""
         if not self.uuid:
             raise ValueError(f"{type(self).__name__} has no uuid")
+        for name in ("uuid", "unit", "frame"):
+            if not isinstance(value := getattr(self, name), str):
+                raise TypeError(f"{type(self).__name__}.{name} must be a str, not {value!r}")
         self._mjs_fields = self._mjs_declared()
         description = (type(self._mjs_original()).__doc__ or "").strip().split("\n")[0]
         specs = []
@@ -458,60 +458,6 @@ class Sensor(Generic[T]):
                 "unit": self.unit, "frame": self.frame, "description": description,
             })  # fmt: skip
         return specs
-
-
-class ForeignSensor(Sensor):
-    """Wraps a sensor written for MolmoSpaces: any object with a uuid and ``get_observation(env, task, batch_index)``."""
-
-    def __init__(self, original: Any) -> None:
-        self.original = original
-        """The wrapped object, which belongs to world 0."""
-        self.uuid = original.uuid
-        self.observation_space = getattr(original, "observation_space", None)
-        self.is_dict = bool(getattr(original, "is_dict", False))
-        self.str_max_len = int(getattr(original, "str_max_len", Sensor.str_max_len))
-        self.unit, self.frame = str(getattr(original, "unit", "")), str(getattr(original, "frame", ""))
-
-    def __repr__(self) -> str:
-        return f"<{type(self.original).__name__} '{self.uuid}'>"
-
-    def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
-        instance = self._mjs_instances[batch_index] if self._mjs_instances else self.original
-        return observe(instance, env, task, batch_index)
-
-    def _mjs_original(self) -> Any:
-        return self.original
-
-    def _mjs_by_world(self) -> bool:
-        return True
-
-    def _mjs_is_shared(self) -> bool:
-        reset = getattr(self.original, "reset", None)
-        return reset is not None and bool(required(reset))
-
-    def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
-        if not self._mjs_is_shared():
-            return super()._mjs_reset(world_ids, seeds)
-        with named(self.uuid, "reset"):
-            self.original.reset(world_ids)
-
-    def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
-        """Does nothing: such an object has no edit_spec or initialize."""
-
-    def _mjs_updates(self) -> bool:
-        update = getattr(self.original, "update", None)
-        return callable(update) and len(required(update)) == 1
-
-
-def as_sensor(thing: Any) -> Any:
-    """Returns an mjsense sensor, wrapping one of another library if necessary; raises TypeError for other objects."""
-    if isinstance(thing, (Sensor, NativeSensor)):
-        return thing
-    if isinstance(thing, type):
-        raise TypeError(f"not a sensor but a class: make one, {thing.__name__}(...)")
-    if callable(getattr(thing, "get_observation", None)) and isinstance(getattr(thing, "uuid", None), str):
-        return ForeignSensor(thing)
-    raise TypeError(f"not a sensor: {thing!r} is not a mjsense.Sensor, nor has it a uuid and get_observation(env, task, batch_index)")
 
 
 def _overrides(sensor: Sensor, method: str) -> bool:

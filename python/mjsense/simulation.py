@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 
 from mjsense import _core, _mujoco, _show
 from mjsense._arguments import KnownAttributes, Seed, checked
-from mjsense._randomizable import check_randomizable, valid_values
+from mjsense._arrays import ids_of_worlds
+from mjsense._foreign_sensor import as_sensor
+from mjsense._world_models import WorldModels
+from mjsense._written_values import numbers, write_component
 from mjsense.derived_fields import DerivedFields
 from mjsense.drawing import DebugShapes
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 from mjsense.native_sensor import NativeSensor
 from mjsense.peer import PeerEnv
 from mjsense.scene import Scene
-from mjsense.sensor import Sensor, as_sensor
+from mjsense.sensor import Sensor
 
 if TYPE_CHECKING:
     import mujoco
@@ -44,7 +47,7 @@ class _State:
         return self if sim is None else sim._component(self._name)
 
     def __set__(self, sim: Simulation, value: Any) -> None:
-        sim._component(self._name)[...] = value
+        write_component(self._name, sim._component(self._name), value)
 
 
 @checked
@@ -142,9 +145,7 @@ class Simulation(KnownAttributes):
         self._views: dict[str, np.ndarray] = {}
         self._python: list[Sensor] = []
         self._derived: dict[str, tuple[Any, np.ndarray]] = {}
-        self._model: mujoco.MjModel | None = None
-        self._models: dict[int, mujoco.MjModel] = {}
-        self._models_version = 0
+        self._models = WorldModels(self._core)
 
     def __repr__(self) -> str:
         if self._core.closed:
@@ -178,6 +179,7 @@ class Simulation(KnownAttributes):
     def close(self) -> None:
         """Frees the worlds once no array of them is referenced any more. Every later call raises RuntimeError."""
         self._views.clear()
+        self._models.clear()
         self._core.close()
 
     # --------------------------------------------------------------------------------------------------------- physics
@@ -206,23 +208,27 @@ class Simulation(KnownAttributes):
                 names = [self.model.key(i).name for i in range(self.model.nkey)]
                 raise ValueError(f"no keyframe '{key}'; there are {names}")
             key = found
-        self._core.reset(_ids(world_ids), -1 if key is None else key, seed)
+        elif key is not None and key < -1:
+            raise ValueError(f"keyframe {key}: the model has {self.model.nkey} keyframes (-1: the model's defaults)")
+        self._core.reset(self._ids(world_ids), -1 if key is None else key, seed)
 
     def forward(self, world_ids: Sequence[int] | None = None) -> None:
         """Updates derived quantities and sensors after the state was written."""
-        self._core.forward(_ids(world_ids))
+        self._core.forward(self._ids(world_ids))
 
     def set_state(self, world_ids: Sequence[int] | None = None, *, forward: bool = True, **components: Any) -> None:
         """Writes components of the state, ``set_state(qpos=..., qvel=...)``, then calls forward().
 
         The components are those of the attributes qpos, qvel, act, ctrl ... Values have the shape ``[n]`` (the same for every
-        world) or ``[worlds, n]``. With ``forward=False``, derived quantities are computed when they are read.
+        world) or ``[worlds, n]``; ``time`` (s) is a number or has the shape ``[worlds]``. Sensors' update periods, histories and
+        delays count the steps since the reset, whatever ``time`` is. With ``forward=False``, derived quantities are computed when
+        they are read.
         """
         rows = self._rows(world_ids)
         checked = []
         for name, value in components.items():
             view = self._component(name)
-            value = np.asarray(value, dtype=np.float64)
+            value = numbers(name, value)
             target = view[rows]
             if value.shape not in (target.shape, target.shape[1:], (1, *target.shape[1:])):
                 raise ValueError(f"{name}: shape {value.shape} is neither {target.shape} nor {target.shape[1:]}")
@@ -232,7 +238,7 @@ class Simulation(KnownAttributes):
         if forward:
             self.forward(world_ids)
         else:
-            self._core.invalidate(_ids(world_ids))
+            self._core.invalidate(self._ids(world_ids))
 
     @property
     def state(self) -> NDArray[np.float64]:
@@ -267,8 +273,12 @@ class Simulation(KnownAttributes):
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Simulation time of each world since its reset, s, ``[B]``; an exact multiple of the substep."""
-        return np.array(self._core.times())
+        """Simulation time of each world, s, ``[B]``, a copy. It is 0 after a reset, or the keyframe's time, and ``set_state(time=...)``
+        changes it. Unless it began elsewhere than at 0, it is an exact multiple of the substep."""
+        counted, summed = np.array(self._core.times()), self._component("time")
+        # MuJoCo adds the timestep in each step, and each sum is rounded. A larger difference was written.
+        rounding = np.finfo(float).eps * counted * (counted / self.physics_dt)
+        return np.where(np.abs(summed - counted) <= rounding, counted, summed)
 
     @property
     def failures(self) -> list[tuple[int, str]]:
@@ -291,9 +301,7 @@ class Simulation(KnownAttributes):
     def model(self) -> mujoco.MjModel:
         """A copy of the simulated model for look-ups. It does not contain values that differ between worlds; see
         :meth:`model_of`."""
-        if self._model is None:
-            self._model = _mujoco.model_of(self._core.copy_model())
-        return self._model
+        return self._models.shared
 
     def model_of(self, world: int) -> mujoco.MjModel:
         """A copy of the model with the values of one world: those set by :meth:`randomize`, and the sizes, furniture, lights and
@@ -304,18 +312,7 @@ class Simulation(KnownAttributes):
         simulation.
         """
         (world,) = self._rows([world]).tolist()
-        if world not in self._models:
-            self._models[world] = _mujoco.model_of(self._core.copy_model())
-        self._core.write_model(world, self._models[world]._address)
-        return self._models[world]
-
-    def _follow_models(self) -> None:
-        """Updates the copies that model_of() has created."""
-        version = self._core.model_version()
-        if version != self._models_version:
-            for world in self._models:
-                self.model_of(world)
-            self._models_version = version
+        return self._models.of(world)
 
     @property
     def threads(self) -> int:
@@ -332,43 +329,29 @@ class Simulation(KnownAttributes):
 
         Values have the shape ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field, rays and images
         follow. Raises ValueError for fields that cannot differ between worlds (meshes, height fields, texture pixels), for a
-        wrong shape, and for values that are not finite.
+        wrong shape, for values that are not finite, and for those that MuJoCo cannot use.
         """
-        check_randomizable(self.model, field)
-        target = self.model_field(field)
-        rows = self._rows(world_ids)
-        target[rows] = valid_values(self.model, field, values, target[rows], np.arange(self.num_worlds)[rows])
-        self._core.model_changed(_ids(world_ids), field in _core.setconst_inputs())
-        self._follow_models()
+        worlds = np.arange(self.num_worlds)
+        self._models.randomize(field, values, worlds[self._rows(world_ids)])
         self.forward(world_ids)
 
     def model_field(self, name: str) -> np.ndarray:
         """A field of the model with one value per world, ``[B, ...]``, live; see :meth:`randomize`."""
-        key = f"model.{name}"
-        if key not in self._views or self._core.closed:
-            like = getattr(self.model, name, None)
-            if not isinstance(like, np.ndarray):
-                arrays = [field for field in dir(self.model) if isinstance(getattr(self.model, field, None), np.ndarray)]
-                near = difflib.get_close_matches(name, arrays, 3)
-                hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-                raise AttributeError(f"mjModel has no array '{name}'{hint}")
-            self._views[key] = self._core.model_field(name).view(like.dtype).reshape(self.num_worlds, *like.shape)
-        return self._views[key]
+        return self._models.field(name)
+
+    def _ids(self, world_ids: Any) -> list[int] | None:
+        """Ids of worlds, of ids or a mask; None: all. Raises ValueError for ids out of range."""
+        return None if world_ids is None else ids_of_worlds(world_ids, self.num_worlds).tolist()
 
     def _rows(self, world_ids: Any) -> Any:
-        """Index of these worlds; raises ValueError for ids out of range."""
-        ids = _ids(world_ids)
-        if ids is None:
-            return slice(None)
-        for world in ids:
-            if not 0 <= world < self.num_worlds:
-                raise ValueError(f"world id {world}: must be in [0, {self.num_worlds})")
-        return np.array(ids, dtype=int)
+        """Index of these worlds in arrays ``[B, ...]``."""
+        return slice(None) if world_ids is None else ids_of_worlds(world_ids, self.num_worlds)
 
     def _component(self, name: str) -> NDArray[np.float64]:
         view = self._views.get(name)
         if view is None or self._core.closed:
-            view = self._views[name] = self._core.component(name)
+            view = self._core.component(name)
+            view = self._views[name] = view[:, 0] if name == "time" else view
         return view
 
     # --------------------------------------------------------------------------------------------------------- sensors
@@ -412,7 +395,7 @@ class Simulation(KnownAttributes):
 
     def invalidate(self, world_ids: Sequence[int] | None = None) -> None:
         """Call after the state was changed outside of this class: sensors are recomputed at their next read."""
-        self._core.invalidate(_ids(world_ids))
+        self._core.invalidate(self._ids(world_ids))
 
     # --------------------------------------------------------------------------------------------------------- drawing
 
@@ -440,6 +423,8 @@ class Simulation(KnownAttributes):
         else:
             if isinstance(sensors, (str, NativeSensor, Sensor)):
                 sensors = [sensors]
+            if not hasattr(sensors, "__iter__"):
+                raise TypeError(f"sensors must be a sensor, its name, or a sequence of these, not {sensors!r:.100}")
             chosen = [self._sensor(sensor) for sensor in sensors]
             native = [sensor._handle for sensor in chosen if isinstance(sensor, NativeSensor)]
             if native:
@@ -457,9 +442,7 @@ class Simulation(KnownAttributes):
             raise TypeError(f"neither a sensor nor the name of one: {sensor!r}")
         known = {**self.scene.sensors, **{own.uuid: own for own in self._python}}
         if sensor not in known:
-            near = difflib.get_close_matches(sensor, known, 3)
-            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(known)}"
-            raise UnknownNameError(f"no sensor named '{sensor}'; {hint}")
+            raise UnknownNameError(f"no sensor named '{sensor}'{did_you_mean(sensor, known, 'there are')}")
         return known[sensor]
 
     # ------------------------------------------------------------------------------------------------ mjlab's call order
@@ -471,11 +454,13 @@ class Simulation(KnownAttributes):
     def update_sensors(self, dt: float = 0.0) -> None:
         """Updates the sensors' per-substep state (air time, history) once, after ``step_raw(1)``. ``dt`` is in s; 0: the
         timestep."""
+        if not 0 <= dt < np.inf:
+            raise ValueError(f"update_sensors(): dt must be at least 0 s and finite, not {dt}")
         self._core.update_sensors(dt)
 
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:
         """Resets the sensors' episode state in these worlds without resetting the physics."""
-        self._core.reset_sensors(_ids(world_ids))
+        self._core.reset_sensors(self._ids(world_ids))
 
 
 # Otherwise help() would show the arguments of __new__.
@@ -492,7 +477,7 @@ def warp_module(name: str) -> Any:
         raise ImportError(f"backend='warp' needs {error.name}: pip install \"mjsense[warp]\"") from None
 
 
-@checked
+@partial(checked, context="Simulation()")
 def _on_warp(
     scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
     device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
@@ -507,16 +492,3 @@ def _on_warp(
     sim = warp.WarpSimulation(compiled, scene.cfg.num_envs if num_worlds is None else num_worlds, device, nconmax, njmax)
     scene._simulation = compiled._core
     return sim
-
-
-def _ids(world_ids: Any) -> list[int] | None:
-    if world_ids is None:
-        return None
-    array = np.asarray(world_ids)
-    if array.dtype == bool:
-        array = np.flatnonzero(array)
-    if array.size and not np.issubdtype(array.dtype, np.integer):
-        raise TypeError(f"world_ids must be integers or a mask, not {world_ids!r}")
-    if array.size and not 0 <= array.min() <= array.max() < 2**31:
-        raise ValueError(f"world_ids from {array.min()} to {array.max()}: no such worlds")
-    return [int(w) for w in array.reshape(-1)]

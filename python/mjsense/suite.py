@@ -9,9 +9,11 @@ from typing import Any
 import gymnasium
 
 from mjsense._arguments import KnownAttributes, checked
+from mjsense._arrays import ids_of_worlds
+from mjsense._foreign_sensor import as_sensor
 from mjsense._show import printable
 from mjsense.errors import UnknownNameError
-from mjsense.sensor import Sensor, as_sensor
+from mjsense.sensor import Sensor
 
 
 @checked
@@ -28,8 +30,8 @@ class SensorSuite(KnownAttributes):
         self.extend(sensors)
 
     def add(self, sensor: Any) -> None:
-        """Adds a sensor of the scene, of the core suite, a user-defined one, or one written for MolmoSpaces. Raises ValueError if
-        the name is in use."""
+        """Adds a sensor of the scene, of the core suite, a user-defined one, or one written for MolmoSpaces. Raises ValueError
+        for a sensor without a name, and AssertionError, as MolmoSpaces does, if the name is in use."""
         sensor = as_sensor(sensor)
         uuid = sensor.uuid
         if not uuid:
@@ -79,7 +81,8 @@ class SensorSuite(KnownAttributes):
         """Calls reset() of the sensors that are written in Python."""
         for sensor in self.sensors.values():
             if isinstance(sensor, Sensor):
-                sensor._mjs_reset(list(range(sensor.simulation.num_worlds)) if world_ids is None else list(world_ids))
+                worlds = sensor.simulation.num_worlds
+                sensor._mjs_reset(list(range(worlds)) if world_ids is None else ids_of_worlds(world_ids, worlds).tolist())
 
     def get_observations(self, env: Any, task: Any = None, batch_index: int | None = None) -> dict[str, Any]:
         """Returns a new dict of observations in the suite's order.
@@ -91,9 +94,9 @@ class SensorSuite(KnownAttributes):
             batch_index: Id of one world; by default all worlds.
         """
         sim = getattr(env, "sim", env)
-        for sensor in self.sensors.values():
-            if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
-                sim.add(sensor)
+        if not hasattr(sim, "refresh"):
+            raise TypeError(f"SensorSuite.get_observations(): env must be a Simulation, or an object with one as its sim, not {env!r:.100}")
+        add_missing(sim, self.sensors.values())
         if batch_index is None:
             sim.refresh(list(self.sensors.values()))
             return {uuid: sensor.data for uuid, sensor in self.sensors.items()}
@@ -108,3 +111,10 @@ class SensorSuite(KnownAttributes):
             else:
                 out[uuid] = sensor._row(batch_index)
         return out
+
+
+def add_missing(sim: Any, sensors: Iterable[Any]) -> None:
+    """Adds those sensors to the simulation that belong to none yet."""
+    for sensor in sensors:
+        if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
+            sim.add(sensor)

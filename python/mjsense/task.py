@@ -11,7 +11,9 @@ import numpy as np
 
 from mjsense import _core, _gymnasium, _mujoco
 from mjsense._arguments import checked
-from mjsense.errors import UnknownNameError
+from mjsense._arrays import on_host
+from mjsense._foreign_sensor import list_of_sensors
+from mjsense._written_values import numbers, write_component
 from mjsense.scene import prepared
 
 if TYPE_CHECKING:
@@ -148,6 +150,8 @@ class Task:
 
     def _mjs_settings(self) -> dict[str, Any]:
         name = self._mjs_name()
+        if not isinstance(self.robot_entity, str):
+            raise TypeError(f"task '{name}': robot_entity must be a str, not {self.robot_entity!r}")
         groups = [(group, [p] if isinstance(p, str) else list(p)) for group, p in dict(self.move_groups).items()]
         return {
             "name": name,
@@ -223,15 +227,15 @@ class Task:
         )
 
     def _mjs_column(self, what: str, value: Any, dtype: Any) -> np.ndarray:
-        array = _on_host(value)
+        array = on_host(value)
         if array.shape != (self.num_worlds,):
             raise ValueError(f"{what} has shape {array.shape}, expected ({self.num_worlds},): one value a world")
-        return np.ascontiguousarray(array, dtype=dtype)
+        return np.ascontiguousarray(numbers(what, array), dtype=dtype)
 
     def _mjs_info(self, info: Mapping[str, Any]) -> dict[str, tuple[str, int, np.ndarray]]:
         columns = {}
         for key, value in info.items():
-            array = _on_host(value)
+            array = on_host(value)
             if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or array.shape[0] != self.num_worlds:
                 raise ValueError(
                     f"info '{key}' is {array.dtype}{list(array.shape)}; expected numbers [{self.num_worlds}] or [{self.num_worlds}, k]"
@@ -251,7 +255,7 @@ class Task:
         return dict(self.scene_info(world))
 
     def _mjs_make_sensors(self) -> list[Any]:
-        self._mjs_own = list(self.sensors())  # kept here: C++ refers to them without keeping them alive
+        self._mjs_own = list_of_sensors(self.sensors())  # kept here: C++ refers to them without keeping them alive
         return self._mjs_sensors()
 
     def _mjs_sensors(self) -> list[Any]:
@@ -315,49 +319,33 @@ class WorldState:
             velocity: Velocity of a free body ``[6]``: linear in world axes, m/s, then angular in body axes, rad/s; by default 0.
         """
         model = self.model
-        index = self._id(_mujoco.Obj.BODY, "body", body)
+        index = _mujoco.known_id(model, _mujoco.Obj.BODY, body, "place")
         mocap = model.body_mocapid[index]
         if mocap >= 0:
-            self.mocap_pos[mocap], self.mocap_quat[mocap] = pos, quat
+            _write(f"place: pos of '{body}'", self.mocap_pos[mocap], pos)
+            _write(f"place: quat of '{body}'", self.mocap_quat[mocap], quat)
             return
         joint = model.body_jntadr[index]
         if joint < 0 or model.jnt_type[joint] != _mujoco.Joint.FREE:
             raise ValueError(f"place: body '{body}' is neither free nor a mocap body")
         address, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-        self.qpos[address : address + 3] = pos
-        self.qpos[address + 3 : address + 7] = quat
-        self.qvel[dof : dof + 6] = 0 if velocity is None else velocity
+        _write(f"place: pos of '{body}'", self.qpos[address : address + 3], pos)
+        _write(f"place: quat of '{body}'", self.qpos[address + 3 : address + 7], quat)
+        _write(f"place: velocity of '{body}'", self.qvel[dof : dof + 6], 0 if velocity is None else velocity)
 
     def set_joint(self, joint: str, value: float | Sequence[float], velocity: float | Sequence[float] = 0.0) -> None:
         """Sets a joint's position (rad or m; 7 values for a free joint) and velocity."""
-        model = self.model
-        index = self._id(_mujoco.Obj.JOINT, "joint", joint)
-        kind = model.jnt_type[index]
-        nq, nv = {0: (7, 6), 1: (4, 3)}.get(int(kind), (1, 1))
-        address, dof = model.jnt_qposadr[index], model.jnt_dofadr[index]
-        self.qpos[address : address + nq] = value
-        self.qvel[dof : dof + nv] = velocity
-
-    def _id(self, kind: Any, word: str, name: str) -> int:
-        index = _mujoco.name2id(self.model, kind, name)
-        if index < 0:
-            import difflib
-
-            count = {"body": self.model.nbody, "joint": self.model.njnt}[word]
-            names = [_mujoco.id2name(self.model, kind, i) for i in range(count)]
-            near = difflib.get_close_matches(name, names, 3)
-            hint = (
-                f"; did you mean {' or '.join(map(repr, near))}?"
-                if near
-                else f"; there are {', '.join(filter(None, names[:12]))}"
-            )
-            raise UnknownNameError(f"no {word} named '{name}'{hint}")
-        return index
+        index = _mujoco.known_id(self.model, _mujoco.Obj.JOINT, joint, "set_joint")
+        positions, velocities = _mujoco.rows_of_joint(self.model, index)
+        _write(f"set_joint: value of '{joint}'", self.qpos[positions], value)
+        _write(f"set_joint: velocity of '{joint}'", self.qvel[velocities], velocity)
 
 
-def _on_host(values: Any) -> np.ndarray:
-    """An array, also of a tensor on another device."""
-    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
+def _write(what: str, target: np.ndarray, value: Any) -> None:
+    """Writes finite numbers to a part of the state."""
+    write_component(what, target, value)
+    if not np.isfinite(target).all():
+        raise ValueError(f"{what}: must be finite, not {value!r:.100}")
 
 
 def snake_case(name: str) -> str:

@@ -16,6 +16,7 @@ from mjsense import _core, _mujoco
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
+from mjsense._written_values import numbers
 from mjsense.assets import use_installed_meshes
 from mjsense.native_sensor import box_of
 from mjsense.scene import Scene
@@ -109,7 +110,7 @@ class TaskVectorEnv(VectorEnv):
 
     def _numbers(self, actions: Any) -> Any:
         """Actions as the rollout takes them."""
-        return np.ascontiguousarray(actions, dtype=np.float64)
+        return np.ascontiguousarray(numbers("actions", actions))
 
     def _copy(self, rows: Any) -> Any:
         return rows.copy()
@@ -182,7 +183,7 @@ class TaskVectorEnv(VectorEnv):
         Args:
             actions: ``[num_envs, steps, n]``; see :meth:`step`.
         """
-        shape = np.shape(actions)
+        shape = self._numbers(actions).shape
         steps = shape[1] if len(shape) == 3 and shape[1] > 0 else "steps"
         values = self._checked(actions, (self.num_envs, steps, *(self.single_action_space.shape or ())))
         return self._play(lambda: self._rollout.step_chunk(values, stop_on_success))
@@ -271,12 +272,12 @@ class TaskVectorEnv(VectorEnv):
     def _place_view(self) -> None:
         """In a scene with its own robot, the default view is that of MuJoCo's free camera."""
         model = self.sim.model
-        azimuth, elevation = np.radians([model.vis.global_.azimuth, model.vis.global_.elevation])
-        forward = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        position, forward = _mujoco.free_camera(model)
+        azimuth = np.radians(model.vis.global_.azimuth)
         right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
         quat = _core.mat_to_quat(np.stack([right, np.cross(right, forward), -forward], axis=1).ravel().tolist())
         camera = model.camera(_VIEW).id
-        for field, value in (("cam_pos", model.stat.center - 1.5 * model.stat.extent * forward), ("cam_quat", quat)):
+        for field, value in (("cam_pos", position), ("cam_quat", quat)):
             values = self.sim.model_field(field).copy()
             values[:, camera] = value
             self.sim.randomize(field, values)
@@ -300,7 +301,7 @@ class TaskVectorEnv(VectorEnv):
         """Frees the worlds."""
         self._closed = True
         self.sim.close()
-        self._rollout = None  # type: ignore[assignment]
+        self._rollout = None
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:

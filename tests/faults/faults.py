@@ -340,6 +340,39 @@ def full_disks(lab: Lab, trials: int) -> Row:
     return row
 
 
+def full_disk_repairs(lab: Lab, trials: int) -> Row:
+    """Repairs an unfinished recording on a full disk, which has more space in each trial: one error and an unchanged recording, which
+    can be resumed on a larger disk, or all finished episodes are published."""
+    row = Row("full disks during repair, then --resume")
+    options = ["--episodes", "8", "--batches", "3", "--worlds", "2", "--steps", "8", "--width", "32", "--height", "24"]
+    whole, unfinished = lab.fresh("whole_repair"), lab.fresh("unfinished")
+    assert lab.run(whole, *options).returncode == 0
+    assert lab.run(unfinished, *options, "--stop-after", 5).returncode == 0
+    expected, before = contents(whole), contents(unfinished)
+    for n in range(trials):
+        space = n * (1_000_000 // trials)
+        disk = lab.fresh("disk")
+        kept = Path(f"{disk}.kept")
+        shutil.rmtree(kept, ignore_errors=True)
+        script = f"mount -t tmpfs -o size=8m none {disk} && cp -r {unfinished} {disk}/out && " \
+                 f"head -c $(($(df -B1 --output=avail {disk} | tail -1) - {space})) /dev/zero > {disk}/rest; " \
+                 f"{lab.program} repair {disk}/out; rc=$?; cp -r {disk}/out {kept}; exit $rc"  # fmt: skip
+        done = subprocess.run(["unshare", "-m", "sh", "-c", script], capture_output=True, text=True, timeout=NO_END)
+        row.trials += 1
+        if done.returncode not in (0, 1, 2):
+            row.wrong("crashed", f"space of {space}: {done.returncode} {done.stderr[-300:]}")
+        elif "published 2 finished episodes" in done.stdout:
+            if lab.run("verify", kept).returncode != 0:
+                row.wrong("lost", f"space of {space}: {lab.run('verify', kept).stdout}")
+        elif len(done.stdout.splitlines()) != 1 or "No space left on device" not in done.stdout:
+            row.wrong("unnoticed", f"space of {space}: {done.stdout} {done.stderr}")
+        elif contents(kept) != before:
+            row.wrong("lost", f"space of {space}: repair changed {sorted(set(contents(kept)) ^ set(before))}")
+        elif lab.run(kept, *options, "--resume").returncode != 0 or contents(kept) != expected:
+            row.wrong("lost", f"space of {space}: {sorted(set(contents(kept)) ^ set(expected))}")
+    return row
+
+
 def file_limits(lab: Lab, trials: int) -> Row:
     """Records with a limit on file sizes, which grows with each trial: one clear error, no incomplete files, and the same final
     files after --resume without the limit."""

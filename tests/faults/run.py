@@ -23,7 +23,7 @@ import faults
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs/faults.md"
 # Trials of the long form; None: one trial for each entry of the kind's list.
-TRIALS = {"kills": 300, "killed_changes": 200, "full_disks": 100, "file_limits": 100, "flips": 1000, "truncations": 200, "mutations": 2000, "hostile": None, "staged": None, "encoders": None}
+TRIALS = {"kills": 300, "killed_changes": 200, "full_disks": 100, "full_disk_repairs": 40, "file_limits": 100, "flips": 1000, "truncations": 200, "mutations": 2000, "hostile": None, "staged": None, "encoders": None}
 HEAD = "| fault | trials | lost | unnoticed | crashed | hung |\n| --- | --- | --- | --- | --- | --- |\n"
 BEGIN, END = "<!-- table of tests/faults/run.py -->\n", "<!-- end -->"
 

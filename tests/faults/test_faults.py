@@ -68,6 +68,7 @@ def test_faulty_and_hanging_encoders(lab):
 @pytest.mark.skipif(not can_mount(), reason="a small disk needs the right to mount one")
 def test_full_disks(lab):
     check(faults.full_disks(lab, 6))
+    check(faults.full_disk_repairs(lab, 4))
 
 
 def test_kills_before_changes_of_the_file_system(lab):

@@ -154,7 +154,7 @@ def episodes_of(root):
                         return
                     value = item[()]
                     one[name] = (str(item.dtype), item.shape, value if isinstance(value, bytes) else value.tobytes(),
-                                 dict(item.attrs.items()))  # fmt: skip
+                                 {key: np.asarray(attribute).tolist() for key, attribute in item.attrs.items()})  # fmt: skip
                     if name.startswith("obs/sensor_data/"):
                         video = value.tobytes().rstrip(b"\0").decode()
                         one[video] = (path.parent / video).read_bytes()

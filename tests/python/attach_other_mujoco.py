@@ -121,3 +121,42 @@ if not mujoco.mj_versionString().startswith("4.0"):
     else:
         raise AssertionError("an unknown field was accepted")
 attached.close()
+
+CHANGED = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 .1" pos="0 0 -3"/><site name="high" pos="0 0 2"/>
+    <body name="static" pos="0 0 1">
+      <geom size=".1"/><site name="static"/>
+      <body pos=".3 0 0"><joint axis="0 1 0"/><geom size=".1" contype="0" conaffinity="0"/><site name="tip" pos=".2 0 0"/></body>
+    </body>
+    <geom name="one" type="box" size=".1 .12 .08"/>
+    <body pos=".23 .06 .3" quat=".1 2.1 .6 -.6"><joint/><geom name="two" type="box" size=".1 .12 .08"/></body>
+  </worldbody>
+  <tendon><spatial stiffness="10" springlength="0"><site site="high"/><site site="tip"/></spatial></tendon>
+  <sensor>
+    <accelerometer name="acceleration of a static body" site="static"/>
+    <force name="force of a spatial tendon" site="static"/>
+    <contact name="net force without a contact" geom1="floor" geom2="one" reduce="netforce" data="normal tangent"/>
+    <distance name="distance of boxes" geom1="one" geom2="two" cutoff="5"/>
+  </sensor>
+</mujoco>"""
+"""Sensors of which the table in docs/attach.md says that MuJoCo has changed them."""
+EXPECTED = {
+    "acceleration of a static body": ([0, 0, 9.81], [0, 0, 0]),
+    "force of a spatial tendon": ([5, 0, 72.184064], [0, 0, 82.184064]),
+    "net force without a contact": ([0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 1, 0]),
+    "distance of boxes": ([0.1557198], [0]),
+}
+"""Measurement -> value of mjsense and MuJoCo 4.0, and of MuJoCo 3.8 to 3.11."""
+version = tuple(map(int, mujoco.mj_versionString().split(".")))
+if version >= (3, 8):
+    model = mujoco.MjModel.from_xml_string(CHANGED)
+    data = mujoco.MjData(model)
+    attached = mjs.attach(model, data)
+    mujoco.mj_forward(model, data)
+    for name, (ours, old) in EXPECTED.items():
+        np.testing.assert_allclose(attached[name].data[0], ours, atol=1e-5, err_msg=name)
+        if version < (3, 12) or version >= (4,):
+            np.testing.assert_allclose(data.sensor(name).data, old if version < (4,) else ours, atol=1e-5, err_msg=name)
+    attached.close()

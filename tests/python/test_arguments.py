@@ -44,7 +44,7 @@ def ids(function):
 
 NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # created by scenes only
 STATIC = {f.__qualname__: f for c in {*CLASSES, mjs.TaskVectorEnv} - NATIVE for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
-STATIC |= {f.__qualname__: f for f in (mjs.RecordEpisodes.__init__, mjs.RecordVectorEpisodes.__init__)}
+STATIC["RecordEpisodes.__init__"] = mjs.RecordEpisodes.__init__
 STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.replace and f.__name__ != "checked"}
 
 
@@ -82,7 +82,9 @@ def live(tmp_path_factory):
     mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, worlds=1)
     dataset = mjs.Dataset(data)
     renderer = mjs.Renderer(scene.model, 4, 4)
-    renderer.update_scene(mujoco.MjData(scene.model))
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    renderer.update_scene(data)
     objects += [mjs.attach(scene.model, mujoco.MjData(scene.model)), renderer, dataset, dataset.episodes[0], dataset.episodes[0].video("wrist_camera")]
     objects += [
         mjs.JointPositionSensor(), mjs.JointVelocitySensor(), mjs.PoseSensor("p", body="ball/ball"), mjs.TcpPoseSensor(),
@@ -219,3 +221,63 @@ def test_measurements_are_read_only():
     copy = scene["ball/acc"].data.copy()
     copy[:] = 3
     assert np.shares_memory(np.from_dlpack(scene["ball/acc"].data), scene["ball/acc"].data)
+
+
+def test_values_of_the_wrong_kind_are_named(live):
+    objects, sim = live
+    dataset, env = objects[mjs.Dataset], objects[mjs.TaskEnv]
+    suite = mjs.SensorSuite([sim.scene["scan"]])
+    for call, error, text in [
+        (lambda: dataset.stats([1]), TypeError, r"Dataset.stats\(\): streams must be a sequence of str or None, not \[1\]"),
+        (lambda: sim.debug_shapes(0, 3), TypeError, "sensors must be a sensor, its name, or a sequence of these, not 3"),
+        (lambda: sim.update_sensors(np.nan), ValueError, "dt must be at least 0 s and finite, not nan"),
+        (lambda: sim.update_sensors(-0.1), ValueError, "dt must be at least 0 s and finite, not -0.1"),
+        (lambda: suite.get_observations(3), TypeError, "env must be a Simulation, or an object with one as its sim, not 3"),
+        (lambda: env.step({"arm": 1}), ValueError, r"action: values must be numbers, not .*'arm': 1"),
+        (lambda: env.step([[1, 2], [3]]), ValueError, "action: values must be numbers, not "),
+    ]:
+        with pytest.raises(error, match=text):
+            call()
+
+
+CART = """<mujoco><worldbody><body name="cart"><joint name="slide" type="slide"/><geom size=".05"/></body></worldbody>
+  <actuator><position name="drive" joint="slide" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+class Drive(mjs.Task):
+    horizon, policy_dt_ms, sim_dt_ms, robot_entity = 5, 20, 4, "cart"
+
+    def scene(self):
+        return mjs.SceneCfg(entities={"cart": mjs.EntityCfg(model=CART)})
+
+    def evaluate(self, sim):
+        return np.zeros(2), np.zeros(2, bool)
+
+
+@pytest.mark.parametrize(
+    "attributes, text",
+    [
+        ({"robot_entity": None}, "robot_entity must be a str, not None"),
+        ({"sensors": lambda self: None}, r"sensors\(\) must return a list of sensors, not None"),
+        ({"evaluate": lambda self, sim: (["a", "b"], [True, False])}, "reward: values must be numbers"),
+        ({"sample": lambda self, rng, world: world.set_joint("cart/slide", np.nan)}, "set_joint: value of 'cart/slide': must be finite, not nan"),
+        ({"sample": lambda self, rng, world: world.place("cart/mocap_base", (0, 0))}, r"place: pos of '.*': shape \(2,\) does not broadcast to \(3,\)"),
+    ],
+)  # fmt: skip
+def test_mistakes_of_a_task_are_named(attributes, text):
+    task = type("Wrong", (Drive,), attributes)()
+    with pytest.raises((TypeError, ValueError), match=text):
+        env = mjs.make_vec(task, num_envs=2, cameras=[])
+        env.reset(seed=0)
+        env.step(env.action_space.sample())
+
+
+@pytest.mark.parametrize("attribute", ["uuid", "unit", "frame"])
+def test_texts_of_a_sensor_must_be_texts(attribute):
+    class Own(mjs.Sensor):
+        uuid = "own"
+        observation_space = __import__("gymnasium").spaces.Box(0, 10, (1,), np.float32)
+
+    own = type("Own", (Own,), {attribute: 3})()
+    with pytest.raises(TypeError, match=f"Own.{attribute} must be a str, not 3"):
+        mjs.Simulation(ball_scene()).add(own)

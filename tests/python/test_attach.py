@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjsense.attach: sensors over data that the test steps itself."""
 
+import copy
 import dataclasses
 import gc
 import resource
@@ -284,6 +285,8 @@ def test_errors():
         attached["sped"]
     with pytest.raises(ValueError, match="world"):
         attached.reset([1])
+    with pytest.raises(TypeError, match="cannot be copied or pickled: attach to the copy of the model and data"):
+        copy.deepcopy(attached)
     attached.close()
     with pytest.raises(RuntimeError, match="closed"):
         attached.update()

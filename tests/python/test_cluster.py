@@ -231,7 +231,7 @@ def test_user_code_and_errors(tmp_path):
     lock = threading.Lock()
     with pytest.raises(TypeError, match="record: policy cannot be sent to the workers"):
         record_on_ray(Job(str(tmp_path / "b"), {**ARGUMENTS, "policy": lambda obs: lock}), episodes=1)
-    with pytest.raises(mjs.UnknownNameError, match="unknown option 'horizn'; did you mean horizon"):
+    with pytest.raises(mjs.UnknownNameError, match="unknown option 'horizn'; did you mean 'horizon'"):
         record_on_ray(Job(str(tmp_path / "b"), {**ARGUMENTS, "horizn": 3}), episodes=1)
     assert not Path(tmp_path / "b").exists()
 

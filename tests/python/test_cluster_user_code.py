@@ -29,7 +29,7 @@ def run(tmp_path_factory):
         if os.environ.get("MJSENSE_TEST_RAY_USER", "0") == "0":
             pytest.skip("needs build/ray_user; make it: MJSENSE_TEST_RAY_USER=1 ./dev test -k test_cluster_user_code")
         subprocess.run([sys.executable, "-m", "venv", FOLDER], check=True)
-        done = subprocess.run([FOLDER / "bin/python", "-m", "pip", "install", "--quiet", "--retries=1", *PACKAGES], capture_output=True, text=True)
+        done = subprocess.run([FOLDER / "bin/python", "-I", "-m", "pip", "install", "--quiet", "--retries=1", *PACKAGES], capture_output=True, text=True)
         if done.returncode:
             pytest.skip(f"pip cannot install {' '.join(PACKAGES)}: {done.stderr.strip()[-300:]}")
         (FOLDER / "complete").touch()

@@ -45,9 +45,24 @@ def test_errors_are_one_line(tmp_path):
     unknown = run("replai")
     assert unknown.returncode == 2 and "did you mean 'replay'" in unknown.stderr
     option = run("replay", "--epsodes", "1", "x")
-    assert option.returncode == 2 and "see mjsense replay --help" in option.stderr
+    assert option.returncode == 2 and "no option named '--epsodes'; did you mean '--episodes'?" in option.stderr
     missing = run("replay", str(tmp_path / "nothing"))
     assert missing.returncode == 2 and missing.stderr.startswith("mjsense replay: ") and missing.stderr.count("\n") == 1
+
+
+def test_an_error_of_the_system_names_the_file():
+    assert commands.message_of(PermissionError(13, "Permission denied", "out.lock")) == "out.lock: Permission denied"
+    assert commands.message_of(OSError("no network")) == "no network"
+
+
+@pytest.mark.parametrize("words, hint", ((["render", "data", "out"], "; continue with --resume"), (["export", "zarr", "data", "out"], "")))
+def test_an_interruption_is_reported(words, hint, monkeypatch, capsys):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"mjsense.commands.{words[0]}.run", interrupted)
+    assert commands.run(words) == 130
+    assert capsys.readouterr().err == f"mjsense {words[0]}: interrupted{hint}\n"
 
 
 @pytest.mark.parametrize("words, expected", ((["repl"], ["replay"]), (["replay", "--ep"], ["--episodes"])))

@@ -172,7 +172,7 @@ def test_a_recording_of_the_first_format(tmp_path):
     """Made by a version without data for replay, numbers and checksummed archives, whose videos have B-frames and no tuning."""
     with tarfile.open(Path(__file__).parent / "recordings/first_format.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
-    for command, expected in (("verify", "intact: 1 files, 1 episodes, 3 steps, 2 videos"), ("inspect", "1 x horizon reached")):
+    for command, expected in (("verify", "intact: 1 files, 1 episodes, 3 observations, 2 videos"), ("inspect", "1 x horizon reached")):
         done = subprocess.run([sys.executable, "-m", "mjsense", command, tmp_path], capture_output=True, text=True)
         assert done.returncode == 0 and expected in done.stdout, done.stdout + done.stderr
     dataset = mjs.Dataset(tmp_path)
@@ -237,7 +237,7 @@ def test_windows(root):
     assert mjs.Dataset(root, delta_timestamps={"rewards": [0.1]}, tolerance_s=0.04)[0]["rewards"].shape == (1,)
 
 
-def test_filters_and_names(root, dataset):
+def test_filters_and_names(root, dataset, tmp_path):
     outcomes = {e.outcome for e in dataset.episodes}
     assert len(mjs.Dataset(root, episodes=[2, 0]).episodes) == 2 and mjs.Dataset(root, episodes=[2])[0]["episode_index"] == 2
     assert [e.index for e in mjs.Dataset(root, houses=[10]).episodes] == [2]
@@ -250,12 +250,22 @@ def test_filters_and_names(root, dataset):
     }
     with pytest.raises(ValueError, match=r"3 is not in .* which has 3 episodes"):
         mjs.Dataset(root, episodes=[3])
+    assert [episode.index for episode in mjs.Dataset(root, episodes=[True, False, True]).episodes] == [0, 2]
+    with pytest.raises(ValueError, match=r"episodes: a mask of 2, but .* has 3 episodes"):
+        mjs.Dataset(root, episodes=[True, False])
+    with pytest.raises(TypeError, match="episodes must be integers or a mask, not "):
+        mjs.Dataset(root, episodes=[0.5])
     with pytest.raises(KeyError, match="No stream, group or pattern 'tcp_pose'; did you mean 'obs/extra/tcp_pose'"):
         mjs.Dataset(root, streams=["tcp_pose"])
-    with pytest.raises(KeyError, match="no stream 'obs/extra/tcp_pos'; similar: obs/extra/tcp_pose"):
+    with pytest.raises(KeyError, match="no stream 'obs/extra/tcp_pos'; did you mean 'obs/extra/tcp_pose'"):
         dataset.episodes[0]["obs/extra/tcp_pos"]
-    with pytest.raises(FileNotFoundError, match="contains no recording"):
+    with pytest.raises(FileNotFoundError, match=r"house_3: no such file or directory; did you mean 'house_\d'"):
         mjs.Dataset(root / "house_3")
+    with pytest.raises(FileNotFoundError, match="contains no recording"):
+        mjs.Dataset(tmp_path)
+    (tmp_path / "cut.h5").write_bytes(dataset.episodes[0].path.read_bytes()[:3000])
+    with pytest.raises(OSError, match=r"cut.h5: not an HDF5 file that can be read: .*truncated file"):
+        mjs.Dataset(tmp_path / "cut.h5")
     assert "63 observations" in repr(dataset) and "obs/agent/qpos/arm: float32 [7] [rad]" in repr(dataset)
 
 

@@ -151,6 +151,19 @@ def test_command_lines(page, tmp_path):
             run(line, tmp_path)
 
 
+def test_the_page_of_the_program_lists_every_command():
+    program = subprocess.run([sys.executable, "-m", "mjsense", "--help"], capture_output=True, text=True, check=True).stdout
+    commands = re.findall(r"^  ([a-z]+) ", program.partition("Subcommands:")[2], re.MULTILINE)
+    table = (ROOT / "docs/program.md").read_text().partition("| --- |")[2].partition("\n\n")[0]
+    assert len(commands) > 20 and [name for name in commands if not re.search(rf"`(mjsense )?{name}\b", table)] == []
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, id=str(p.relative_to(ROOT))) for p in PAGES])
+def test_code_in_tables_has_no_bars(page):
+    """A bar in a cell must be escaped, and the site shows the backslash in code."""
+    assert not [line for line in page.read_text().splitlines() if re.match(r"\|.*`[^`]*\\\|[^`]*`", line)]
+
+
 def test_figures_equal_the_performance_notes(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "bench")
     import figures

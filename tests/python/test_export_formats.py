@@ -48,7 +48,8 @@ def reader(name, *packages):
         if os.environ.get("MJSENSE_TEST_EXPORTS", "0") == "0":
             pytest.skip(f"needs build/{name}; make it: MJSENSE_TEST_EXPORTS=1 ./dev test -k test_export_formats")
         subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-        pip = [folder / "bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1"]
+        # -I: packages on PYTHONPATH are not part of the environment.
+        pip = [folder / "bin/python", "-I", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1"]
         for group in packages:
             done = subprocess.run([*pip, *group], capture_output=True, text=True)
             if done.returncode:
@@ -58,7 +59,7 @@ def reader(name, *packages):
 
 
 def run_reader(python, script, *arguments):
-    done = subprocess.run([python, "-W", "ignore", Path(__file__).parent / f"export_readers/{script}", *arguments], capture_output=True, text=True)
+    done = subprocess.run([python, "-I", "-W", "ignore", Path(__file__).parent / f"export_readers/{script}", *arguments], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
     return done.stdout.strip().splitlines()[-1]
 
@@ -333,7 +334,7 @@ def test_mcap_refuses_b_frames_or_encodes_again(root, tmp_path):
 def test_command_exports(root, tmp_path):
     run = [sys.executable, "-m", "mjsense", "export"]
     done = subprocess.run([*run, "robomimic", root, tmp_path / "a.hdf5", "--episodes", "1"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0 and done.stdout == f"Wrote {tmp_path / 'a.hdf5'}.\n", done.stderr
     with h5py.File(tmp_path / "a.hdf5") as file:
         assert list(file["data"]) == ["demo_0"]
     done = subprocess.run([*run, "robomimic", root, tmp_path / "b.hdf5", "--encode-again"], capture_output=True, text=True)

@@ -68,5 +68,11 @@ def test_errors(made, tmp_path, capsys):
     (tmp_path / "old/meta/info.json").write_text(json.dumps({"codebase_version": "v2.1"}))
     with pytest.raises(ValueError, match=r"has the version 'v2.1', expected v3.0"):
         mjs.import_lerobot(tmp_path / "old", tmp_path / "a")
+    for text, wrong in [("[]", "must be a JSON object"), ("{", "not valid JSON"), ('{"codebase_version": "v3.0", "features": {}}', "has no 'fps'")]:
+        (tmp_path / "old/meta/info.json").write_text(text)
+        with pytest.raises(ValueError, match=f"info.json.*{wrong}"):
+            mjs.import_lerobot(tmp_path / "old", tmp_path / "a")
+    with pytest.raises(ValueError, match=r"scene: MuJoCo cannot load .*info\.json"):
+        mjs.import_lerobot(made / "out", tmp_path / "a", scene=tmp_path / "old/meta/info.json")
     assert commands.run(["import", "robomimic", "x.hdf5", "a", "--scene", "x.xml"]) == 2
     assert "--scene is not an option of the format robomimic" in capsys.readouterr().err

@@ -104,6 +104,30 @@ def test_verify_reports_wrong_rows_and_missing_files(recording):
     assert any("row 4: shard_2" in text and "cannot be read" in text for text in texts), texts
 
 
+def test_a_recording_without_an_index_or_without_a_shard(recording, tmp_path, capsys):
+    """It is unfinished, or a shard was lost."""
+    shutil.rmtree(recording / "shard_1")
+    with pytest.raises(FileNotFoundError, match=r"shard_1/house_0/trajectories_batch_1_of_1.h5: no such file or directory"):
+        mjs.export_lerobot(recording, tmp_path / "out")
+    (recording / "index.parquet").unlink()
+    (recording / "shard_0/done.json").touch()
+    (recording / "shard_2/done.json").unlink(missing_ok=True)
+    capsys.readouterr()
+    mjs.export_lerobot(recording, tmp_path / "out")
+    assert capsys.readouterr().err == f"{recording} is unfinished; the export has the episodes that are published\n"
+    done = subprocess.run([sys.executable, "-m", "mjsense", "inspect", recording], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("no index.parquet: the recording is not complete")
+
+
+def test_options_of_the_program(recording, capsys):
+    assert tools.run(["verify", str(recording), "-q"]) == 0 and not capsys.readouterr().out
+    for command in ("verify", "repair"):
+        assert tools.run([command, str(recording), "--decod"]) == 2
+        assert capsys.readouterr().err.startswith(f"mjsense {command}: no option named '--decod'")
+    shutil.rmtree(recording / "shard_2")
+    assert tools.run(["verify", str(recording), "-q"]) == 1 and "shard_2" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("command, code, text", (("verify", 0, "5 episodes in index.parquet"), ("inspect", 0, "5 episodes, 0 successes"), ("repair", 0, "nothing to repair")))
 def test_program(recording, command, code, text):
     done = subprocess.run([sys.executable, "-m", "mjsense", command, f"file://{recording}"], capture_output=True, text=True, timeout=60)

@@ -121,7 +121,7 @@ def test_a_missing_library_is_an_error_that_says_how_to_mend_it(tmp_path):
             (tmp_path / "mjsense" / file.name).symlink_to(file)
     found = python("import mjsense", [tmp_path])
     assert re.search(r"ImportError: mjsense cannot be loaded: libmj_mjsense\.so: .*; installed: mujoco-core 4\.0\.\d+.*\. "
-                     r"Mend it with: pip install --force-reinstall mjsense$", found.stderr.strip()), found.stderr  # fmt: skip
+                     r"Repair it with: pip install --force-reinstall mjsense$", found.stderr.strip()), found.stderr  # fmt: skip
 
 
 def test_another_libmujoco_is_an_error():
@@ -129,7 +129,7 @@ def test_another_libmujoco_is_an_error():
         mujoco_headers = 4000001
         mujoco_version = staticmethod(lambda: "4.0.7")
 
-    with pytest.raises(ImportError, match=r"another libmujoco, 4\.0\.7, instead of 4\.0.*installed: mujoco-core.*Mend it with: pip install --force"):
+    with pytest.raises(ImportError, match=r"another libmujoco, 4\.0\.7, instead of 4\.0.*installed: mujoco-core.*Repair it with: pip install --force"):
         _libmujoco.check(Other)
 
 
@@ -143,5 +143,5 @@ def test_other_structs_are_an_error(monkeypatch):
         _libmujoco.check(Other)
     monkeypatch.setattr(_libmujoco, "shared", None)
     Other.mujoco_version = staticmethod(lambda: "4.0.1")
-    with pytest.raises(ImportError, match="Mend it with: pip install --force-reinstall --no-deps mjsense"):
+    with pytest.raises(ImportError, match="Repair it with: pip install --force-reinstall --no-deps mjsense"):
         _libmujoco.check(Other)

@@ -233,7 +233,7 @@ def test_user_defined_scene():
     sim.reset([1])
     assert array(sim.data.qpos)[1, 2] == 0 and array(sim.data.qpos)[0, 2] > 0.09
     assert scene.sensor_context is None and scene["terrain"] is scene.terrain
-    with pytest.raises(KeyError, match="Scene element 'tuch' not found"):
+    with pytest.raises(KeyError, match="no sensor or entity named 'tuch'; did you mean 'touch'"):
         scene["tuch"]
 
 

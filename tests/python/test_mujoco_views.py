@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mjsense as mjs
-from mjsense import _core, _libmujoco, _mujoco
+from mjsense import _core, _libmujoco, _mujoco, _mujoco_views
 
 XML = """
 <mujoco>
@@ -64,14 +64,14 @@ def data(model):
 
 @pytest.fixture(scope="module")
 def model_view(model):
-    return _mujoco.MjModelView(_core.OwnedModel.copy(model._address))
+    return _mujoco_views.MjModelView(_core.OwnedModel.copy(model._address))
 
 
 @pytest.fixture(scope="module")
 def data_view(model_view, data):
     # One libmujoco serves both here, so its functions can be called with addresses.
     lib = ctypes.CDLL(_libmujoco._environment()[1])
-    view = _mujoco.MjDataView(model_view)
+    view = _mujoco_views.MjDataView(model_view)
     lib.mj_copyData(*(ctypes.c_void_p(address) for address in (view._address, model_view._address, data._address)))
     return view
 
@@ -143,7 +143,7 @@ def test_unknown_elements(model_view, model):
 
 
 def test_arrays_are_the_memory_and_keep_it(model):
-    view = _mujoco.MjModelView(_core.OwnedModel.copy(model._address))
+    view = _mujoco_views.MjModelView(_core.OwnedModel.copy(model._address))
     view.geom("cube").size = [0.3, 0.2, 0.1]
     view.opt.timestep = 0.5
     assert view.geom_size[1].tolist() == [0.3, 0.2, 0.1] and view.opt.timestep == 0.5
@@ -194,7 +194,7 @@ def test_a_spec_of_another_series_goes_over_as_xml(monkeypatch, tmp_path):
     kind, xml = _mujoco.source_of(spec)
     assert kind == "xml" and "wedge.obj" in xml and spec.meshes[0].file == before
     found = mjs.Scene(mjs.SceneCfg(entities={"r": mjs.EntityCfg(model=spec)})).model
-    assert isinstance(found, _mujoco.MjModelView)
+    assert isinstance(found, _mujoco_views.MjModelView)
     np.testing.assert_allclose(found.mesh_vert, shared.mesh_vert)
     np.testing.assert_allclose(found.body("r/b").mass, shared.body("r/b").mass)
 
@@ -248,7 +248,7 @@ def test_editing_a_scene_gives_the_same_model(monkeypatch):
     real = scene().model
     monkeypatch.setattr(_libmujoco, "shared", None)
     view = scene().model
-    assert isinstance(view, _mujoco.MjModelView)
+    assert isinstance(view, _mujoco_views.MjModelView)
     check(real, view)
     shorter = mjs.Scene(mjs.SceneCfg(spec_fn=lambda spec: spec.delete(spec.worldbody.add_site(name="doomed")))).model
     assert shorter.nsite == 0

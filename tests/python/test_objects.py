@@ -3,15 +3,18 @@
 
 import itertools
 import json
+import os
 import tomllib
+import zipfile
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from wheels import wheel
 
 import mjsense as mjs
-from mjsense import _core, assets, commands
+from mjsense import _core, _scene_synthesizer, assets, commands
 
 MODELS = Path(__file__).parents[2] / "models"
 BUILT_IN = [
@@ -79,13 +82,9 @@ def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)
     monkeypatch.delenv("CONDA_PREFIX", raising=False)
     assert not listed()["robosuite_can"]["installed"]
-    for scene, packages in (
-        ("robosuite", "robosuite "),
-        ("rgb", "dm-robotics-manipulation==0.10.0 "),
-        ("ycb", "myosuite==2.12.2 "),
-    ):
-        with pytest.raises(ValueError, match=f"pip install {packages}"):
-            mjs.make_vec("pick", "franka", scene=f"{scene}/objects", num_envs=1, cameras=[], policy=None)
+    for source in ("robosuite", "libero", "metaworld", "rgb", "scene_synthesizer", "ycb"):
+        with pytest.raises(ValueError, match=f"mjsense assets install {source} "):
+            mjs.make_vec("pick", "franka", scene=f"{source}/objects", num_envs=1, cameras=[], policy=None)
 
 
 def test_masses_and_friction_are_those_of_the_table(monkeypatch):
@@ -169,3 +168,80 @@ def test_install_runs_pip_once_and_says_what_was_added(monkeypatch, capsys):
     assert commands.run(["assets", "install", "robosuite"]) == 0 and len(calls) == 1
     assert commands.run(["assets", "install", "robosuit"]) == commands.WRONG_INPUT
     assert "robosuit" in capsys.readouterr().err
+
+
+def test_install_of_generated_objects_leaves_only_their_files(tmp_path, monkeypatch, capsys):
+    """Pip and the generator are replaced."""
+    packages, temporary = tmp_path / "packages", []
+    monkeypatch.setenv("MJSENSE_PACKAGES", str(packages))
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)
+    monkeypatch.delenv("CONDA_PREFIX", raising=False)
+
+    class Done:
+        returncode = 0
+
+    def run(command, env=None, **_):
+        if "--target" in command:
+            temporary.append(Path(command[command.index("--target") + 1]))
+            assert "--no-deps" in command and "scene-synthesizer==1.15.0" in command
+        elif env is not None:
+            assert env["PYTHONPATH"].split(os.pathsep)[0] == str(temporary[0])
+            assert command[1:3] == ["-m", "mjsense._scene_synthesizer"]
+            folder = Path(command[3])
+            folder.mkdir()
+            for name in _scene_synthesizer.OBJECTS:
+                (folder / f"{name}.xml").write_text("<mujoco/>")
+        else:
+            with zipfile.ZipFile(command[-1]) as archive:
+                archive.extractall(packages)
+        return Done
+
+    monkeypatch.setattr(assets.subprocess, "run", run)
+    assert commands.run(["assets", "install", "scene_synthesizer"]) == 0
+    assert f"scene_synthesizer: {len(_scene_synthesizer.OBJECTS)} objects added" in capsys.readouterr().out
+    assert {path.name for path in packages.iterdir()} == {
+        "mjsense_scene_synthesizer",
+        "mjsense_scene_synthesizer-1.15.0.dist-info",
+    }
+    assert not temporary[0].parent.exists()
+
+
+def extent(model, data, contacts):
+    """Lowest and highest corner of the geoms with contacts, or of those without."""
+    points = []
+    for geom in np.flatnonzero((model.geom_contype > 0) == contacts):
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = model.geom_dataid[geom]
+            own = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
+        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            own = CORNERS * model.geom_size[geom][[0, 0, 1]]
+        else:
+            own = CORNERS * model.geom_size[geom]
+        points.append(own @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+    return np.concatenate([np.concatenate(points).min(0), np.concatenate(points).max(0)])
+
+
+def test_objects_of_scene_synthesizer(tmp_path, monkeypatch):
+    """Generates them: contacts are as large as the meshes that pictures show."""
+    if "scene_synthesizer" not in os.environ.get("MJSENSE_TEST_ADAPTERS", "").split(","):
+        pytest.skip("downloads 50 MB: MJSENSE_TEST_ADAPTERS=scene_synthesizer ./dev test -k test_objects")
+    monkeypatch.setenv("MJSENSE_PACKAGES", str(tmp_path))
+    pip = assets._pip_install
+    monkeypatch.setattr(
+        assets,
+        "_pip_install",
+        lambda source, *what: pip(source, *(what if "--target" in what else ("--target", str(tmp_path), *what))),
+    )
+    assert len(assets.install_objects("scene_synthesizer")) == len(_scene_synthesizer.OBJECTS)
+    for name in _scene_synthesizer.OBJECTS:
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / f"mjsense_scene_synthesizer/{name}.xml"))
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        assert np.allclose(extent(model, data, True), extent(model, data, False), atol=0.0025), name
+    table = tomllib.loads((MODELS / "objects/scene_synthesizer.toml").read_text())["objects"]
+    assert [one["name"] for one in table] == [f"scene_synthesizer_{name}" for name in _scene_synthesizer.OBJECTS]
+    (tmp_path / "scene.toml").write_text(SCENE.format(names='["scene_synthesizer_.*"]'))
+    env = mjs.make_vec("pick", scene=str(tmp_path / "scene.toml"), cameras=[], policy=None, observations=["qpos"])
+    masses = {one["name"]: env.sim.model.body(f"{one['name']}/{one['name']}").subtreemass[0] for one in table}
+    assert masses == pytest.approx({one["name"]: one["mass"] for one in table})
+    env.close()

@@ -42,16 +42,16 @@ def environment(version):
         return python
     first, _, over = version.partition("+")
     mujoco = [] if version == "none" else [f"mujoco=={first}"]
-    steps = [["gymnasium>=1.0", "nanobind-backend>=1.0", "numpy>=1.26", "pytest", "PyOpenGL", *mujoco]]
+    steps = [["gymnasium>=1.1", "nanobind-backend>=1.0", "numpy>=1.26", "pytest", "PyOpenGL", *mujoco]]
     steps += [["--no-deps", f"mujoco-core=={over}.*"]] if over else []
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     for step in steps:
-        pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:", "--retries=1", *step]
+        pip = [python, "-I", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:", "--retries=1", *step]
         done = subprocess.run(pip, capture_output=True, text=True)
         if done.returncode:
             pytest.skip(f"pip cannot install {' '.join(step)}: {done.stderr.strip()[-300:]}")
     if not over:
-        subprocess.run([python, "-m", "pip", "check", "--disable-pip-version-check"], check=True)
+        subprocess.run([python, "-I", "-m", "pip", "check", "--disable-pip-version-check"], check=True)
     (folder / "complete").touch()
     return python
 
@@ -80,6 +80,6 @@ def test_images_are_those_of_its_renderer(version):
     path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     if subprocess.run([python, "-c", "import OpenGL, pytest"], capture_output=True).returncode:
         pytest.skip(f"{python.parents[1]} is older than this test; delete it")
-    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "look_as_in_opengl", SCRIPT.with_name("test_renderer.py")]
+    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "look_as_in_opengl", SCRIPT.with_name("test_renderer_opengl.py")]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 0, done.stdout[-3000:]

@@ -26,6 +26,17 @@ def test_entry_point_runs_the_program():
     assert (wrong.returncode, wrong.stderr) == (2, "mjsense: no command 'sensrs'; did you mean 'sensors'?\n")
 
 
+@pytest.mark.parametrize("words, message", [
+    (("record", "pick", "--episode", "3"), "mjsense: record: no option named '--episode'; did you mean '--episodes'?"),
+    (("record", "pick", "3"), "mjsense: The following argument was not expected: 3; see mjsense record --help"),
+    (("replay", "data", "--form=states"), "mjsense replay: no option named '--form'; did you mean '--from'?"),
+    (("replay", "data", "--xyz"), "mjsense replay: no option named '--xyz'; see mjsense replay --help"),
+])  # fmt: skip
+def test_unknown_options_are_named_with_the_nearest(words, message):
+    wrong = run(*words)
+    assert (wrong.returncode, wrong.stderr) == (2, message + "\n")
+
+
 def test_unknown_commands_run_programs_from_path(tmp_path):
     program = tmp_path / "mjsense-hello"
     program.write_text('#!/bin/sh\necho "hello $1"\nexit 7\n')

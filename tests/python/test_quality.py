@@ -7,28 +7,10 @@ import sys
 
 import numpy as np
 import pytest
-from mjsense.cluster import export_on_ray
 from mjsense.commands import run as run_command
+from waiting import MOVES, WAITS, Waiting
 
 import mjsense as mjs
-
-MOVES, WAITS = 5, 12
-
-
-class Waiting(mjs.Policy):
-    """Raises one joint, waits, and raises it again."""
-
-    observation = ("qpos",)
-
-    def initialize(self):
-        self.step = 0
-
-    def act(self, obs):
-        raised = min(self.step, MOVES) + max(0, self.step - MOVES - WAITS)
-        self.step += 1
-        arm = np.tile([0, -0.7853, 0, -2.35619, 0, 1.57079, 0], (self.num_worlds, 1))
-        arm[:, 3] += 0.05 * raised
-        return {"arm": arm, "gripper": np.zeros((self.num_worlds, 1))}
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +50,14 @@ def test_picks_from_above(picks):
         assert quality.visibility["wrist_camera"]["pickup_obj"] == pytest.approx(seen.mean())
 
 
+def test_jerk_of_two_arms_is_that_of_the_rougher_one(tmp_path):
+    mjs.record("pick", "bimanual_yam", out=tmp_path, episodes=1, horizon=8, keep_failures=True, cameras=[])
+    (episode,) = mjs.Dataset(tmp_path).episodes
+    paths = [episode[f"obs/extra/tcp_pose_{side}"][:, :3].astype(float) for side in ("left", "right")]
+    jerks = [np.sqrt(((np.diff(path, 3, axis=0) * float(episode.fps) ** 3) ** 2).sum(1).mean()) for path in paths]
+    assert episode.quality.jerk == pytest.approx(max(jerks))
+
+
 def test_episodes_are_chosen_by_a_function(waiting, picks):
     assert len(mjs.Dataset(picks, where=lambda episode: episode.quality.idle < 0.3).episodes) == 2
     assert not mjs.Dataset(waiting, where=lambda episode: episode.quality.idle < 0.1).episodes
@@ -90,11 +80,6 @@ def test_trimmed_episodes(waiting):
         short.replay("actions")
 
 
-def test_export_on_ray_does_not_trim(waiting, tmp_path):
-    with pytest.raises(ValueError, match="export on Ray does not trim episodes; leave out --ray, or trim_idle"):
-        export_on_ray("zarr", waiting, tmp_path / "out", trim_idle=True)
-
-
 def test_moving_objects_and_idle_steps_at_the_end_stay(tmp_path):
     class Still(mjs.Policy):
         """Commands the initial position while an object falls."""
@@ -115,30 +100,6 @@ def test_moving_objects_and_idle_steps_at_the_end_stay(tmp_path):
     rows[falling][:, 2] += np.linspace(0, 1, episode.length)
     episode._store.rows.add((episode.index, falling), rows[falling], 0)
     assert episode.trimmed().length == episode.length
-
-
-def test_trimmed_export_has_the_frames_that_are_left(tmp_path):
-    av = pytest.importorskip("av")
-    data, out = tmp_path / "data", tmp_path / "lerobot"
-    mjs.record(
-        "pick",
-        policy=Waiting,
-        out=data,
-        horizon=2 * MOVES + WAITS,
-        worlds=1,
-        keep_failures=True,
-        width=64,
-        height=48,
-        shadows=False,
-    )
-    mjs.export_lerobot(data, out, trim_idle=True)
-    (episode,) = mjs.Dataset(data, trim_idle=True).episodes
-    info = json.loads((out / "meta/info.json").read_text())
-    assert info["total_frames"] == episode.length - 1 < mjs.Dataset(data).episodes[0].length - 1
-    with av.open(str(out / "videos/observation.images.wrist_camera/chunk-000/file-000.mp4")) as video:
-        frames = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
-    wanted = episode.video("wrist_camera")[:]
-    assert len(frames) == len(wanted) == episode.length and np.abs(np.array(frames, int) - wanted).mean() < 6
 
 
 def test_program(picks, waiting, capsys):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjsense.RecordEpisodes: recordings of any Gymnasium environment."""
 
+import copy
+import gc
 import os
 import signal
 import subprocess
@@ -56,6 +58,12 @@ class Counter(gymnasium.Env):
 
 def run(env, steps=1000):
     """Plays until everything is recorded."""
+    play(env, steps)
+    env.close()
+
+
+def play(env, steps):
+    """Makes at most so many steps."""
     single = not hasattr(env, "num_envs")
     env.reset(seed=5)
     for step in range(steps):
@@ -65,7 +73,6 @@ def run(env, steps=1000):
         _, _, terminated, truncated, _ = env.step(action)
         if single and (terminated or truncated):
             env.reset()
-    env.close()
 
 
 def verified(folder):
@@ -85,7 +92,7 @@ def test_a_single_environment(tmp_path):
     env = mjs.RecordEpisodes(Counter(), tmp_path, 3, cameras={"view": "render"}, settings={"note": 1})
     assert isinstance(env, gymnasium.Wrapper)
     run(env)
-    assert "3 episodes, 15 steps, 3 videos" in verified(tmp_path)
+    assert "3 episodes, 15 observations, 3 videos" in verified(tmp_path)
     data = mjs.Dataset(tmp_path)
     assert data.fps == 20 and [e.outcome for e in data.episodes] == ["success", "terminated", "terminated"]
     assert [e.seed for e in data.episodes] == [5, 0, 0]
@@ -303,8 +310,52 @@ def test_a_killed_recording_is_resumed(tmp_path):
     assert done.returncode and "has a recording: pass resume=True to continue it" in done.stderr
     done = subprocess.run([*again, "resume"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "8 episodes, 40 steps" in verified(tmp_path)
+    assert "8 episodes, 40 observations" in verified(tmp_path)
     assert [e.length for e in mjs.Dataset(tmp_path).episodes] == [5] * 8
+
+
+@pytest.mark.parametrize("make", [Counter, lambda: SyncVectorEnv([Counter, Counter])], ids=["single", "vector"])
+@pytest.mark.parametrize("within", [True, False])
+def test_a_recording_that_an_error_ends_is_resumed(tmp_path, make, within):
+    """In a ``with`` block, and when the environment is deleted without close()."""
+    env = mjs.RecordEpisodes(make(), tmp_path, 5)
+    if within:
+        with pytest.raises(RuntimeError, match="the arm is lost"), env:
+            play(env, 13)
+            raise RuntimeError("the arm is lost")
+        assert env.recording.kept
+    else:
+        play(env, 13)
+        del env
+        gc.collect()
+    assert (tmp_path / "house_0/.recording").exists()
+    with mjs.RecordEpisodes(make(), tmp_path, 5, resume=True) as env:
+        play(env, 100)
+    assert "5 episodes, 25 observations" in verified(tmp_path)
+
+
+def test_a_recording_that_was_published_early_cannot_be_resumed(tmp_path):
+    with mjs.RecordEpisodes(Counter(), tmp_path, 5) as env:
+        play(env, 13)
+    env = mjs.RecordEpisodes(Counter(), tmp_path, 5, resume=True)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="house_0' was published with 3 of 5 episodes and cannot be continued: choose another folder"):
+            env.reset()
+
+
+@pytest.mark.parametrize("env", [Counter, lambda: SyncVectorEnv([Counter])])
+def test_a_recording_environment_cannot_be_copied(env, tmp_path):
+    with pytest.raises(TypeError, match=r"cannot be copied or pickled; make one in each process, with house=0, 1, 2"):
+        copy.deepcopy(mjs.RecordEpisodes(env(), tmp_path, 1))
+
+
+@pytest.mark.parametrize("use", [lambda data, out: mjs.check_replay(data), lambda data, out: mjs.render(data, out)])
+def test_replay_and_render_say_that_another_environment_cannot_be_simulated(use, tmp_path):
+    env = mjs.RecordEpisodes(Counter(), tmp_path / "data", episodes=1, cameras={"view": "render"})
+    run(env)
+    env.close()
+    with pytest.raises(ValueError, match=r"has no data for replay: the environment '.*Counter.*' is not simulated by mjsense"):
+        use(tmp_path / "data", tmp_path / "out")
 
 
 def test_errors(tmp_path):
@@ -328,6 +379,16 @@ def test_errors(tmp_path):
     env.observation_space = spaces.Text(5)
     with pytest.raises(TypeError, match=r"observation: .*Text.*FilterObservation"):
         mjs.RecordEpisodes(env, tmp_path, 1)
+    env = Counter()
+    env.action_space = spaces.Text(5)
+    with pytest.raises(TypeError, match=r"actions/action: space Text.*TransformAction"):
+        mjs.RecordEpisodes(env, tmp_path, 1)
+    env = Counter()
+    env.step = lambda action: (env._observation(), np.array([1.0, 2.0]), False, False, {})
+    recorded = mjs.RecordEpisodes(env, tmp_path / "reward", 1)
+    recorded.reset()
+    with pytest.raises(ValueError, match=r"the reward has the shape \(2,\), expected one number"):
+        recorded.step(np.zeros(2, np.float32))
     env = Pendulum()
     env.observation_space = spaces.Box(-1, 1, (3,))
     with pytest.raises(ValueError, match=r"'observation' has the shape \(2,\), expected \(3,\) as in its space"):

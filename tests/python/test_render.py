@@ -46,7 +46,10 @@ def numbers(root):
                 def add(name, item, number=number):
                     if isinstance(item, h5py.Dataset):
                         value = item[()]
-                        found[number, name] = value if isinstance(value, bytes) else (value.dtype, value.shape, value.tobytes()), dict(item.attrs)
+                        found[number, name] = (
+                            value if isinstance(value, bytes) else (value.dtype, value.shape, value.tobytes()),
+                            {key: np.array(of).tolist() for key, of in item.attrs.items()},
+                        )
 
                 trajectory.visititems(add)
     return found
@@ -70,7 +73,9 @@ def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
     assert dataset.episodes[0].settings["render"]["of"]["settings"]["task"] == "pick"
 
 
-@pytest.mark.parametrize("task, robot", (("open", "i2rt_yam"), ("nav_to_obj", "rby1"), ("packing", "franka"), ("pick", "floating_rum")))
+@pytest.mark.parametrize(
+    "task, robot", (("open", "i2rt_yam"), ("nav_to_obj", "rby1"), ("packing", "franka"), ("pick", "floating_rum"))
+)
 def test_other_tasks_and_robots(task, robot, tmp_path):
     """tools/replay_table.py checks all of them."""
     mjs.record(task, robot, out=tmp_path / "data", max_attempts=1, **{**RECORDING, "episodes": 1, "worlds": 1, "horizon": 4})
@@ -109,7 +114,9 @@ def test_added_cameras(recorded, tmp_path):
     with h5py.File(episode.path) as file:
         trajectory = file[episode.trajectory]
         assert sorted(trajectory["obs/sensor_param"]) == ["hand", "top", "wrist_camera"]
-        assert "exo_camera_1_segmentation" not in trajectory["obs/extra"] and "wrist_camera_segmentation" in trajectory["obs/extra"]
+        assert (
+            "exo_camera_1_segmentation" not in trajectory["obs/extra"] and "wrist_camera_segmentation" in trajectory["obs/extra"]
+        )
     assert episode.video("top")[0].std() > 10
     # A rendering can be rendered again, with its added cameras.
     assert mjs.render(tmp_path, tmp_path / "again", copy=False).frames == 3 * 9 * 5
@@ -117,7 +124,9 @@ def test_added_cameras(recorded, tmp_path):
     assert videos(tmp_path / "again") == videos(tmp_path) == videos(tmp_path / "copies")
 
 
-@pytest.mark.parametrize("pos, lookat, up", (((1, 2, 3), (0, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, 0, 0), (0, 0, 1)), ((-1, 0, 0), (2, 1, -1), (1, 1, 0))))
+@pytest.mark.parametrize(
+    "pos, lookat, up", (((1, 2, 3), (0, 0, 0), (0, 0, 1)), ((0, 0, 1), (0, 0, 0), (0, 0, 1)), ((-1, 0, 0), (2, 1, -1), (1, 1, 0)))
+)
 def test_orientation(pos, lookat, up):
     from mjsense.dataset.render_cameras import added_camera
 
@@ -157,7 +166,10 @@ def test_light(recorded, tmp_path):
     mjs.render(recorded, tmp_path / "lamp", edit=edit, episodes=[0])
     mjs.render(tmp_path / "dark", tmp_path / "again", copy=False)
     assert videos(tmp_path / "again") == videos(tmp_path / "dark")
-    before, dark, lamp = (mjs.Dataset(out).episodes[0].video("wrist_camera")[0].mean((0, 1)) for out in (recorded, tmp_path / "dark", tmp_path / "lamp"))
+    before, dark, lamp = (
+        mjs.Dataset(out).episodes[0].video("wrist_camera")[0].mean((0, 1))
+        for out in (recorded, tmp_path / "dark", tmp_path / "lamp")
+    )
     assert dark.mean() < 0.6 * before.mean() and lamp[0] > before[0] + 5
 
 
@@ -179,7 +191,12 @@ def test_sensors(recorded, tmp_path):
     )
     from mjsense.dataset.sensor_tables import sensors_of
 
-    mjs.render(recorded, tmp_path / "out", cameras=[], sensors=lambda: [*sensors_of(tmp_path / "sensors.toml"), Height(), mjs.PoseSensor("hand", body="robot_0/gripper/base")])
+    mjs.render(
+        recorded,
+        tmp_path / "out",
+        cameras=[],
+        sensors=lambda: [*sensors_of(tmp_path / "sensors.toml"), Height(), mjs.PoseSensor("hand", body="robot_0/gripper/base")],
+    )
     verified(tmp_path / "out")
     episode = mjs.Dataset(tmp_path / "out").episodes[0]
     assert episode["obs/extra/fingers/found"].shape[0] == 9 and episode["obs/extra/scan/distances"].shape == (9, 16)
@@ -204,7 +221,9 @@ def test_resume_after_an_interruption(recorded, tmp_path):
     with pytest.raises(ValueError, match="a different recording: 'settings/samples' was 1 and is now 2"):
         mjs.render(recorded, tmp_path / "out", resume=True, samples=2, **about)
     mjs.render(recorded, tmp_path / "out", resume=True, **about)
-    whole, out = ({p.relative_to(root): p.read_bytes() for p in root.rglob("*.*")} for root in (tmp_path / "whole", tmp_path / "out"))
+    whole, out = (
+        {p.relative_to(root): p.read_bytes() for p in root.rglob("*.*")} for root in (tmp_path / "whole", tmp_path / "out")
+    )
     assert whole == out
     assert mjs.render(recorded, tmp_path / "out", resume=True, **about).finished == 3
 
@@ -216,7 +235,9 @@ def test_kill_and_resume(recorded, tmp_path):
     subprocess.run([*program, tmp_path / "whole", *words], check=True, capture_output=True)
     killed = 0
     for delay in (0.02, 0.15, 0.3):
-        process = subprocess.Popen([*program, tmp_path / "out", *words, "--resume"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        process = subprocess.Popen(
+            [*program, tmp_path / "out", *words, "--resume"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
         house = tmp_path / "out/house_0"
         while process.poll() is None and not house.exists():
             time.sleep(0.005)
@@ -226,7 +247,9 @@ def test_kill_and_resume(recorded, tmp_path):
         process.communicate()
     assert killed
     subprocess.run([*program, tmp_path / "out", *words, "--resume"], check=True, capture_output=True)
-    whole, out = ({p.relative_to(root): p.read_bytes() for p in root.rglob("*.*")} for root in (tmp_path / "whole", tmp_path / "out"))
+    whole, out = (
+        {p.relative_to(root): p.read_bytes() for p in root.rglob("*.*")} for root in (tmp_path / "whole", tmp_path / "out")
+    )
     assert whole == out and not (tmp_path / "out/house_0/.recording").exists()
 
 
@@ -314,7 +337,16 @@ def test_program(recorded, tmp_path):
     def run(*words):
         return subprocess.run([sys.executable, "-m", "mjsense", *map(str, words)], capture_output=True, text=True)
 
-    done = run("render", recorded, tmp_path / "out", "--cameras", "--add-camera", "top=pos=0.5,0,1.6 lookat=0.5,0,0 width=32 height=24 depth", "--episodes", 0)
+    done = run(
+        "render",
+        recorded,
+        tmp_path / "out",
+        "--cameras",
+        "--add-camera",
+        "top=pos=0.5,0,1.6 lookat=0.5,0,0 width=32 height=24 depth",
+        "--episodes",
+        0,
+    )
     assert done.returncode == 0 and done.stdout.startswith("1 episodes with 18 images in "), done.stdout + done.stderr
     assert mjs.Dataset(tmp_path / "out").episodes[0].video("top_depth").shape == (9, 24, 32)
     wrong = run("render", recorded, tmp_path / "out2", "--add-camera", "top=pos=0.5,0")
@@ -333,10 +365,15 @@ def test_a_task_in_python(tmp_path):
     verified(tmp_path / "out")
     made = videos(tmp_path / "out")
     assert {name: data for name, data in made.items() if "top" not in name} == videos(tmp_path / "data") and len(made) == 6
-    for root, reason in (("data", "belongs to the task 'cart', which is written in Python"), ("out", "carried over from the recording that was rendered")):
+    for root, reason in (
+        ("data", "belongs to the task 'cart', which is written in Python"),
+        ("out", "carried over from the recording that was rendered"),
+    ):
         report = mjs.check_replay(tmp_path / root, states=True)
         check = report.episodes[1].sensors
-        assert report and {"obs/sensor_data/side", "obs/sensor_data/side_depth", "obs/sensor_param/side/intrinsic_cv"} <= set(check.equal), report
+        assert report and {"obs/sensor_data/side", "obs/sensor_data/side_depth", "obs/sensor_param/side/intrinsic_cv"} <= set(
+            check.equal
+        ), report
         assert check.not_computed["rewards"] == check.not_computed["obs/agent/qpos"] == reason
 
 
@@ -361,10 +398,16 @@ def test_sensors_from_states(recorded, tmp_path):
         rows = file["traj_1/obs/agent/qpos"]
         text = json.loads(rows[2].tobytes().rstrip(b"\0"))
         text["arm"][2] += 1
-        rows[2] = np.frombuffer(json.dumps(text, sort_keys=True, separators=(",", ":")).encode().ljust(rows.shape[1], b"\0"), np.uint8)
+        rows[2] = np.frombuffer(
+            json.dumps(text, sort_keys=True, separators=(",", ":")).encode().ljust(rows.shape[1], b"\0"), np.uint8
+        )
     wrong = mjs.check_replay(tmp_path / "data", states=True)
     assert not wrong and wrong.episodes[0].ok
     found = wrong.episodes[1].deviations
     assert set(found) == {"obs/extra/tcp_pose", "obs/agent/qpos"}
-    assert (found["obs/extra/tcp_pose"].step, found["obs/extra/tcp_pose"].element, found["obs/extra/tcp_pose"].count) == (3, "value [1]", 1)
+    assert (found["obs/extra/tcp_pose"].step, found["obs/extra/tcp_pose"].element, found["obs/extra/tcp_pose"].count) == (
+        3,
+        "value [1]",
+        1,
+    )
     assert (found["obs/agent/qpos"].step, found["obs/agent/qpos"].element) == (2, "key 'arm'")

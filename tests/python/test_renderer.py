@@ -1,76 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense.Renderer: its interface, its images against truth and against mujoco.Renderer, threads and processes."""
+"""mjsense.Renderer: its interface, and its images against truth."""
 
-import concurrent.futures
-import gc
-import multiprocessing
-import os
-import resource
+import copy
+import pickle
 
 import numpy as np
 import pytest
-from test_fork import in_fork
+from renderer_scenes import BALL, SHAPES, image_of, load
 
 import mjsense as mjs
 
 mujoco = pytest.importorskip("mujoco")
-
-BALL = """<mujoco><visual><map znear="0.01" zfar="50"/></visual><statistic extent="1" center="0 0 0"/>
-<worldbody><light pos="0 0 3" castshadow="false"/>
-<camera name="front" pos="0 -2.5 0" xyaxes="1 0 0 0 0 1" fovy="45"/><camera name="frontal" pos="0 -3 0" xyaxes="1 0 0 0 0 1"/>
-<body name="ball" pos="0 0 0"><freejoint/><geom name="ball" size="0.5" rgba="1 0 0 1"/></body></worldbody></mujoco>"""
-
-SHAPES = """<mujoco><visual><map znear="0.01" zfar="30"/></visual><statistic extent="2" center="0 0 .4"/>
-<asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 .2" width="64" height="384"/>
-<texture name="checks" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".8 .7 .6" width="128" height="128"/>
-<texture name="cube" type="cube" builtin="checker" mark="cross" markrgb="1 1 1" rgb1=".7 .2 .2" rgb2=".2 .2 .7" width="64" height="64"/>
-<material name="floor" texture="checks" texrepeat="4 4" texuniform="true" reflectance=".2"/>
-<material name="box" texture="cube"/><material name="flat" texture="checks" texrepeat="2 2"/><material name="glass" rgba=".2 .8 .9 .4"/>
-<mesh name="rock" vertex="0 0 0  .3 0 0  0 .3 0  0 0 .3  .25 .25 .1"/>
-<hfield name="hill" nrow="3" ncol="3" size=".4 .4 .2 .05" elevation="0 1 0 2 3 1 0 1 0"/></asset>
-<worldbody><light pos="1 -1 3" dir="-.3 .3 -1" diffuse=".7 .7 .7"/>
-<light type="directional" dir=".5 .5 -1" pos="0 0 3" diffuse=".3 .3 .3" castshadow="false"/>
-<camera name="view" pos="1.2 -1.6 1.2" xyaxes="1 .75 0 -.25 .35 .85"/><camera name="below" pos="1.6 -1.6 -.5" xyaxes="1 1 0 .2 -.2 1"/>
-<camera name="flat" pos="1.2 -1.6 1.2" xyaxes="1 .75 0 -.25 .35 .85" projection="orthographic" fovy="2"/>
-<camera name="sensor" pos="1.2 -1.6 1.2" xyaxes="1 .75 0 -.25 .35 .85" sensorsize=".01 .008" focal=".01 .01" principal=".001 .0005"
- resolution="640 480"/>
-<geom name="floor" type="plane" size="0 0 .1" material="floor"/><geom type="plane" size=".3 .2 .1" pos="-.8 .8 .3" euler="40 0 20" material="flat"/>
-<geom type="hfield" hfield="hill" pos="-.8 -.4 .02" rgba=".3 .7 .3 1"/>
-<body pos="0 0 .5"><freejoint/><geom type="sphere" size=".15" material="flat"/></body>
-<body name="arm" pos=".5 0 .3"><joint type="hinge" axis="0 1 0"/><geom type="capsule" size=".08 .2" rgba=".9 .4 .2 1"/>
- <site name="a" pos="0 0 .35" size=".05"/><body pos="0 0 .4"><joint type="hinge" axis="1 0 0"/><geom type="box" size=".1 .06 .08" material="box"/>
- <site name="b" type="box" size=".04 .02 .06" pos="0 0 .12" rgba="0 1 0 .5"/></body></body>
-<body pos="0 .6 .3"><joint type="slide" axis="0 0 1"/><geom type="cylinder" size=".1 .2" material="flat"/><site name="c" pos="0 0 .3"/></body>
-<body pos="-.4 .1 .3"><joint type="ball"/><geom type="ellipsoid" size=".1 .15 .2" rgba=".6 .2 .8 1"/></body>
-<body pos=".4 -.6 .1"><freejoint/><geom type="mesh" mesh="rock" rgba=".9 .9 .3 1"/></body>
-<body pos="-.2 -.6 .2"><freejoint/><geom type="box" size=".15 .15 .15" material="glass"/></body></worldbody>
-<tendon><spatial width=".01" rgba="1 0 0 1"><site site="a"/><site site="b"/><site site="c"/></spatial></tendon></mujoco>"""
-
-SOFT = """<mujoco><statistic extent="1" center="0 0 .3"/><worldbody><light pos="0 -1 2" dir="0 .5 -1"/>
-<camera name="view" pos="0 -1.6 .9" xyaxes="1 0 0 0 .4 .9"/><geom type="plane" size="1 1 .1"/>
-<flexcomp name="cloth" type="grid" dim="2" count="6 6 1" spacing=".08 .08 .08" pos="-.3 0 .4" radius=".01" rgba=".2 .6 .9 1" mass=".1"/>
-<flexcomp name="gel" type="grid" dim="3" count="4 4 4" spacing=".07 .07 .07" pos=".3 0 .3" radius=".01" rgba=".9 .5 .2 1" mass=".1"/>
-<flexcomp name="rope" type="grid" dim="1" count="8 1 1" spacing=".05 .05 .05" pos="0 -.3 .3" radius=".01" rgba=".3 .9 .3 1" mass=".1"/>
-</worldbody></mujoco>"""
-
-
-def load(xml, steps=0):
-    if not hasattr(mujoco.MjModel, "cam_projection"):  # older versions
-        xml = xml.replace('projection="orthographic"', 'orthographic="true"')
-    if not hasattr(mujoco.MjModel, "light_type"):
-        xml = xml.replace('type="directional"', 'directional="true"')
-    model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
-    for _ in range(steps):
-        mujoco.mj_step(model, data)
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
-def image_of(model, data, camera=-1, option=None, **kwargs):
-    with mjs.Renderer(model, 60, 80, **kwargs) as renderer:
-        renderer.update_scene(data, camera, option)
-        return renderer.render()
 
 
 def test_depth_of_a_ball_is_that_of_the_sphere():
@@ -188,13 +128,52 @@ def test_data_of_a_model_that_was_compiled_anew_is_refused():
             call()
 
 
-def test_a_pose_that_is_not_finite_is_named():
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda m, d: d.geom_xpos, r"geom 0 of the scene \(geom 'ball', id 0\) has a pose, size or colour that is not finite"),
+        (lambda m, d: m.geom_rgba, r"geom 0 of the scene \(geom 'ball', id 0\) has a pose, size or colour that is not finite"),
+        (lambda m, d: d.light_xdir, r"light 1 of the scene( \(light 'lamp', id 0\))? has a pose or colour that is not finite"),
+        (lambda m, d: m.light_diffuse, r"light 1 of the scene( \(light 'lamp', id 0\))? has a pose or colour that is not finite"),
+        (lambda m, d: d.cam_xpos, r"the scene's camera \(camera 'front', id 0\) has a pose or field of view that is not finite"),
+        (lambda m, d: m.cam_fovy, r"the scene's camera \(camera 'front', id 0\) has a pose or field of view that is not finite"),
+    ],
+)
+def test_what_is_not_finite_is_named(edit, message):
+    model, data = load(BALL.replace("<light", '<light name="lamp"'))
+    renderer = mjs.Renderer(model, 20, 30)
+    np.reshape(edit(model, data), -1)[0] = np.nan
+    renderer.update_scene(data, "front")
+    with pytest.raises(ValueError, match=message):
+        renderer.render()
+
+
+def test_a_camera_that_is_not_set_is_an_error():
     model, data = load(BALL)
     renderer = mjs.Renderer(model, 20, 30)
-    data.geom_xpos[0, 1] = np.nan
-    renderer.update_scene(data, "front")
-    with pytest.raises(ValueError, match=r"geom 0 of the scene \(geom 'ball', id 0\) has a pose or size that is not finite"):
-        renderer.render()
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_USER
+    with pytest.raises(ValueError, match="the near plane of the scene's camera is at 0"):  # otherwise MuJoCo ends the process
+        renderer.update_scene(data, camera)
+    with pytest.raises(ValueError, match=r"the scene's camera is not set: .*mj_forward"):
+        mjs.Renderer(model, 20, 30).render()
+
+
+@pytest.mark.parametrize("camera", [-1, "front"])
+def test_data_without_poses_is_an_error(camera):
+    model, data = load(BALL)
+    renderer = mjs.Renderer(model, 20, 30)
+    mujoco.mj_resetData(model, data)
+    with pytest.raises(ValueError, match=r"`data` has no poses yet: call mujoco.mj_forward\(model, data\)"):
+        renderer.update_scene(data, camera)
+    with pytest.raises(ValueError, match=r"has no poses yet.*\(datas\[0\]\)"):
+        renderer.render_batch([data], camera)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_renderer_cannot_be_copied(copied):
+    with pytest.raises(TypeError, match="Renderer: cannot be copied or pickled; make one in each process"):
+        copied(mjs.Renderer(load(BALL)[0]))
 
 
 REFUSED = ("WIREFRAME", "ADDITIVE", "DEPTH", "SEGMENT", "IDCOLOR", "CULL_FACE")
@@ -248,6 +227,7 @@ def test_edits_of_the_model_show_in_the_next_image():
         lambda: model.mat_rgba.__setitem__((0, slice(3)), (1, 0, 0)),
         lambda: model.tex_data.__imul__(0),
         lambda: model.hfield_data.__setitem__(4, 0.2),
+        lambda: model.hfield_size.__setitem__((0, 2), 0.4),
         lambda: data.qpos.__setitem__(2, 0.7),
         lambda: model.mesh_vert.__imul__(1.5),
     ]
@@ -257,6 +237,59 @@ def test_edits_of_the_model_show_in_the_next_image():
         assert (images[-1] != images[-2]).any(), f"edit {i} does not show"
         np.testing.assert_array_equal(look(), images[-1])
     np.testing.assert_array_equal(image_of(model, data, "view"), images[-1])
+
+
+# A tetrahedron in view, one behind the camera, and a texture of 512 x 512.
+FEW_MESHES = """<mujoco><visual><map znear="0.01" zfar="50"/><quality offsamples="1"/></visual><statistic extent="1" center="0 0 0"/>
+<asset><texture name="noise" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".8 .7 .6" width="512" height="512"/>
+<material name="noise" texture="noise" texrepeat="1 1"/>
+<mesh name="seen" vertex="-.5 .5 -.5  .5 .5 -.5  0 -.5 -.5  0 0 .5"/><mesh name="behind" vertex="-1 0 0  1 0 0  0 1 0  0 0 1"/></asset>
+<worldbody><light pos="0 0 3" castshadow="false"/><camera name="front" pos="0 -2.5 0" xyaxes="1 0 0 0 0 1"/>
+<camera name="back" pos="0 -2.5 0" xyaxes="-1 0 0 0 0 1"/>
+<geom type="mesh" mesh="seen"/><geom type="mesh" mesh="behind" pos="0 -5 0"/>
+<geom type="plane" size="1 1 .1" pos="0 0 -1" material="noise"/></worldbody></mujoco>"""
+
+
+def test_only_what_an_image_shows_is_prepared():
+    model, data = load(FEW_MESHES)
+    renderer = mjs.Renderer(model, 32, 32)
+    nothing = {"meshes": 0, "clusters": 0, "trees": 0, "surfaces": 0, "textures": 0, "levels": 0}
+    assert renderer._native.prepared() == nothing
+    renderer.update_scene(data, "front")
+    renderer.enable_depth_rendering()
+    renderer.render()
+    assert renderer._native.prepared() == nothing | {"meshes": 2, "clusters": 1}
+    renderer.disable_depth_rendering()
+    renderer.render()
+    prepared = renderer._native.prepared()
+    # No trees without shadows; of the texture's ten levels only those as coarse as the image, and one more.
+    assert prepared == nothing | {"meshes": 2, "clusters": 1, "surfaces": 1, "textures": 1, "levels": prepared["levels"]}
+    assert 1 <= prepared["levels"] <= 7
+    renderer.update_scene(data, "back")
+    renderer.render()
+    assert renderer._native.prepared() == prepared | {"clusters": 2, "surfaces": 2}
+    model.light_castshadow[:] = 1
+    renderer.update_scene(data, "front")
+    renderer.render()
+    assert renderer._native.prepared()["trees"] >= 1
+
+
+def test_parts_prepared_later_show_the_current_model():
+    model, data = load(FEW_MESHES)
+    with mjs.Renderer(model, 120, 120) as renderer:
+        renderer.update_scene(data, "front")
+        renderer.render()
+        levels = renderer._native.prepared()["levels"]
+        model.mesh_vert[model.mesh_vertadr[1] :] *= 0.5
+        model.tex_data[:] = model.tex_data[::-1] // 2
+        for camera, size in (("back", 120), ("front", 120), ("front", 1200)):
+            renderer.update_scene(data, camera)
+            found = renderer.render_images(height=size, width=size)
+            with mjs.Renderer(model, size, size) as other:
+                other.update_scene(data, camera)
+                for kind, image in other.render_images().items():
+                    np.testing.assert_array_equal(found[kind], image)
+        assert renderer._native.prepared()["levels"] > levels
 
 
 def test_reload_shows_a_small_change():
@@ -300,6 +333,49 @@ def test_decoration_geoms_are_drawn_and_not_segmented():
         assert blue > (8 if shape in ("LINE", "LINEBOX", "TRIANGLE") else 40), shape
         np.testing.assert_array_equal(after["depth"], before["depth"])
         np.testing.assert_array_equal(after["segmentation"], before["segmentation"])
+
+
+def test_a_triangle_has_the_sides_that_its_matrix_gives():
+    # The first two columns of the matrix are unit vectors, and here they are not perpendicular.
+    model, data = load(BALL)
+    with mjs.Renderer(model, 60, 80) as renderer:
+        renderer.update_scene(data, "front")
+        scene = renderer.scene
+        corner, sides = np.array([-0.2, -0.8, -0.1]), np.array([[1, 0, 0], [0.6, 0, 0.8]])
+        geom = scene.geoms[scene.ngeom]
+        matrix = np.stack([*sides, [0, -1, 0]], 1).ravel()
+        kind = mujoco.mjtGeom.mjGEOM_TRIANGLE
+        mujoco.mjv_initGeom(geom, kind, np.array([0.5, 0.3, 0]), corner, matrix, np.array([0, 0, 1, 1], np.float32))
+        geom.segid = scene.ngeom
+        geom.objid, geom.objtype = 7, mujoco.mjtObj.mjOBJ_CAMERA
+        scene.ngeom += 1
+        images = renderer.render_images()
+    # Coordinates of the pixels along the sides; the plane is 1.7 m in front of the camera.
+    pixel = 1.7 * 2 * np.tan(np.radians(22.5)) / 60
+    x, z = (np.arange(80) - 39.5) * pixel - corner[0], (29.5 - np.arange(60)[:, None]) * pixel - corner[2]
+    b = z / sides[1, 2]
+    a = x - b * sides[1, 0]
+    inside = np.minimum(np.minimum(a / 0.5, b / 0.3), 1 - a / 0.5 - b / 0.3)
+    sure = np.abs(inside) > 1e-3
+    np.testing.assert_array_equal((images["segmentation"] == [7, mujoco.mjtObj.mjOBJ_CAMERA]).all(-1)[sure], (inside > 0)[sure])
+    assert images["rgb"][inside > 0.1, 2].min() > 100 and (inside > 0.1).sum() > 20
+
+
+def test_geoms_of_the_scene_are_checked():
+    model, data = load(BALL)
+    renderer = mjs.Renderer(model, 20, 30, max_geom=4)
+    renderer.update_scene(data, "front")
+    before = renderer.render()
+    scene = renderer.scene
+    mujoco.mjv_initGeom(
+        scene.geoms[1], mujoco.mjtGeom.mjGEOM_FLEX, np.full(3, 0.1), np.zeros(3), np.eye(3).ravel(), np.ones(4, np.float32)
+    )
+    scene.geoms[1].objid = 0  # the model has no flexes
+    scene.ngeom = 2
+    np.testing.assert_array_equal(renderer.render(), before)
+    scene.ngeom = 5
+    with pytest.raises(ValueError, match=r"scene.ngeom is 5: must be in \[0, 4\]"):
+        renderer.render()
 
 
 def test_a_negative_alpha_hides_a_site():
@@ -351,50 +427,9 @@ def test_a_batch_equals_single_images():
             renderer.render_batch(datas, ["view", "view"])
         with pytest.raises(ValueError, match=r"uint8 array of shape \(7, 60, 80, 3\)"):
             renderer.render_batch(datas, out=np.empty((7, 60, 80), np.uint8))
-
-
-def test_threads():
-    model, data = load(SHAPES)
-    expected = image_of(model, data, "view")
-    with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        for image in pool.map(lambda _: image_of(model, data, "view"), range(12)):
-            np.testing.assert_array_equal(image, expected)
-
-
-def child_image():
-    return image_of(*load(SHAPES), "view")
-
-
-def test_processes():
-    model, data = load(SHAPES)
-    renderer = mjs.Renderer(model, 60, 80)
-    renderer.update_scene(data, "view")
-    expected = renderer.render()
-    renderer.render_batch([data, data], "view")
-    np.testing.assert_array_equal(in_fork(renderer.render), expected)
-    np.testing.assert_array_equal(in_fork(lambda: renderer.render_batch([data], "view"))[0], expected)
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        np.testing.assert_array_equal(pool.apply(child_image), expected)
-
-
-class Images:
-    """A data set whose workers draw its images."""
-
-    def __len__(self):
-        return 4
-
-    def __getitem__(self, index):
-        return child_image()
-
-
-@pytest.mark.parametrize("context", ["fork", "spawn"])
-def test_dataloader_workers(context):
-    data = pytest.importorskip("torch.utils.data")
-    expected = child_image()
-    loader = data.DataLoader(Images(), batch_size=2, num_workers=2, multiprocessing_context=context)
-    for batch in loader:
-        for image in batch.numpy():
-            np.testing.assert_array_equal(image, expected)
+        datas[3].geom_xpos[5] = np.nan
+        with pytest.raises(ValueError, match=r"not finite \(datas\[3\]\)"):
+            renderer.render_batch(datas, cameras)
 
 
 def test_images_of_another_size_are_those_of_a_renderer_of_that_size():
@@ -422,239 +457,3 @@ def test_a_scene_whose_class_has_only_the_geoms_in_use_is_drawn():
     renderer = mjs.Renderer.of_scene(model, scene, 60, 80)
     mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
     np.testing.assert_array_equal(renderer.render(), image_of(model, data, 0))
-
-
-def test_renderers_leak_nothing():
-    model, data = load(SHAPES)
-
-    def use():
-        with mjs.Renderer(model, 16, 16, max_geom=100) as renderer:
-            renderer.update_scene(data, "view")
-            renderer.render()
-
-    for _ in range(100):
-        use()
-    gc.collect()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    files = len(os.listdir("/proc/self/fd"))
-    for _ in range(1000):
-        use()
-    gc.collect()
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 8000  # KiB
-    assert len(os.listdir("/proc/self/fd")) == files
-
-
-# Against MuJoCo's own renderer
-
-
-@pytest.fixture(scope="module")
-def opengl():
-    os.environ.setdefault("MUJOCO_GL", "egl")
-    pytest.importorskip("OpenGL")
-    model, _ = load(BALL)
-    try:
-        mujoco.Renderer(model, 8, 8).close()
-    except Exception as error:
-        pytest.skip(f"mujoco.Renderer does not work here: {error}")
-
-
-def both(model, data, camera, option=None):
-    images = []
-    for Renderer in (mujoco.Renderer, mjs.Renderer):
-        with Renderer(model, 240, 320) as renderer:
-            for _ in range(2):  # MuJoCo's first image has infinite planes at another place than the following ones
-                renderer.update_scene(data, camera, option)
-            row = [renderer.render()]
-            renderer.enable_depth_rendering()
-            row.append(renderer.render())
-            renderer.enable_segmentation_rendering()
-            row.append(renderer.render())
-            images.append(row)
-    return list(zip(*images, strict=True))
-
-
-def compare(images, psnr):
-    rgb, depth, segmentation = images
-    error = np.mean((rgb[0].astype(float) - rgb[1]) ** 2)
-    assert 10 * np.log10(255**2 / max(error, 1e-9)) > psnr
-    assert np.median(np.abs(depth[0] - depth[1])) < 1e-5
-    assert np.quantile(np.abs(depth[0] - depth[1]), 0.98) < 5e-3
-    assert (segmentation[0] == segmentation[1]).all(-1).mean() > 0.998
-
-
-@pytest.mark.parametrize("camera", ["view", "below", "flat", "sensor", -1])
-def test_shapes_look_as_in_opengl(opengl, camera):
-    images = both(*load(SHAPES, 60), camera)
-    if camera == "flat" and mujoco.__version__ < "4":  # whose depth of orthographic cameras is wrong
-        images[1] = (images[1][1],) * 2
-    compare(images, 34)
-
-
-@pytest.mark.parametrize(
-    "flag", [i for i in range(int(mujoco.mjtRndFlag.mjNRNDFLAG)) if mujoco.mjtRndFlag(i).name[6:] not in REFUSED]
-)
-def test_all_other_flags_of_the_scene_do_what_they_do_in_opengl(opengl, flag):
-    model, data = load(SHAPES, 60)
-    images = []
-    for Renderer in (mujoco.Renderer, mjs.Renderer):
-        with Renderer(model, 240, 320) as renderer:
-            for _ in range(2):
-                renderer.update_scene(data, "view")
-            renderer.scene.flags[flag] = 1 - renderer.scene.flags[flag]
-            images.append(renderer.render().astype(float))
-    assert 10 * np.log10(255**2 / np.mean((images[0] - images[1]) ** 2)) > 34
-
-
-@pytest.mark.parametrize(("tilt", "fog", "haze"), [(1, (0.3, 1.5), 0.3), (0.2, (5, 40), 0.8)], ids=["surfaces", "sky and haze"])
-def test_fog_is_that_of_opengl(opengl, tilt, fog, haze):
-    model, data = (
-        load(f"""<mujoco><visual><map zfar="30" fogstart="{fog[0]}" fogend="{fog[1]}" haze="{haze}"/><rgba fog=".9 .2 .5 1"/></visual>
-        <statistic extent="2" center="0 0 .4"/><asset><material name="floor" reflectance=".4"/>
-        <texture type="skybox" builtin="gradient" rgb1=".2 .6 .8" rgb2="0 0 .2" width="64" height="384"/></asset>
-        <worldbody><light pos="0 0 6"/><camera name="view" pos="0 -2 2.5" xyaxes="1 0 0 0 {tilt} 1"/><geom type="plane" size="0 0 .1" material="floor"/>
-        <geom size=".3" pos="0 0 .4" rgba="0 1 0 1"/><geom type="box" size=".2 .02 .2" pos="-.5 -.6 .5" rgba="1 1 0 .5"/></worldbody></mujoco>""")
-    )
-    images = []
-    for Renderer in (mujoco.Renderer, mjs.Renderer):
-        with Renderer(model, 120, 160) as renderer:
-            for _ in range(2):
-                renderer.update_scene(data, "view")
-            without = renderer.render()
-            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
-            images.append(renderer.render().astype(float))
-            assert (np.abs(images[-1] - without).max(-1) > 10).mean() > 0.3
-    assert 10 * np.log10(255**2 / np.mean((images[0] - images[1]) ** 2)) > 40
-
-
-@pytest.mark.parametrize("flag", range(int(mujoco.mjtVisFlag.mjNVISFLAG)))
-def test_visual_flags_do_what_they_do_in_opengl(opengl, flag):
-    option = mujoco.MjvOption()
-    option.flags[flag] = not option.flags[flag]
-    model, data = load(SHAPES, 60)
-    rgb, _, _ = both(model, data, "view", option)
-    error = np.mean((rgb[0].astype(float) - rgb[1]) ** 2)
-    assert 10 * np.log10(255**2 / error) > 31.5
-
-
-@pytest.mark.parametrize(
-    ("light", "region"),
-    [('type="directional"', 'shadowclip=".4"'), ('type="spot" cutoff="40" exponent="1"', 'shadowscale=".4"')],
-    ids=["directional", "spot"],
-)
-def test_shadows_end_where_they_end_in_opengl(opengl, light, region):
-    boxes = "".join(
-        f'<geom type="box" size=".05 .05 .2" pos="{0.3 * x} {0.3 * y} .3"/>' for x in range(-5, 6) for y in range(-5, 6)
-    )
-    model, data = (
-        load(f"""<mujoco><visual><map {region}/><headlight diffuse=".2 .2 .2"/></visual><statistic extent="2" center="0 0 0"/>
-        <worldbody><light pos=".2 0 2" dir=".2 .1 -1" {light}/><camera pos="0 -2 2.5" xyaxes="1 0 0 0 .8 .6"/>
-        <geom type="plane" size="3 3 .1"/>{boxes}</worldbody></mujoco>""")
-    )
-    compare(both(model, data, 0), 30)
-
-
-@pytest.mark.parametrize("light", ['type="directional"', 'type="spot" cutoff="60"'], ids=["directional", "spot"])
-@pytest.mark.parametrize("distance", [0.05, 0.15, -0.05])
-def test_geoms_near_a_light_cast_shadows_as_in_opengl(opengl, light, distance):
-    # light (o) above a box (=), above the floor; the near plane of the light's shadow map is 0.1 m below it
-    model, data = (
-        load(f"""<mujoco><visual><map znear=".05"/><headlight diffuse=".1 .1 .1"/></visual><statistic extent="2" center="0 0 0"/>
-        <worldbody><light pos="0 0 1" dir="0 0 -1" {light}/><camera pos="0 -1 1" xyaxes="1 0 0 0 .7 .7"/>
-        <geom type="plane" size="2 2 .1"/><geom type="box" size=".2 .2 .005" pos="0 0 {1 - distance}"/></worldbody></mujoco>""")
-    )
-    theirs, ours = both(model, data, 0)[0]
-    assert 10 * np.log10(255**2 / np.mean((theirs.astype(float) - ours) ** 2)) > 30
-
-
-@pytest.mark.parametrize(("repeat", "uniform"), [(1, "true"), (3, "false"), (3, "true")])
-def test_textured_meshes_look_as_in_opengl(opengl, repeat, uniform):
-    model, data = (
-        load(f"""<mujoco><asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
-        <material name="m" texture="t" texrepeat="{repeat} {repeat}" texuniform="{uniform}"/>
-        <mesh name="prism" vertex="0 0 0  1 0 0  0 1 0  0 0 -1  1 0 -1  0 1 -1" texcoord="0 0  1 0  0 1  .5 .5  1 .5  .5 1"
-         face="0 1 2  3 5 4  0 4 1  0 3 4  1 4 5  1 5 2  0 2 5  0 5 3"/></asset>
-        <worldbody><light pos="0 0 3" castshadow="false"/><camera name="view" pos="0 0 3"/><geom type="mesh" mesh="prism" material="m"/></worldbody></mujoco>""")
-    )
-    compare(both(model, data, "view"), 31)
-
-
-@pytest.mark.parametrize("skin", [0, 1])
-def test_flexes_look_as_in_opengl(opengl, skin):
-    option = mujoco.MjvOption()
-    option.flags[mujoco.mjtVisFlag.mjVIS_FLEXSKIN] = skin
-    option.flags[mujoco.mjtVisFlag.mjVIS_FLEXVERT] = 1 - skin
-    compare(both(*load(SOFT, 30), "view", option), 33)
-
-
-# Gymnasium
-
-
-@pytest.mark.parametrize("mode", ["rgb_array", "depth_array", "rgbd_tuple"])
-def test_gymnasium_environments_render_as_with_opengl(opengl, mode):
-    pytest.importorskip("glfw")  # which Gymnasium's renderer imports
-    gymnasium = pytest.importorskip("gymnasium")
-    from mjsense.compat.gymnasium import use
-
-    images = []
-    for adapt in (lambda env: env, use):
-        env = adapt(gymnasium.make("HalfCheetah-v5", render_mode=mode, width=96, height=80))
-        env.reset(seed=0)
-        env.render()
-        image = env.render()
-        images.append(image if isinstance(image, tuple) else (image,))
-    for theirs, ours in zip(*images, strict=True):
-        assert theirs.shape == ours.shape
-        assert theirs.dtype == ours.dtype
-        if ours.dtype == np.uint8:
-            assert 10 * np.log10(255**2 / np.mean((theirs.astype(float) - ours) ** 2)) > 30
-        else:
-            assert np.median(np.abs(theirs - ours)) < 1e-3
-
-
-def cheetah():
-    pytest.importorskip("glfw")  # which Gymnasium's renderer imports
-    gymnasium = pytest.importorskip("gymnasium")
-    from mjsense.compat.gymnasium import use
-
-    return use(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array", width=32, height=32))
-
-
-@pytest.mark.parametrize("context", ["fork", "spawn"])
-def test_gymnasium_subprocesses(context):
-    pytest.importorskip("glfw")
-    vector = pytest.importorskip("gymnasium.vector")
-    envs = vector.AsyncVectorEnv([cheetah, cheetah], context=context)
-    try:
-        envs.reset(seed=3)
-        images = envs.render()
-    finally:
-        envs.close()
-    env = cheetah()
-    env.reset(seed=3)
-    np.testing.assert_array_equal(images[0], env.render())
-    assert images[1].shape == (32, 32, 3)
-
-
-@pytest.mark.parametrize("context", ["fork", "spawn"])
-def test_stable_baselines3_subprocesses(context):
-    pytest.importorskip("glfw")
-    vector = pytest.importorskip("stable_baselines3.common.vec_env")
-    envs = vector.SubprocVecEnv([cheetah, cheetah], start_method=context)
-    try:
-        envs.seed(3)
-        envs.reset()
-        images = envs.get_images()
-    finally:
-        envs.close()
-    env = cheetah()
-    env.reset(seed=3)
-    np.testing.assert_array_equal(images[0], env.render())
-
-
-def test_gymnasium_environments_without_mujoco_are_refused():
-    pytest.importorskip("glfw")  # which Gymnasium's renderer imports
-    gymnasium = pytest.importorskip("gymnasium")
-    from mjsense.compat.gymnasium import use
-
-    with pytest.raises(TypeError, match="has no mujoco_renderer"):
-        use(gymnasium.make("CartPole-v1"))

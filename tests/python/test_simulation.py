@@ -120,11 +120,33 @@ def test_set_state(sim):
     np.testing.assert_array_equal(sim.data.qpos, before)
 
 
+def test_the_time_has_no_rounding_errors_of_mujocos_sum(sim):
+    sim.step_raw(3000)
+    assert sim.state[0, 0] != 3000 * sim.physics_dt
+    assert sim.time.tolist() == [3000 * sim.physics_dt] * 4
+
+
+def test_values_of_the_state_are_errors_that_name_the_component(sim):
+    before = sim.state.copy()
+    for value, text in [(np.zeros(3), r"shape \(3,\) does not broadcast to \(4, 7\)"), ("up", "numbers, not 'up'"), (None, "numbers, not None")]:
+        for owner in (sim, sim.data):
+            with pytest.raises(ValueError, match=f"qpos: .*{text}"):
+                owner.qpos = value
+    with pytest.raises(ValueError, match="qpos: values must be numbers, not None"):
+        sim.set_state(qpos=None)
+    with pytest.raises(ValueError, match="keyframe -2: the model has"):
+        sim.reset(key=-2)
+    np.testing.assert_array_equal(sim.state, before)
+
+
 def test_randomize_errors_name_the_field(sim):
     for call, error, text in [
         (lambda: sim.randomize("bodymass", 1), AttributeError, "did you mean 'body_mass'"),
-        (lambda: sim.randomize("body_mass", np.ones((4, 99))), ValueError, r"body_mass: values must be of shape \(4, "),
-        (lambda: sim.randomize("body_mass", "heavy"), ValueError, "body_mass: values must be"),
+        (lambda: sim.randomize("body_mass", np.ones((4, 99))), ValueError, r"body_mass: shape \(4, 99\) does not broadcast to \(4, "),
+        (lambda: sim.randomize("body_mass", "heavy"), ValueError, "body_mass: values must be numbers, not 'heavy'"),
+        (lambda: sim.randomize("body_mass", -1), ValueError, r"body_mass: values must be at least 0; that of world 0, element \[0\] is -1"),
+        (lambda: sim.randomize("geom_group", 1.5), ValueError, "geom_group: values must be integers, not 1.5"),
+        (lambda: sim.randomize("geom_group", np.nan), ValueError, "geom_group: values must be integers, not nan"),
         (lambda: sim.randomize("body_mass", np.inf), ValueError, r"finite numbers; that of world 0, element \[0\] is inf"),
         (lambda: sim.randomize("body_pos", [[0, 0, 1], [0, np.nan, 1], [0, 0, 1]], [3]), ValueError, r"that of world 3, element \[1, 1\] is nan"),
         (lambda: sim.randomize("geom_matid", sim.model.nmat), ValueError, "geom_matid: ids from"),
@@ -132,6 +154,26 @@ def test_randomize_errors_name_the_field(sim):
     ]:
         with pytest.raises(error, match=text):
             call()
+
+
+@pytest.mark.parametrize("simple", [True, False])
+def test_values_that_mujoco_cannot_use_are_refused(simple):
+    """MuJoCo's fast path for a body whose centre of mass is its origin ignores another centre of mass."""
+    ball = f"""<body name="ball" pos="0 0 1" {"" if simple else 'simple="false"'}><freejoint/><geom size=".1"/></body>"""
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=f"<mujoco><worldbody>{ball}</worldbody></mujoco>")), 3)
+    offsets = np.zeros((3, 2, 3))
+    offsets[1, 1, 0] = 0.02
+    if simple:
+        with pytest.raises(ValueError, match=r"body_ipos: .* values of world 1: .*body 'ball' is compiled as simple .* use body/simple='false'"):
+            sim.randomize("body_ipos", offsets)
+        assert (sim.model_field("body_ipos") == 0).all()
+        sim.randomize("body_mass", 2.0)  # works as before
+    else:
+        sim.randomize("body_ipos", offsets)
+    sim.qvel[:, 5] = 5
+    sim.step(100)
+    assert sim.failures == []
+    assert (np.abs(sim.qpos[:, :2]).max(1) > 1e-3).tolist() == [False, not simple, False]
 
 
 def test_randomize(sim):
@@ -353,3 +395,26 @@ def test_names_do_not_control_the_terminal():
     assert any("?[31m" in text for text in texts) and any("?[2J" in text for text in texts)
     assert not any("\x1b" in text for text in texts), texts
     sim.close()
+
+
+def test_a_mask_selects_worlds_everywhere(sim, tmp_path):
+    """Booleans are not the ids 0 and 1, and a mask has one entry for each world."""
+    mask = [False, False, True, False]
+    sim.step()
+    sim.reset(mask)
+    assert (sim.time == 0).tolist() == mask
+    pipeline = mjs.ObservationPipeline(4, history_length=2)
+    for value in (1.0, 2.0):
+        pipeline(np.full((4, 1), value))
+    pipeline.reset(mask)
+    assert (pipeline(np.full((4, 1), 3.0))[:, 0] == 3).tolist() == mask
+    with mjs.Recorder(tmp_path, sim) as recorder:
+        for world in range(4):
+            recorder.begin_episode(world, world)
+            recorder.append(np.arange(4) == world)
+        recorder.finish_episode(2)
+        for world in (0, 1, 3):
+            recorder.abandon_episode(world)
+    for call in (sim.reset, sim.forward, pipeline.reset, mjs.Recorder(tmp_path / "more", sim).append):
+        with pytest.raises(ValueError, match=r"world_ids: a mask of shape \(2,\) for 4 worlds"):
+            call([True, False])

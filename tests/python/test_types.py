@@ -31,7 +31,7 @@ def test_typed_access_to_sensors():
         scene.imu("ball")
     with pytest.raises(TypeError, match="'touch' is a sensor, not an entity"):
         scene.entity("touch")
-    with pytest.raises(KeyError, match=r"Scene element 'fornt' not found\. Did you mean 'front'"):
+    with pytest.raises(KeyError, match="scene: no sensor or entity named 'fornt'; did you mean 'front'"):
         scene.camera("fornt")
 
 

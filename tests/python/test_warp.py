@@ -76,22 +76,83 @@ def test_warp_is_imported_only_if_asked_for():
     "scene", ["quadruped on a plane", "quadruped on rough terrain", "objects", "stones", "table with a Franka", "kitchen"]
 )
 def test_every_field_equals_that_of_the_cpu(scene):
-    import gpu_check
+    import warp_compare
+    from warp_scenes import SCENES
 
-    found = gpu_check.run("cpu", 3, 6, {scene: gpu_check.SCENES[scene]})
-    assert not gpu_check.beyond(found)
+    assert not warp_compare.beyond(warp_compare.run("cpu", 3, 6, {scene: SCENES[scene]}))
+
+
+@needs_warp
+@pytest.mark.parametrize("scene", ["quadruped on a plane", "quadruped on a slope", "objects", "stones"])
+def test_sensors_of_the_same_physics_are_equal_but_for_rounding(scene):
+    import warp_compare
+    from warp_scenes import SCENES
+
+    assert not warp_compare.beyond(warp_compare.run_copied("cpu", 3, 3, {scene: SCENES[scene]}))
+
+
+def fail():
+    raise RuntimeError("the part has failed")
+
+
+@needs_warp
+def test_the_check_of_a_device_continues_after_parts_that_fail():
+    import os
+    import time
+
+    from gpu_check import Part, run_parts
+
+    parts = [
+        Part("adds", divmod, (7, 2)),
+        Part("fails", fail, ()),
+        Part("crashes", os._exit, (3,)),
+        Part("hangs", time.sleep, (60,)),
+    ]
+    results, failed = run_parts([*parts, Part("adds again", divmod, (9, 2))], seconds=60, longest=10)
+    assert results == {"adds": (3, 1), "adds again": (4, 1)}
+    assert "the part has failed" in failed["fails"] and "code 3" in failed["crashes"] and failed["hangs"] == "ended after 10 s"
+    assert run_parts(parts[:1], seconds=0) == ({}, {"adds": "no time was left"})
 
 
 @needs_warp
 def test_air_time_and_history_over_many_steps():
-    import gpu_check
+    import warp_compare
+    from warp_scenes import SceneOfCheck, feet_only
 
-    reference, ours = gpu_check.pair(gpu_check.SceneOfCheck(gpu_check.feet_only), 2, "cpu")
-    for _ in gpu_check.steps(reference, ours, 150):
+    reference, ours = warp_compare.pair(SceneOfCheck(feet_only), 2, "cpu")
+    for _ in warp_compare.steps(reference, ours, 150):
         for name, field in reference.scene["feet"].fields.items():
             if not name.startswith(("force", "torque", "friction", "normal_force")):
                 np.testing.assert_allclose(host(ours.scene["feet"].fields[name]), field, atol=1e-5, err_msg=name)
     assert reference.scene["feet"].data.last_air_time.max() > 0
+
+
+@needs_warp
+@pytest.mark.parametrize("scene", ["quadruped on a plane", "objects", "stones"])
+def test_the_graph_of_a_step_computes_what_the_step_computes(scene):
+    """Warp captures graphs on its CPU device as well, and they are replayed with the arrays and numbers of the capture."""
+    import warp_compare
+    from warp_scenes import SCENES
+
+    plain, graph = (warp_compare.pair(SCENES[scene], 2, "cpu", reference=False)[1] for _ in range(2))
+    graph._graphs.enabled = True
+    key = "init_state" if plain.model.nkey else None
+    for sim in (plain, graph):
+        sim.reset(key=key, seed=3)
+        for sensor in sim.scene.sensors.values():
+            sensor.fields
+    rng = np.random.default_rng(0)
+    for step in range(7):
+        ctrl = rng.normal(size=plain.ctrl.shape)
+        for sim in (plain, graph):
+            if step == 5:
+                sim.reset([1], key=key)
+            sim.ctrl = ctrl
+            sim.step()
+        for name, sensor in plain.scene.sensors.items():
+            for field, values in sensor.fields.items():
+                np.testing.assert_array_equal(host(graph.scene[name].fields[field]), host(values), err_msg=f"{name} {field}")
+    assert graph._graphs._graphs["step"] is not None
 
 
 @needs_warp
@@ -101,6 +162,8 @@ def test_sensors_belong_to_the_current_state():
     sim.ctrl = [[0.1], [0.2], [0.3]]
     for _ in range(3):
         sim.step()
+    with pytest.raises(ValueError, match=r"ctrl: shape \(2, 5\) does not broadcast to \(3, 1\)"):
+        sim.ctrl = np.zeros((2, 5))
     sim.ctrl = 7.0  # for the next step only
     for world in range(3):
         data.qpos[:], data.qvel[:], data.ctrl[:] = host(sim.qpos)[world], host(sim.qvel)[world], 0.1 * (world + 1)
@@ -131,6 +194,32 @@ def test_a_reset_concerns_only_its_worlds():
     assert host(sim.time).tolist() == [0, 0, 0]
     with pytest.raises(ValueError, match=r"world id 3: must be in \[0, 3\)"):
         sim.reset([3])
+
+
+@pytest.mark.parametrize("backend", ["cpu", pytest.param("warp", marks=needs_warp)])
+def test_a_written_time_is_the_simulations_and_the_physics_and_does_not_disturb_sensors(backend):
+    xml = XML.replace("<sensor>", '<sensor><clock name="clock"/>').replace('<key name="low"', '<key name="low" time="1.5"')
+    slow = mjs.CameraSensorCfg("eye", pos=(0, 0, 3), width=4, height=4, data_types=("depth",), update_period=0.015)
+    sensors = slow, touch(track_air_time=True, history_length=3)
+    sim, alone = (simulation(*sensors, xml=xml, backend=backend) for _ in range(2))
+    for step in range(12):
+        for other in (sim, alone):
+            other.step()
+        if step == 2:
+            sim.set_state([1], time=5)
+            np.testing.assert_allclose(host(sim.time), [0.015, 5, 0.015])
+        if step == 6:
+            sim.set_state(time=sim.time - 1)
+        for name in ("eye", "touch"):
+            for field, values in alone.scene[name].fields.items():
+                np.testing.assert_array_equal(host(sim.scene[name].fields[field]), host(values), err_msg=f"{step} {field}")
+    np.testing.assert_allclose(host(sim.time), [-0.94, 4.045, -0.94])
+    np.testing.assert_allclose(host(sim.scene["clock"].data)[:, 0], host(sim.time), rtol=1e-6)
+    with pytest.raises(ValueError, match=r"time: shape \(2,\) is neither \(3,\) nor \(\)"):
+        sim.set_state(time=[1, 2])
+    sim.reset([0])
+    sim.reset([1], key="low")
+    np.testing.assert_allclose(host(sim.time), [0, 1.5, -0.94])
 
 
 @needs_warp
@@ -219,12 +308,20 @@ def test_code_of_the_pages():
     pytest.importorskip("torch")
     exec(training, page)
     assert page["reward"].shape == (16,)
-    feet = []
+    read = []
     for backend in ("cpu", "warp"):
-        names = {}
-        exec("\n".join(blocks("mjlab.md")).replace("model=scene.compile()", f"model=scene.compile(), backend='{backend}'"), names)
-        feet.append(host(names["scene"]["height"].data))
-    np.testing.assert_allclose(feet[1], feet[0], atol=1e-5)
+        names, values = {}, []
+        for block in blocks("mjlab.md"):
+            exec(block.replace("model=scene.compile()", f"model=scene.compile(), backend='{backend}'"), names)
+            data = {name: sensor.data for name, sensor in names["scene"].sensors.items()}
+            if "eye" in data:
+                values += [data["terrain_scan"].distances, data["feet_ground_contact"].force, data["eye"].depth]
+            else:
+                values.append(data["height"])
+        read.append([host(value) for value in values])
+    assert len(read[0]) == 4
+    for theirs, ours in zip(*read, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-4)
 
 
 class Height(mjs.Sensor):
@@ -264,6 +361,8 @@ def test_sensors_written_in_python_are_functions_of_device_arrays():
 def test_what_is_missing_is_a_clear_error():
     with pytest.raises(ValueError, match="device 'cuda:7': there is no such device; there are cpu"):
         simulation(device="cuda:7")
+    with pytest.raises(TypeError, match=r"Simulation\(\): device must be a str or None, not 3"):
+        simulation(device=3)
     plugin = XML.replace("<sensor>", '<sensor><framepos name="late" objtype="geom" objname="ball" nsample="2" delay="0.01"/>')
     with pytest.raises(ValueError, match=r"sensor 'late': nsample = 2 is not available with backend='warp'"):
         simulation(xml=plugin)

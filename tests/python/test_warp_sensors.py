@@ -443,7 +443,7 @@ def test_a_nan_policy_raises():
     [
         "camera",
         "camera_normals",
-        "contact",
+        "contact_kernels",
         "contact_lists",
         "contact_memory",
         "effect_errors",
@@ -453,6 +453,7 @@ def test_a_nan_policy_raises():
         "lidar",
         "pose_history",
         "rays",
+        "terrain_height",
     ],
 )
 def test_kernels_compile_for_cuda_devices(module, tmp_path):

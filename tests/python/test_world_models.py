@@ -175,3 +175,24 @@ def test_simulated_model_bounds_every_size():
         assert found[0] == found[1] == contacts(sim.env.mj_datas[world]) != []
     assert np.abs(sim.model.bvh_aabb - sim.scene.model.bvh_aabb).max() > 1e-3
     env.close()
+
+
+def test_another_mesh_has_its_own_contacts():
+    cube, wedge = "-1 -1 -1 1 -1 -1 -1 1 -1 1 1 -1 -1 -1 1 1 -1 1 -1 1 1 1 1 1", "0 0 0 1 0 0 0 1 0 0 0 1.2 .5 .6 1"
+    xml = f"""<mujoco><asset><mesh name="small" vertex="{cube}" scale=".1 .1 .1"/><mesh name="large" vertex="{cube}" scale=".5 .5 .5"/>
+      <mesh name="wedge" vertex="{wedge}"/></asset><worldbody><body name="box" pos="0 0 1"><freejoint/><geom name="box" type="mesh" mesh="{{}}"/></body>
+      <geom name="target" type="sphere" size=".1" pos=".55 0 1"/></worldbody></mujoco>"""
+    sim, model = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=xml.format("small"))), 3), mujoco.MjModel.from_xml_string(xml.format("large"))
+    ids = sim.model.geom_dataid.copy()
+    ids[sim.model.geom("box").id] = 1
+    sim.randomize("geom_dataid", ids, [1])
+    sim.randomize("body_gravcomp", 1.0)  # keeps what the meshes have
+    assert [data.ncon > 0 for data in sim.env.mj_datas] == [False, True, False]
+    for field in ("geom_aabb", "geom_rbound", "geom_size"):
+        np.testing.assert_allclose(sim.model_field(field)[1], getattr(model, field), rtol=1e-6, atol=1e-7)
+        np.testing.assert_array_equal(sim.model_field(field)[2], getattr(sim.model, field))
+    ids[sim.model.geom("box").id] = 2
+    sim.randomize("geom_dataid", ids, [0])
+    wedge = mujoco.MjModel.from_xml_string(xml.format("wedge"))
+    np.testing.assert_allclose(sim.model_field("geom_aabb")[0], wedge.geom_aabb, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(sim.model_field("geom_rbound")[0], wedge.geom_rbound, rtol=1e-6)

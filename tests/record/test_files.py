@@ -267,7 +267,7 @@ def peer_file(tmp_path):
 def test_molmospaces_files_are_understood(record_fake, peer_file):
     path, noise = peer_file
     done = record_fake("verify", path.parent)
-    assert "names no video of camera 'wrist_camera'" in done.stdout and "intact: 1 files, 1 episodes, 40 steps" in done.stdout
+    assert "names no video of camera 'wrist_camera'" in done.stdout and "intact: 1 files, 1 episodes, 40 observations" in done.stdout
     listing = record_fake("inspect", path).stdout
     line = next(row for row in listing.splitlines() if "tcp_pose" in row)
     assert f"{noise.mean():.4g}" in line and f"{noise.std():.4g}" in line

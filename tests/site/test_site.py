@@ -53,6 +53,12 @@ def test_every_native_name_is_in_the_reference(documented):
     assert wanted and wanted <= documented, sorted(wanted - documented)
 
 
+def test_components_of_the_state_are_arrays(site):
+    page = re.sub(r"<[^>]+>", "", (site / "reference/simulation.html").read_text())
+    assert re.search(r"qpos: NDArray\[float64\]\s+Joint positions \[B, nq\] \(m, rad\)\. Live, float64; call forward\(\)", page)
+    assert re.search(r"qpos: Any\s+Joint positions \[B, nq\] \(m, rad\)\. Live, float32, on the device", page)
+
+
 def test_signatures_of_configurations_equal_their_fields(site):
     page = re.sub(r"<[^>]+>", "", (site / "reference/sensor_configs.html").read_text())
     assert re.search(r"ContactMatch\(\s*mode: Literal\[.*?\],\s*pattern:", page, re.DOTALL)

@@ -11,11 +11,12 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from mjsense.cluster.scratch import scratch_folder
 
 _FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 _PR_SET_PDEATHSIG = 1
@@ -54,13 +55,13 @@ def alone(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Outcome:
     """Calls a function in a new process. Raises its exceptions."""
     import ray  # pyright: ignore[reportMissingImports]
 
-    with tempfile.TemporaryDirectory(prefix="mjsense_alone_") as folder:
-        (Path(folder) / "call").write_bytes(ray.cloudpickle.dumps((function, arguments)))
+    with scratch_folder() as folder:
+        (folder / "call").write_bytes(ray.cloudpickle.dumps((function, arguments)))
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         program = "import sys; from mjsense.cluster import alone; alone.run_call(sys.argv[1])"
         done = subprocess.run([sys.executable, "-X", "faulthandler", "-c", program, folder], env=environment, stdout=subprocess.DEVNULL,
                               stderr=subprocess.PIPE, text=True, errors="replace")  # fmt: skip
-        result = Path(folder) / "result"
+        result = folder / "result"
         if not result.exists():
             frame = re.search(r'^Current thread .*\n  File "(.*)", line (\d+) in (.*)$', done.stderr, re.MULTILINE)
             place = f"{frame[3]} in line {frame[2]} of {frame[1]}" if frame else ""

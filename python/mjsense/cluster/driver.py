@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -181,8 +182,7 @@ def run_job(
         workers = 0
         final = report()
     write_index(storage, results.without_gap(), episodes)
-    failures: dict[str, int] = {}
+    failures: Counter[str] = Counter()
     for result in results.done.values():
-        for reason, count in result.failures.items():
-            failures[reason] = failures.get(reason, 0) + count
-    return ClusterSummary(**final, enough=final["kept"] >= episodes, failures=failures, out=job.out)
+        failures.update(result.failures)
+    return ClusterSummary(**final, enough=final["kept"] >= episodes, failures=dict(failures), out=job.out)

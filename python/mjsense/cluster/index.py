@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
+from mjsense._optional import optional
 from mjsense.cluster.job import ShardResult
 from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import INDEX
@@ -17,11 +18,7 @@ def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int)
     Returns:
         The number of rows.
     """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"The index needs pyarrow: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    pyarrow, parquet = (optional(module, "ray", "The index") for module in ("pyarrow", "pyarrow.parquet"))
     rows = [
         {**row, "path": f"{result.shard.folder}/{row['path']}"} for result in results for row in sorted(result.episodes, key=lambda row: row["episode"])
     ]
@@ -30,6 +27,6 @@ def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int)
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in kinds.items()])
     table = pyarrow.Table.from_pylist(rows[:episodes], schema=schema)
     data = io.BytesIO()
-    pyarrow.parquet.write_table(table, data)
+    parquet.write_table(table, data)
     storage.write(INDEX, data.getvalue())
     return len(table)

@@ -6,25 +6,25 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from mjsense import _core
 from mjsense._parts import parts_of
 from mjsense._recording import PARTS, check_names, record_here
+from mjsense.assets import use_installed_files
+from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.storage import Storage
 from mjsense.dataset import Episode
 from mjsense.dataset.episode import Store
 from mjsense.dataset.files import entries_of
 
-_OF_RECORD = {"sensors", "progress", "format", "map", "keep_recording", "ray"}
+_OF_RECORD = {"sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"}
 """Arguments of ``record`` that do not decide the data."""
 _FREE = _OF_RECORD | {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite",
                       "ffmpeg", "batches", "out"}  # fmt: skip
@@ -118,12 +118,7 @@ class Job:
 
 def _run_program(words: list[str]) -> tuple[int, str, str]:
     """Exit code and output of the program, which runs in this process: a new one would need 0.6 s to start."""
-    from mjsense.assets import use_installed_meshes
-    from mjsense.ffmpeg import use_installed_ffmpeg
-
-    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
-        use_installed_meshes()
-    use_installed_ffmpeg()
+    use_installed_files(words)
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
         before = [os.dup(1), os.dup(2)]
         sys.stdout.flush()
@@ -168,8 +163,7 @@ def _kept_episodes(folder: Path) -> Iterable[dict[str, Any]]:
 def run_shard(job: Job, shard: Shard, fingerprint: str) -> ShardResult:
     """Records a shard into a temporary folder, moves it to the output directory, and marks it as done."""
     began = time.perf_counter()
-    folder = Path(tempfile.mkdtemp(prefix="mjsense_shard_"))
-    try:
+    with scratch_folder() as folder:
         summary = job.record(folder, shard)
         result = ShardResult(
             shard, fingerprint, list(_kept_episodes(folder)), summary["succeeded"], summary["failed"], summary["steps"], summary["failures"],
@@ -178,5 +172,3 @@ def run_shard(job: Job, shard: Shard, fingerprint: str) -> ShardResult:
         storage.put_folder(folder, shard.folder)
         storage.write(f"{shard.folder}/done.json", json.dumps(asdict(result)).encode())
         return result
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)

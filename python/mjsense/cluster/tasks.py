@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from mjsense._optional import optional
 from mjsense.cluster.alone import Death, alone
 
 _CRASHES = 2  # deaths of workers after which a task runs in a process of its own
@@ -15,11 +16,7 @@ _DEATHS = 2  # deaths of that process by a defect, after which it is not repeate
 
 
 def _ray() -> Any:
-    try:
-        import ray  # pyright: ignore[reportMissingImports]
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"A cluster needs Ray: pip install 'mjsense[ray]' ({error})", name=error.name) from error
-    return ray
+    return optional("ray", "ray", "A cluster")
 
 
 @contextlib.contextmanager

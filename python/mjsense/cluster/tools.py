@@ -50,10 +50,13 @@ def run(words: list[str]) -> int:
     try:
         if words[0] == "verify":
             found = verify(given.path, *options)
-            print(json.dumps(found, indent=2) if given.json else _verify_text(found))
+            if given.json or not found["ok"] or not {"-q", "--quiet"} & {*others}:
+                print(json.dumps(found, indent=2) if given.json else _verify_text(found))
             return 0 if found["ok"] else 1
         if words[0] == "repair":
-            made = repair(given.path, *options)
+            if options:
+                raise ValueError(f"no option named '{options[0]}'; available: --help, --json")
+            made = repair(given.path)
             lines = [*made["actions"], *(f"cannot repair {failure}" for failure in made["failures"])]
             print(json.dumps(made, indent=2) if given.json else "\n".join(lines) or "nothing to repair")
             return 1 if made["failures"] else 0
@@ -72,7 +75,7 @@ def _program(command: str, path: Path, *options: str) -> str:
     code = "import os, sys; from mjsense import _core; sys.exit(_core.run_program([b'mjsense', *map(os.fsencode, sys.argv[1:])], []))"
     done = subprocess.run([sys.executable, "-c", code, command, str(path), *options], capture_output=True, text=True)
     if done.returncode not in (0, 1):
-        raise RuntimeError(done.stderr.strip().removeprefix("mjsense: "))
+        raise RuntimeError(done.stderr.strip().removeprefix("mjsense: ").removeprefix(f"{command}: "))
     return done.stdout
 
 
@@ -88,15 +91,19 @@ def _fetched(path: str) -> tuple[Path, list[dict[str, Any]] | None]:
     return local, rows
 
 
-def _summary(path: str) -> tuple[Path, dict[str, Any]]:
+def _summary(path: str) -> tuple[Path, dict[str, Any] | None]:
+    """The local folder of a recording, and the counts of its index, if it has one."""
     local, rows = _fetched(path)
-    rows = rows or []
+    if rows is None:
+        return local, None
     tasks = Counter(row["task"] for row in rows)
     return local, {"episodes": len(rows), "successes": sum(row["success"] for row in rows), "observations": sum(row["length"] for row in rows),
                    "files": len({row["path"] for row in rows}), "instructions": len(tasks)}  # fmt: skip
 
 
-def _summary_text(about: dict[str, Any]) -> str:
+def _summary_text(about: dict[str, Any] | None) -> str:
+    if about is None:
+        return f"no {INDEX}: the recording is not complete; the following counts the files that are there\n"
     return (f"{INDEX}  {about['episodes']} episodes, {about['successes']} successes, {about['observations']} observations, "
             f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n")  # fmt: skip
 
@@ -121,7 +128,7 @@ def verify(path: str, *options: str) -> dict[str, Any]:
 
 def _verify_text(found: dict[str, Any]) -> str:
     lines = [f"{'error' if f['error'] else 'note'}: {f['place']} {f['text']}" for f in found["findings"]]
-    counts = ", ".join(f"{found[name]} {name}" for name in ("files", "episodes", "steps", "videos"))
+    counts = f"{found['files']} files, {found['episodes']} episodes, {found['steps']} observations, {found['videos']} videos"
     index = f"; {found['indexed']} episodes in {INDEX}" if "indexed" in found else f"; no {INDEX}: the recording is not complete"
     return "\n".join([*lines, f"{'intact' if found['ok'] else 'NOT intact'}: {counts}{index}"])
 
@@ -153,7 +160,7 @@ def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str
     return found
 
 
-def repair(path: str, *options: str) -> dict[str, list[str]]:
+def repair(path: str) -> dict[str, list[str]]:
     """Makes the index agree with the shards: a shard that is damaged is no longer marked as done, so that ``record --resume`` records it
     again, and the index is written anew from the complete shards without a gap. Nothing is deleted but marks.
 
@@ -165,12 +172,12 @@ def repair(path: str, *options: str) -> dict[str, list[str]]:
     storage = Storage(address)
     made: dict[str, list[str]] = {"actions": [], "failures": []}
     if storage.read("job.json") is None:
-        return json.loads(_program("repair", _fetched(path)[0], "--json", *options))
+        return json.loads(_program("repair", _fetched(path)[0], "--json"))
     local, rows = _fetched(path)
     remote = resolved(path)[1]
     damaged: dict[str, str] = {}
     if any(local.glob("shard_*/*/*.h5")):
-        for finding in json.loads(_program("verify", local, "--json", *options))["findings"]:
+        for finding in json.loads(_program("verify", local, "--json"))["findings"]:
             if finding["error"]:
                 damaged.setdefault(finding["place"].split("/")[0], f"{finding['place']} {finding['text']}")
     done: dict[int, ShardResult] = {}

@@ -8,12 +8,14 @@ its explanation. It imports what it needs in ``run``, so that ``--help`` and com
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import os
 import shutil
 import sys
 import textwrap
 from types import ModuleType
+from typing import Any
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
@@ -44,6 +46,14 @@ class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
 
 
 class _Parser(argparse.ArgumentParser):
+    def parse_known_args(self, *args: Any, **kwargs: Any) -> Any:
+        arguments, rest = super().parse_known_args(*args, **kwargs)
+        for name in (word.partition("=")[0] for word in rest if word.startswith("--")):
+            near = difflib.get_close_matches(name, self._option_string_actions, 3)
+            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"see {self.prog} --help"
+            raise ValueError(f"no option named '{name}'; {hint}")
+        return arguments, rest
+
     def error(self, message: str) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]  # raises instead of exiting
         raise ValueError(f"{message}; see {self.prog} --help")
 
@@ -67,7 +77,10 @@ def parser_of(name: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _message(error: BaseException) -> str:
+def message_of(error: BaseException) -> str:
+    """One line for stderr."""
+    if isinstance(error, OSError) and error.filename is not None:  # raised by Python: "[Errno 30] Read-only file system: 'out'"
+        return f"{error.filename}: {error.strerror}"
     text = error.args[0] if isinstance(error, KeyError) and error.args else error  # str() of a KeyError is a repr
     return " ".join(str(text).split()) or type(error).__name__
 
@@ -78,18 +91,21 @@ def run(words: list[str]) -> int:
     Returns:
         0: done; 1: some episodes or checks failed; 2: wrong usage or input; 130: interrupted; 141: the reader of the output has ended.
     """
+    parser = parser_of(words[0])
     try:
-        arguments = parser_of(words[0]).parse_args(words[1:])
+        arguments = parser.parse_args(words[1:])
         code = _module(words[0]).run(arguments)
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
+        hint = "; continue with --resume" if "--resume" in parser._option_string_actions else ""
+        print(f"mjsense {words[0]}: interrupted{hint}", file=sys.stderr)
         return _INTERRUPTED
     except BrokenPipeError:  # the reader of the output, such as head, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush when Python ends
         return _BROKEN_PIPE
     except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
-        print(f"mjsense {words[0]}: {_message(error)}", file=sys.stderr)
+        print(f"mjsense {words[0]}: {message_of(error)}", file=sys.stderr)
         return WRONG_INPUT
 
 

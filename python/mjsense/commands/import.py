@@ -40,4 +40,5 @@ def run(arguments: argparse.Namespace) -> int:
         from mjsense.dataset.import_lerobot import import_lerobot
 
         import_lerobot(arguments.path, arguments.out, **given)
+    print(f"Wrote {arguments.out}.")
     return 0

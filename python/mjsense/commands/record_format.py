@@ -8,6 +8,8 @@ import os
 import sys
 from typing import NoReturn
 
+from mjsense.commands import message_of
+
 _REFUSED = ("--ray", "--shard", "--append", "--overwrite", "--config")
 
 
@@ -31,6 +33,7 @@ def run(words: list[str]) -> int:
     parser.add_argument("--format", choices=["lerobot", "mjsense"])
     parser.add_argument("--out", required=True)
     parser.add_argument("--map")
+    parser.add_argument("--trim-idle", action=argparse.BooleanOptionalAction)
     parser.add_argument("--keep-recording", action="store_true")
     parser.add_argument("--resume", action="store_true")
     try:
@@ -39,6 +42,7 @@ def run(words: list[str]) -> int:
             if given.format == "lerobot" and any(word.split("=")[0] == option for word in others):
                 raise ValueError(f"{option} cannot be combined with --format lerobot")
         use_installed_ffmpeg()
+        quiet = bool({"-q", "--quiet"} & set(others))
 
         def record(out: str, *more: str) -> int:
             command = ["mjsense", "record", *others, "--out", out, *(["--resume"] if given.resume else []), *more]
@@ -49,15 +53,19 @@ def run(words: list[str]) -> int:
         from mjsense.export.record_lerobot import CompleteError, converted
 
         try:
-            with converted(given.out, resume=given.resume, map=given.map, keep_recording=given.keep_recording) as folder:
-                code = record(str(folder), "--no-sheet")
+            with converted(given.out, resume=given.resume, map=given.map, trim_idle=given.trim_idle, keep_recording=given.keep_recording,
+                           quiet=quiet) as folder:  # fmt: skip
+                code = record(str(folder), "--no-sheet", "--no-tree")
         except CompleteError as error:
             print(error)
             return 0
-        if os.path.exists(given.out):
+        if not quiet and "--json" not in others:
+            for path in (given.out, str(folder)):  # the recording is there if it is unfinished or kept
+                if os.path.exists(path):
+                    print(f"\n{_core.tree_text(path)}", end="", flush=True)
+        if not quiet and os.path.exists(given.out):
             print(f"The LeRobot data set is in {given.out}.", file=sys.stderr)
         return code
     except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
-        text = error.args[0] if isinstance(error, KeyError) and error.args else error
-        print(f"mjsense record: {' '.join(str(text).split())}", file=sys.stderr)
+        print(f"mjsense record: {message_of(error)}", file=sys.stderr)
         return 2

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 _opengl = {
+    "copy": engine.Physics.copy,
     "make_contexts": engine.Physics._make_rendering_contexts,
     "physics_render": engine.Physics.render,
     "camera_render": engine.Camera.render,
@@ -84,6 +85,26 @@ def _make_contexts(physics: Any) -> None:
         _opengl["make_contexts"](physics)
 
 
+def _copy(physics: Any, share_model: bool = False) -> Any:
+    made = _opengl["copy"](physics, share_model)
+    made._uses_mjsense = getattr(physics, "_uses_mjsense", False)
+    return made
+
+
+def _follow_recompilation(env: Any) -> None:
+    """Environments of dm_control's composer make a new physics when their model changes, usually for each episode."""
+    recompile = getattr(env, "_recompile_physics", None)
+    owner = getattr(recompile, "__self__", None)  # `env`, or the one in its wrapper; None if this was done before
+    if recompile is None or owner is None:
+        return
+
+    def recompile_and_use() -> None:
+        recompile()
+        owner._physics._uses_mjsense = True
+
+    owner._recompile_physics = recompile_and_use
+
+
 def _physics_render(
     physics: Any,
     height: int = 240,
@@ -142,18 +163,23 @@ def use(env: Any = None) -> Any:
     Overlay texts are an error; `render_flag_overrides` and `scene_option` have the same limits as in ``mjsense.Renderer``.
 
     Args:
-        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet.
+        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that ``copy.deepcopy`` or
+            pickle make use mjsense only with None.
 
     Returns:
         `env`.
     """
     physics = engine.Physics if env is None else getattr(env, "physics", env)
     if env is not None and not isinstance(physics, engine.Physics):
-        raise TypeError(f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics")
+        raise TypeError(
+            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() before environments are made"
+        )
+    engine.Physics.copy = _copy
     engine.Physics._make_rendering_contexts = _make_contexts
     engine.Physics.render = _physics_render
     engine.Camera.render = _camera_render
     physics._uses_mjsense = True
+    _follow_recompilation(env)
     if env is not None and physics._contexts:
         physics._free_rendering_contexts()
     return env

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 import mujoco
+from gymnasium.vector import VectorEnv
 
 try:
     from gymnasium.envs.mujoco.mujoco_rendering import MujocoRenderer, OffScreenViewer
@@ -80,11 +81,15 @@ class Viewer(OffScreenViewer):
 
 def _drawn(env: Any) -> Any:
     """The environment that has the ``MujocoRenderer``: `env`, or one that it contains, as gymnasium-robotics' kitchen and mazes do."""
-    inner = env.unwrapped
+    if isinstance(env, VectorEnv):
+        raise TypeError(
+            f"mjsense.compat.gymnasium.use: {env} is a vector environment; call use in the function that makes each environment"
+        )
+    inner = getattr(env, "unwrapped", None)
     for each in (inner, *(getattr(inner, name, None) for name in ("robot_env", "point_env", "ant_env"))):
         if isinstance(getattr(each, "mujoco_renderer", None), MujocoRenderer):
             return each
-    raise TypeError(f"mjsense.compat.gymnasium.use: {env} has no mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer")
+    raise TypeError(f"mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}")
 
 
 def renderer_of(env: Any) -> MujocoRenderer:

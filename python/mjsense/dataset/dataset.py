@@ -37,7 +37,7 @@ class Dataset:
     Args:
         root: Output directory of a recording or of its shards, its ``index.parquet``, one of the ``house_N`` folders, one HDF5 file, or an
             address that fsspec reads (``s3://bucket/pick``).
-        episodes: Positions of episodes in the recording; by default all.
+        episodes: Positions of episodes in the recording, or a mask; by default all.
         delta_timestamps: Windows: seconds relative to the observation, by stream or group. The stream becomes ``[n, ...]``, and
             ``{stream}_is_pad`` says which entries lie outside the episode; those repeat its first or last row.
         streams: Names of streams, of groups (``"obs/agent/qpos"``, ``"actions"``), or patterns (``"obs/sensor_data/*"``); by default all
@@ -70,13 +70,10 @@ class Dataset:
         self.root, source = resolved(root)
         """The folder or file; of an address, its copy on this machine."""
         entries, recordings = entries_of(self.root, source)
-        store = Store(recordings, int(cache_mb * 1e6))
-        chosen = [Episode(entry, i, store) for i, entry in enumerate(entries)]
+        self._store = Store(recordings, int(cache_mb * 1e6))
+        chosen = [Episode(entry, i, self._store) for i, entry in enumerate(entries)]
         if episodes is not None:
-            wanted = [int(i) for i in episodes]
-            if wrong := [i for i in wanted if not 0 <= i < len(chosen)]:
-                raise ValueError(f"episodes: {wrong[0]} is not in {self.root}, which has {len(chosen)} episodes")
-            chosen = [chosen[i] for i in wanted]
+            chosen = [chosen[i] for i in _numbers(episodes, len(chosen), self.root)]
         if outcome is not None:
             chosen = [episode for episode in chosen if _matches(episode.outcome, outcome)]
         if success is not None:
@@ -101,13 +98,16 @@ class Dataset:
                 raise ValueError(f"{self.root}: no episode matches; it has {len(entries)} episodes with the outcomes "
                                  f"{sorted({entry.outcome for entry in entries})}")  # fmt: skip
             return
-        known = self._known_streams()
         self._fps = self._common_fps()
-        names = None if streams is None else list(streams)
+        self._choose_streams(None if streams is None else list(streams), delta_timestamps or {}, tolerance_s)
+
+    def _choose_streams(self, names: list[str] | None, windows: Mapping[str, Sequence[float]], tolerance_s: float) -> None:
+        """Determines the streams of a sample, their windows, and how each is read."""
+        known = self._known_streams()
         selected = {name for name in known if not name.startswith(REPLAY)} if names is None else set(self._expand_all(names, known))
         if names is None or not set(names) <= known.keys():
-            store.leaves = set(known)
-        for name, seconds in (delta_timestamps or {}).items():
+            self._store.leaves = set(known)
+        for name, seconds in windows.items():
             steps = _steps(name, seconds, self._fps, tolerance_s)
             for stream in self._expand_all([name], known):
                 self._windows[stream] = steps
@@ -156,11 +156,9 @@ class Dataset:
         return sample
 
     def __repr__(self) -> str:
-        outcomes: dict[str, int] = {}
-        for episode in self.episodes:
-            outcomes[episode.outcome] = outcomes.get(episode.outcome, 0) + 1
+        outcomes = Counter(episode.outcome for episode in self.episodes)
         lines = [f"Dataset({str(self.root)!r}): {len(self.episodes)} episodes, {len(self)} observations"]
-        lines += [f"  {count} x {outcome}" for outcome, count in sorted(outcomes.items(), key=lambda item: -item[1])]
+        lines += [f"  {count} x {outcome}" for outcome, count in outcomes.most_common()]
         return "\n".join(lines + [f"  {stream}" for stream in self.streams.values()])
 
     def _repr_html_(self) -> str:
@@ -278,6 +276,23 @@ class Dataset:
         return values if array.dtype == object else np.array(values)  # a copy: the array is in the cache
 
 
+def opened(root: str | Path | Dataset, episodes: Iterable[int] | None) -> Dataset:
+    """The data set itself, or that of a recording with these episodes."""
+    if not isinstance(root, Dataset):
+        return Dataset(root, episodes=episodes)
+    if episodes is not None:
+        raise ValueError("episodes= cannot be combined with a Dataset; choose them when it is created")
+    return root
+
+
+def by_house(episodes: Iterable[Episode]) -> list[list[Episode]]:
+    """The episodes of each house. A house has one folder name, and may be in many shards."""
+    houses: dict[str, list[Episode]] = {}
+    for episode in episodes:
+        houses.setdefault(episode.path.parent.name, []).append(episode)
+    return list(houses.values())
+
+
 def _row_bytes(stream: Stream) -> int:
     return int(np.prod(stream.shape, dtype=np.int64)) * stream.dtype.itemsize
 
@@ -285,6 +300,21 @@ def _row_bytes(stream: Stream) -> int:
 def _is_mask(name: str) -> bool:
     parts = name.split("/")
     return parts[0] == "actions" and len(parts) > 3 and parts[2] == "given"
+
+
+def _numbers(episodes: Iterable[int], count: int, root: Path) -> list[int]:
+    """Positions of the episodes that numbers or a mask select."""
+    array = np.asarray(list(episodes))
+    if array.dtype == bool:
+        if array.shape != (count,):
+            raise ValueError(f"episodes: a mask of {array.size}, but {root} has {count} episodes")
+        return np.flatnonzero(array).tolist()
+    if array.size and array.dtype.kind not in "iu":
+        raise TypeError(f"episodes must be integers or a mask, not {episodes!r:.100}")
+    for i in array.tolist():
+        if not 0 <= i < count:
+            raise ValueError(f"episodes: {i} is not in {root}, which has {count} episodes")
+    return array.tolist()
 
 
 def _matches(outcome: str, wanted: str | Iterable[str] | Callable[[str], bool]) -> bool:

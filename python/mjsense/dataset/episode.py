@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import warnings
 from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ from mjsense.dataset.cache import Cache
 from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
 from mjsense.dataset.quality import EpisodeQuality, idle_steps, kept_rows, quality_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 
 if TYPE_CHECKING:
     import mujoco
@@ -54,6 +53,10 @@ def given_name(stream: str) -> str | None:
     """``actions/joint_pos/given/arm`` of ``actions/joint_pos/arm``, as observations name it; None for other streams."""
     parts = stream.split("/")
     return "/".join([*parts[:2], "given", *parts[2:]]) if parts[0] == "actions" and len(parts) > 2 else None
+
+
+def _video_name(camera: str) -> str:
+    return camera if camera.startswith(VIDEOS) else VIDEOS + camera
 
 
 def _unit_of(unit: str, leaf: str) -> str:
@@ -135,6 +138,11 @@ class Episode:
     def length(self) -> int:
         """Number of observations: one after the reset and one after each step; of a trimmed episode those that are left."""
         return self._entry.length if self._kept is None else len(self._kept)
+
+    @property
+    def trimmed_steps(self) -> int:
+        """Number of steps that :meth:`trimmed` left out; 0 of a complete episode."""
+        return self._entry.length - self.length
 
     @property
     def outcome(self) -> str:
@@ -239,11 +247,23 @@ class Episode:
         """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
         return Video(self._video(camera), self._store.frames, None if self._kept is None else self._kept.tolist())
 
+    def image_histogram(self, camera: str) -> np.ndarray | None:
+        """int64 [3, 256]: how often each level of red, green and blue occurs in all images of a camera, counted before they were encoded.
+
+        Of each image every n-th row and column counts, from the first on, with the smallest n with which the longer side has at most 160.
+        None for depth, a trimmed episode, and recordings of earlier versions and of MolmoSpaces.
+        """
+        if self.video(camera).trimmed:
+            return None
+        with open_h5(self.path) as file:
+            counts = file[self.trajectory][_video_name(camera)].attrs.get("histogram")
+        return None if counts is None else counts.astype(np.int64)
+
     # The next functions are for this package.
 
     def _video(self, camera: str) -> VideoInfo:
         videos = self._store.rows.get((self.index, "videos"), self._find_videos)
-        info = videos.get(camera if camera.startswith(VIDEOS) else VIDEOS + camera)
+        info = videos.get(_video_name(camera))
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
             raise UnknownNameError(f"Episode {self.index} has no video '{camera}'; it has {cameras or 'no videos'}")
@@ -263,9 +283,8 @@ class Episode:
         return json.loads(text_of(text)), 16 * len(text)
 
     def _unknown(self, name: str) -> UnknownNameError:
-        near = difflib.get_close_matches(name, [*self.streams, *{stream.rsplit("/", 1)[0] for stream in self.streams}], 3)
-        hint = f"; similar: {', '.join(near)}" if near else ""
-        return UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no stream '{name}'{hint}")
+        known = [*self.streams, *{stream.rsplit("/", 1)[0] for stream in self.streams}]
+        return UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no stream '{name}'{did_you_mean(name, known)}")
 
     def _find_videos(self) -> tuple[dict[str, VideoInfo], int]:
         videos: dict[str, VideoInfo] = {}

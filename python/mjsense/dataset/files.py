@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from mjsense._input_files import missing, unreadable
+from mjsense._optional import optional
+
 INDEX = "index.parquet"
 """Index of a recording on a cluster."""
 BATCH = re.compile(r"trajectories_batch_(\d+)_of_(\d+)\.h5")
@@ -16,11 +19,11 @@ BATCH = re.compile(r"trajectories_batch_(\d+)_of_(\d+)\.h5")
 
 def open_h5(path: Path) -> Any:
     """The file, opened for reading."""
+    h5py = optional("h5py", "dataset", "Reading recordings")
     try:
-        import h5py
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"Reading recordings needs h5py: pip install 'mjsense[dataset]' ({error})", name=error.name) from error
-    return h5py.File(path, "r")
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise unreadable(path, error, "an HDF5 file") from None
 
 
 def video_options(recording: dict[str, Any]) -> dict[str, Any]:
@@ -70,10 +73,7 @@ class EpisodeEntry:
 def read_index(root: Path) -> list[dict[str, Any]]:
     """The rows of ``index.parquet``."""
     index = root / INDEX
-    try:
-        from pyarrow import parquet
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"Reading {index} needs pyarrow: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    parquet = optional("pyarrow.parquet", "ray", f"Reading {index}")
     return parquet.read_table(index).to_pylist()
 
 
@@ -101,6 +101,8 @@ def _house(path: Path) -> int | None:
 
 def _batches(root: Path) -> list[Path]:
     """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and batches."""
+    if not root.exists():
+        raise missing(root)
     if root.is_file():
         return [root]
     found = [path for folder in ("", "house_*/", "shard_*/house_*/") for path in root.glob(f"{folder}trajectories_batch_*.h5")]
@@ -117,6 +119,13 @@ def _batches(root: Path) -> list[Path]:
         hint = ": it is unfinished; `mjsense repair` publishes its episodes" if waiting else ""
         raise FileNotFoundError(f"{root} contains no recording (house_*/trajectories_batch_*.h5){hint}")
     return sorted(found, key=order)
+
+
+def is_unfinished(root: Path) -> bool:
+    """Whether more episodes may follow, or wait to be published. An index is written at the end of a recording."""
+    if (root / INDEX).exists():
+        return False
+    return (root / "job.json").exists() or any(any(root.glob(f"{folder}.recording")) for folder in ("", "house_*/", "shard_*/house_*/"))
 
 
 def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:

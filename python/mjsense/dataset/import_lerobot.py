@@ -14,6 +14,8 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
+from mjsense._input_files import missing, read_json, read_text
+from mjsense._optional import optional
 from mjsense.dataset.import_rows import OPTIONS, Rows, archive_of, compile_archive, unique_name
 from mjsense.errors import UnknownNameError
 
@@ -79,12 +81,7 @@ def import_lerobot(
 
 
 def _needs(module: str) -> Any:
-    import importlib
-
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"import lerobot needs {module.split('.')[0]}: pip install 'mjsense[export]' ({error})", name=error.name) from error
+    return optional(module, "export", "import lerobot")
 
 
 class _Source:
@@ -92,12 +89,18 @@ class _Source:
 
     def __init__(self, root: Path) -> None:
         self.root = root
+        if not root.exists():
+            raise missing(root)
         if not (root / "meta/info.json").exists():
             raise FileNotFoundError(f"{root} is not a LeRobot data set: it has no meta/info.json")
-        self.info: dict[str, Any] = json.loads((root / "meta/info.json").read_text())
+        self.info: dict[str, Any] = read_json(root / "meta/info.json")
+        if not isinstance(self.info, dict):
+            raise ValueError(f"{root / 'meta/info.json'}: must be a JSON object, not a {type(self.info).__name__}")
         if not str(self.info.get("codebase_version", "")).startswith("v3."):
             raise ValueError(f"{root} has the version {self.info.get('codebase_version')!r}, expected v3.0; "
                              "python -m lerobot.datasets.v30.convert_dataset_v21_to_v30 converts v2.1")  # fmt: skip
+        if absent := [key for key in ("features", "fps", "data_path") if key not in self.info]:
+            raise ValueError(f"{root / 'meta/info.json'} has no '{absent[0]}'")
         self.features: dict[str, dict[str, Any]] = self.info["features"]
         self.rate = Fraction(self.info["fps"]).limit_denominator(1000)
         self.images = {key: about for key, about in self.features.items() if about["dtype"] in ("video", "image")}
@@ -177,10 +180,12 @@ class _Pose:
     def __init__(self, scene: Path, source: _Source, joints: Sequence[str] | None) -> None:
         if mujoco is None:
             raise RuntimeError(f"scene needs the series of MuJoCo that mjsense uses: {_libmujoco.explain()}")
-        if not scene.exists():
-            raise FileNotFoundError(f"scene: {scene} does not exist")
-        spec = mujoco.MjSpec.from_file(str(scene))
-        spec.compile()
+        read_text(scene)
+        try:
+            spec = mujoco.MjSpec.from_file(str(scene))
+            spec.compile()
+        except ValueError as error:
+            raise ValueError(f"scene: MuJoCo cannot load {scene}: {error}") from None
 
         def read(file: str, folder: str) -> tuple[str, bytes]:
             path = next((path for path in (scene.parent / folder / file, scene.parent / file, Path(file)) if path.is_file()), None)

@@ -12,34 +12,24 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 
 from mjsense import _core, _libmujoco
-from mjsense.recorder import FILE_OPTIONS
+from mjsense._written_rows import WrittenRows
+from mjsense.recorder import FILE_OPTIONS, VIDEO_OPTIONS
 
 if TYPE_CHECKING:
     import mujoco
 else:
     mujoco = _libmujoco.shared
 
-OPTIONS = {**FILE_OPTIONS, "ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
+OPTIONS = FILE_OPTIONS | VIDEO_OPTIONS
 _WRITTEN = "Values written into the previous state before this step; NaN: not written."
 
 
-class Rows:
-    """The streams of a recording, whose current row is written by hand."""
-
-    def __init__(self) -> None:
-        self._handles: list[Any] = []
-
-    def add(self, name: str, dtype: str, shape: tuple[int, ...], description: str, **more: Any) -> np.ndarray:
-        """Declares a stream. Returns the array ``[1, *shape]`` to write its rows to."""
-        spec = {"dtype": dtype, "shape": [*shape], "low": -np.inf, "high": np.inf, "is_dict": False, "unit": "", "frame": "",
-                "description": description, **more}  # fmt: skip
-        self._handles.append(_core.written_rows(name, spec, 1))
-        return self._handles[-1].arrays(writable=True)[""]
+class Rows(WrittenRows):
+    """The streams of a recording with one world."""
 
     def add_state(self, model: mujoco.MjModel) -> np.ndarray:
         """Declares the data for replay. Returns the array ``[1, nstate]`` to write MuJoCo's states to, in the order of mjSTATE_INTEGRATION."""
@@ -51,7 +41,7 @@ class Rows:
     def recorder(self, out: str | Path, rate: Fraction, settings: dict[str, Any], options: dict[str, Any]) -> Any:
         """The recorder of these streams."""
         text = json.dumps(settings, sort_keys=True)
-        return _core.Recorder(None, 1, self._handles, str(out), rate.numerator, rate.denominator, text, options)
+        return _core.Recorder(None, 1, self.handles, str(out), rate.numerator, rate.denominator, text, options)
 
 
 def archive_of(text: str, read: Callable[[str, str], tuple[str, bytes]]) -> tuple[str, bytes]:
@@ -61,6 +51,8 @@ def archive_of(text: str, read: Callable[[str, str], tuple[str, bytes]]) -> tupl
         text: The model as MJCF.
         read: Name in the archive and content of a file, given its name in the MJCF and the folder that the MJCF states for its kind.
     """
+    from xml.etree import ElementTree  # slow to import
+
     tree = ElementTree.fromstring(text)
     folders: dict[str, str] = {}
     for compiler in tree.iter("compiler"):

@@ -49,6 +49,8 @@ def inputs_of(episode: Episode) -> ReplayInputs:
         return cached
     with open_h5(episode.path) as file:
         group = file[episode.trajectory].get("replay")
+        if group is None and "env" in episode.settings:
+            raise ValueError(f"{where(episode)} has no data for replay: the environment '{episode.settings['env']}' is not simulated by mjsense")
         if group is None:
             raise ValueError(
                 f"{where(episode)} has no data for replay. Record it again without --no-replay (replay=False); "

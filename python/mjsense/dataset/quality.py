@@ -71,7 +71,7 @@ def quality_of(episode: Episode) -> EpisodeQuality:
     idle = idle_steps(episode)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(int), [0]])))
     waits = edges[1::2] - edges[::2]
-    tools = [episode[name] for name in episode.streams if name.split("/")[:3] == ["obs", "extra", "tcp_pose"]]
+    tools = [episode[name] for name in episode.streams if name.startswith("obs/extra/tcp_pose")]
     jerks = [np.diff(tool[:, :3].astype(float), 3, axis=0) * float(episode.fps) ** 3 for tool in tools if len(tool) > 3]
     visibility: dict[str, dict[str, float]] = {}
     for name in episode.streams:

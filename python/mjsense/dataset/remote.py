@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mjsense._optional import optional
 from mjsense.dataset.files import INDEX
 
 
@@ -25,10 +26,7 @@ def absolute(root: str | Path) -> str:
 
 def open_address(address: str) -> tuple[Any, str]:
     """fsspec's file system of an address or a path, and the path there."""
-    try:
-        from fsspec.core import url_to_fs  # pyright: ignore[reportMissingImports]
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"{address} needs fsspec: pip install 'mjsense[ray]' ({error})", name=error.name) from error
+    url_to_fs = optional("fsspec.core", "ray", address).url_to_fs
     return url_to_fs(address)
 
 

@@ -16,13 +16,14 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import checked
-from mjsense._progress import ProgressLine, interactive
+from mjsense._progress import line_of
 from mjsense.core_sensors import CoreSensor
 from mjsense.dataset import render_cameras
-from mjsense.dataset.dataset import Dataset
+from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.files import open_h5, video_options
 from mjsense.dataset.playback import archive_of, inputs_of
+from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
 
@@ -57,7 +58,7 @@ class _Progress:
     """Reports at most ten times per second."""
 
     def __init__(self, wanted: int, report: bool | Callable[[RenderProgress], None] | None) -> None:
-        line = self._line = ProgressLine() if report is True or (report is None and interactive()) else None
+        line = self._line = line_of(report)
         self._report = report if callable(report) else None if line is None else lambda now: line.show(_text(now))
         self._begun, self._reported = time.monotonic(), -1.0
         self.now = RenderProgress(0, wanted, 0, 0.0)
@@ -95,6 +96,7 @@ class _House:
     def __init__(self, episodes: list[Episode], others: list[int], out: Path, options: dict[str, Any], progress: _Progress) -> None:
         self._episodes, self._progress = episodes, progress
         first = episodes[0]
+        archive_of(first)  # raises an error with the reason if the recording has no data for replay
         cameras, self._system, unchanged = render_cameras.choose(
             first, options["cameras"], options["add_cameras"], options["camera_system"],
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
@@ -103,52 +105,52 @@ class _House:
         defaults = {"shadows": settings.get("shadows", True), "samples": settings.get("samples", 1),
                     "brightness": settings.get("render", {}).get("brightness", 1.0)}  # fmt: skip
         shadows, samples, brightness = (value if options[key] is None else options[key] for key, value in defaults.items())
-        recorded = render_cameras.recorded_cameras(first, None)
         as_recorded = options["copy"] and not options["edit"] and all(options[key] is None for key in (*defaults, "crf", "preset"))
         copied = unchanged if as_recorded else []
         new_cameras = [camera for camera in cameras if camera not in copied]
-        sensors = list(options["sensors"])
+        self._frames = sum(1 + camera.depth for camera in new_cameras)
+        handles = self._make_worlds(new_cameras, shadows, samples, brightness, options)
+        changed = {"cameras": [camera.settings() for camera in cameras], "shadows": shadows, "samples": samples,
+                   "render": {"of": first._recording, "episodes": [episode.number for episode in episodes], "brightness": brightness,
+                              "camera_system": options["camera_system"]}}  # fmt: skip
+        self._recorder = self._make_recorder(out, handles, settings | changed, options)
+        self.path = Path(self._recorder.path)
+        self._skip = _replaced_streams(first, copied)
+        for number in () if self._recorder.enough else others:
+            if not self._recorder.decided(number):
+                self._recorder.skip_episode(number, "not in the rendering")
+
+    def _make_worlds(self, cameras: list[RenderCamera], shadows: bool, samples: int, brightness: float, options: dict[str, Any]) -> list[Any]:
+        """Makes the simulation with the cameras and sensors. Returns the handles of the streams to record."""
+        first, sensors = self._episodes[0], list(options["sensors"])
         suite_sensors = [sensor for sensor in sensors if isinstance(sensor, CoreSensor)]
         scene_sensors = [sensor for sensor in sensors if not isinstance(sensor, CoreSensor)]
-        views = [camera.scene_sensor(shadows, samples) for camera in new_cameras]
+        views = [camera.scene_sensor(shadows, samples) for camera in cameras]
         self._worlds = EpisodeWorlds(
-            first, min(options["worlds"], len(episodes)), [*views, *scene_sensors],
+            first, min(options["worlds"], len(self._episodes)), [*views, *scene_sensors],
             edit=options["edit"], brightness=brightness, threads=options["threads"],
         )  # fmt: skip
         if self._system:
             self._system.bind(self._worlds)
-        self._frames = sum(1 + camera.depth for camera in new_cameras)
-        scene, sim = self._worlds.scene, self._worlds.sim
-        own = [scene[_key_of(sensor)] for sensor in scene_sensors]
-        streams = [stream for camera in new_cameras for stream in camera.streams()]
-        self._sensors, handles = recorded_sensors(sim, [*streams, *own, *suite_sensors])
-        for sensor, handle in zip(self._sensors, handles):
+        own = [self._worlds.scene[_key_of(sensor)] for sensor in scene_sensors]
+        streams = [stream for camera in cameras for stream in camera.streams()]
+        self._sensors, handles = recorded_sensors(self._worlds.sim, [*streams, *own, *suite_sensors])
+        for handle in handles:
             if handle.has_memory:
                 raise ValueError(f"sensor '{handle.name}' depends on the physics steps between observations (air time, history, delays); "
                                  "render computes sensors from the recorded states only")  # fmt: skip
-        description = first._recording
-        files = FILE_OPTIONS | {"episodes": len(episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
-                 "gzip": description.get("gzip", 4)}  # fmt: skip
-        video = video_options(description)
-        video |= {key: options[key] for key in ("crf", "preset") if options[key] is not None}
-        archive = archive_of(first)
-        files["archive"] = archive.name, archive.read_bytes()
-        changed = {"cameras": [camera.settings() for camera in cameras], "shadows": shadows, "samples": samples,
-                   "render": {"of": description, "episodes": [episode.number for episode in episodes], "brightness": brightness,
-                              "camera_system": options["camera_system"]}}  # fmt: skip
-        text = json.dumps(settings | changed, sort_keys=True, separators=(",", ":"))
-        rate = Fraction(first.fps)
+        return handles
+
+    def _make_recorder(self, out: Path, handles: list[Any], settings: dict[str, Any], options: dict[str, Any]) -> Any:
+        """The recorder of the new recording, whose other options are those of the old one."""
+        first, sim = self._episodes[0], self._worlds.sim
+        description, archive, rate = first._recording, archive_of(first), Fraction(first.fps)
+        files = FILE_OPTIONS | {"episodes": len(self._episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
+                                "gzip": description.get("gzip", 4), "archive": (archive.name, archive.read_bytes())}  # fmt: skip
+        video = video_options(description) | {key: options[key] for key in ("crf", "preset") if options[key] is not None}
         use_installed_ffmpeg()
-        self._recorder = _core.Recorder(sim._core, sim.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, files | video)
-        self.path = Path(self._recorder.path)
-        self._skip = [
-            f"obs/{place}{end}" for camera in recorded if camera not in copied
-            for place, ends in ((f"sensor_data/{camera.name}", ("", "_depth", "_depth_16bit")), (f"sensor_param/{camera.name}", ("",)),
-                                (f"extra/{camera.name}", ("_segmentation",))) for end in ends
-        ]  # fmt: skip
-        for number in () if self._recorder.enough else others:
-            if not self._recorder.decided(number):
-                self._recorder.skip_episode(number, "not in the rendering")
+        text = json.dumps(settings, sort_keys=True, separators=(",", ":"))
+        return _core.Recorder(sim._core, sim.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, files | video)
 
     def run(self) -> None:
         recorder, worlds = self._recorder, self._worlds
@@ -192,6 +194,13 @@ class _House:
             scene = file[episode.trajectory]["obs_scene"][()]
         self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
         self._recorder.finish_episode(world, scene.decode() if isinstance(scene, bytes) else str(scene), episode.outcome)
+
+
+def _replaced_streams(episode: Episode, copied: list[RenderCamera]) -> list[str]:
+    """Streams of the recorded cameras that are rendered again or left out, all but those of the copied cameras."""
+    names = [camera.name for camera in render_cameras.recorded_cameras(episode, None) if camera not in copied]
+    places = ("sensor_data/{}", "sensor_data/{}_depth", "sensor_data/{}_depth_16bit", "sensor_param/{}", "extra/{}_segmentation")
+    return [f"obs/{place.format(name)}" for name in names for place in places]
 
 
 def _key_of(sensor: Any) -> str:
@@ -268,23 +277,19 @@ def render(
             raise ValueError(f"{name} is {value}: must be at least 1")
     if brightness is not None and not brightness > 0:
         raise ValueError(f"brightness is {brightness}: must be positive")
-    dataset = root if isinstance(root, Dataset) else Dataset(root, episodes=episodes)
-    if isinstance(root, Dataset) and episodes is not None:
-        raise ValueError("episodes= cannot be combined with a Dataset; choose them when it is created")
+    dataset = opened(root, episodes)
     if not dataset.episodes:
         raise ValueError(f"{dataset.root} contains no episodes")
-    houses: dict[str, list[Episode]] = {}  # by the name of the folder: a house may be in many shards
-    for episode in dataset.episodes:
-        houses.setdefault(episode.path.parent.name, []).append(episode)
+    houses = by_house(dataset.episodes)
     made = sensors if callable(sensors) else None
     given = () if callable(sensors) else list(sensors)
     if len(houses) > 1 and any(not hasattr(sensor, "kind") or isinstance(sensor, CoreSensor) for sensor in given):
         raise ValueError(f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs to one simulation")
-    if Path(out).resolve() in {dataset.root.resolve(), *(episodes[0].path.resolve().parents[1] for episodes in houses.values())}:
+    if Path(out).resolve() in {dataset.root.resolve(), *(chosen[0].path.resolve().parents[1] for chosen in houses)}:
         raise ValueError(f"the output directory '{out}' is that of the recording; choose another one")
     state = _Progress(len(dataset.episodes), progress)
     paths = []
-    for chosen in houses.values():
+    for chosen in houses:
         chosen.sort(key=lambda episode: episode.number)
         numbers = {episode.number for episode in chosen}
         others = [number for number in range(max(numbers)) if number not in numbers]

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from mjsense._rotations import quaternions_of
 from mjsense.configs import CameraSensorCfg
 from mjsense.core_sensors import CameraImageSensor, CameraParameterSensor
 from mjsense.dataset.files import open_h5, text_of
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 
 if TYPE_CHECKING:
     from mjsense.dataset.episode import Episode
@@ -113,8 +112,7 @@ def added_camera(name: str, given: Mapping[str, Any], size: tuple[int, int]) -> 
     ``width``, ``height``, ``depth``, ``segmentation``."""
     for key in given:
         if key not in _KEYS:
-            near = difflib.get_close_matches(key, _KEYS, 1)
-            raise UnknownNameError(f"camera '{name}' has no '{key}'; {f'did you mean {near[0]!r}?' if near else 'it has ' + ', '.join(_KEYS)}")
+            raise UnknownNameError(f"camera '{name}' has no '{key}'{did_you_mean(key, _KEYS, 'it has')}")
     if "pos" not in given or ("lookat" in given) == ("quat" in given):
         raise ValueError(f"camera '{name}' needs pos, and either lookat or quat; given: {', '.join(given) or 'nothing'}")
     pos = _vector(name, "pos", given["pos"], 3)

@@ -14,7 +14,7 @@ from mjsense import _libmujoco
 from mjsense._arguments import checked
 from mjsense._mujoco import Obj, id2name
 from mjsense._progress import counter
-from mjsense.dataset.dataset import Dataset
+from mjsense.dataset.dataset import Dataset, opened
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode_worlds import OwnStepper
 from mjsense.dataset.playback import Stepper, inputs_of, model_of
@@ -28,14 +28,6 @@ else:
     mujoco = _libmujoco.shared
 
 
-def _dataset(root: str | Path | Dataset, episodes: Sequence[int] | None) -> Dataset:
-    if isinstance(root, Dataset):
-        if episodes is not None:
-            raise ValueError("episodes= cannot be combined with a Dataset; choose them when it is created")
-        return root
-    return Dataset(root, episodes=episodes)
-
-
 @checked
 def replay(
     root: str | Path | Dataset, *, from_: Literal["states", "actions"] = "states", episodes: Sequence[int] | None = None
@@ -47,7 +39,7 @@ def replay(
         from_: ``states`` sets every recorded state; ``actions`` sets the first one and then simulates with the recorded controls.
         episodes: Positions of episodes in the recording; by default all.
     """
-    for episode in _dataset(root, episodes).episodes:
+    for episode in opened(root, episodes).episodes:
         for t, data in episode.replay(from_):
             yield episode, t, data
 
@@ -198,7 +190,7 @@ def check_replay(
         progress: Show the progress on stderr, or a function that is called with the number of checks done and of all; by default
             shown where stderr is a terminal or a notebook.
     """
-    chosen = _dataset(root, episodes).episodes
+    chosen = opened(root, episodes).episodes
     checks: dict[int, EpisodeCheck] = {}
     report, done, total = counter("checks", progress), 0, len(chosen) * (actions + states)
     for episode in chosen if actions else ():

@@ -16,7 +16,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.assets import use_installed_meshes
 from mjsense.dataset import json_rows, render_cameras
-from mjsense.dataset.dataset import Dataset
+from mjsense.dataset.dataset import Dataset, by_house
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import VIDEOS
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
@@ -240,11 +240,8 @@ def _compare(recorded: Episode, replayed: Episode, worlds: Any, otherwise: str) 
 
 def check_sensors(episodes: list[Episode], *, worlds: int = 4, threads: int = 0) -> Iterator[tuple[Episode, SensorCheck]]:
     """Yields the comparison of every episode."""
-    houses: dict[str, list[Episode]] = {}
-    for episode in episodes:
-        houses.setdefault(episode.path.parent.name, []).append(episode)
     use_installed_ffmpeg()
-    for chosen in houses.values():
+    for chosen in by_house(episodes):
         playing, otherwise = _worlds_of(chosen[0], min(worlds, len(chosen)), threads)
         for start in range(0, len(chosen), _CHUNK):
             some = chosen[start : start + _CHUNK]

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
-import importlib
 import types
 import typing
 from collections.abc import Sequence
@@ -13,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from mjsense import configs
+from mjsense._input_files import read_toml
+from mjsense.errors import did_you_mean
+from mjsense.robot import sensor_of_class
 
 _PYTHON = "python"
 
 
 def _nearest(context: str, what: str, name: str, known: Sequence[str]) -> ValueError:
-    near = difflib.get_close_matches(name, known, 1)
-    return ValueError(f"{context}: unknown {what} '{name}'; {f'did you mean {near[0]!r}?' if near else 'there are ' + ', '.join(known)}")
+    return ValueError(f"{context}: unknown {what} '{name}'{did_you_mean(name, known, 'there are')}")
 
 
 def _classes(hint: Any) -> list[type[Any]]:
@@ -63,13 +63,9 @@ def _value(classes: list[type[Any]], value: Any, context: str) -> Any:
 
 def _python_sensor(table: dict[str, Any], context: str) -> Any:
     reference = str(table.get("class", ""))
-    module, _, attribute = reference.partition(":")
-    if not module or not attribute:
+    if not all(reference.partition(":")):
         raise ValueError(f"{context}: class is '{reference}': must be 'package.module:Class'")
-    try:
-        sensor = getattr(importlib.import_module(module), attribute)(**table.get("args", {}))
-    except (ImportError, AttributeError, TypeError) as error:
-        raise ValueError(f"{context}: class '{reference}' cannot be used: {error}") from error
+    sensor = sensor_of_class(reference, table.get("args", {}), context)
     if name := table.get("name"):
         sensor.uuid = name
     return sensor
@@ -77,12 +73,7 @@ def _python_sensor(table: dict[str, Any], context: str) -> Any:
 
 def sensors_of(path: str | Path) -> list[Any]:
     """Sensors of the scene. Names of elements are full names in the model (``robot_0/gripper/base``), or local names with ``entity``."""
-    import tomllib  # slow to import
-
-    try:
-        tables = tomllib.loads(Path(path).read_text()).get("sensors")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: {error}") from error
+    tables = read_toml(path).get("sensors")
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         raise ValueError(f"{path}: contains no [[sensors]] tables")
     kinds = {cls.kind: cls for cls in vars(configs).values() if isinstance(cls, type) and issubclass(cls, configs.SensorCfg) and hasattr(cls, "kind")}

@@ -1,61 +1,54 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Histograms of the frames of a video, for statistics of images."""
+"""Histograms of the images of an episode, for statistics of images."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from mjsense.dataset import statistics
+from mjsense.dataset import Episode, statistics
 from mjsense.export.output import needs
 
-DEFAULT_FRAMES: Literal["key"] = "key"
-"""Frames that the statistics of images use."""
-_LONG_SIDE = 160  # pixels; frames are sampled at every n-th row and column down to about this size
+_LONG_SIDE = 160  # pixels; every n-th row and column counts, so that the longer side has at most so many, as in the recorder
 _PERIOD = 20  # frames from one key frame to the next, by default; with far fewer key frames, every 20th frame is used
 
 
-def check_frames(frames: int | str) -> None:
-    """Raises ValueError unless this is a number of frames, 0 for all, or ``key``."""
-    if frames != "key" and (isinstance(frames, str) or frames < 0):
-        raise ValueError(f"statistics_frames is {frames!r}: must be a number of frames of each episode, 0 for all, or 'key' for the key frames")
+def image_histograms(episode: Episode, camera: str) -> tuple[np.ndarray, int]:
+    """Histograms int64 [3, 256] of the channels of an episode's images, and the number of images that they count.
 
-
-def frame_histograms(path: Path, length: int, frames: int | Literal["key"] = DEFAULT_FRAMES) -> tuple[np.ndarray, int]:
-    """Histograms int64 [3, 256] of the channels of the first ``length`` frames, and the number of frames used.
-
-    Args:
-        frames: Maximum number of frames, evenly spaced; 0: all. All frames are decoded, up to the last one that is used. ``key``: the key
-            frames, which need no others to be decoded; if a video has few of them, every 20th frame.
+    The recorder counted all images. Of a trimmed episode, the images that are left are decoded. Recordings of earlier versions and of
+    MolmoSpaces have no histograms: of their videos, the key frames are decoded.
     """
-    if frames == "key":
-        found = _histograms(path, length, frames)
-        return found if found[1] * 2 * _PERIOD >= length else _histograms(path, length, -(-length // _PERIOD))
-    return _histograms(path, length, frames)
+    counted = episode.image_histogram(camera)
+    if counted is not None:
+        return counted, episode.length
+    video = episode.video(camera)
+    if not video.trimmed:
+        return key_frame_histograms(video.path, len(video))
+    step = _step(*video.shape[1:3])
+    return statistics.histograms(video[t][::step, ::step] for t in range(len(video)))
 
 
-def _histograms(path: Path, length: int, frames: int | Literal["key"]) -> tuple[np.ndarray, int]:
+def key_frame_histograms(path: Path, length: int) -> tuple[np.ndarray, int]:
+    """The same of the key frames of a video of ``length`` frames, which need no others to be decoded. If it has few, of every 20th frame."""
+    found = _decoded(path, None)
+    return found if found[1] * 2 * _PERIOD >= length else _decoded(path, {*range(0, length, _PERIOD)})
+
+
+def _decoded(path: Path, wanted: set[int] | None) -> tuple[np.ndarray, int]:
+    """Histograms of the wanted frames; None: of the key frames."""
     av = needs("av")
-    chosen = range(length) if not frames or frames == "key" else np.unique(np.linspace(0, length - 1, min(frames, length)).astype(int))
-    wanted = {int(n) for n in chosen}
     with av.open(str(path)) as video:
         stream = video.streams.video[0]
         stream.codec_context.options = {"skip_loop_filter": "all"}  # changes pixels at edges of blocks by a few levels, and is 20 % faster
-        if frames == "key":
+        if wanted is None:
             stream.codec_context.skip_frame = "NONKEY"
-        step = max(1, max(stream.width, stream.height) // _LONG_SIDE)
-        width, height = max(1, stream.width // step), max(1, stream.height // step)
+        step = _step(stream.width, stream.height)
+        width, height = -(-stream.width // step), -(-stream.height // step)
+        frames = (frame for n, frame in enumerate(video.decode(stream)) if wanted is None or n in wanted)
+        return statistics.histograms(frame.reformat(width, height, "rgb24", interpolation="POINT", threads=1).to_ndarray() for frame in frames)
 
-        per_tick = float(stream.time_base * stream.average_rate)
 
-        def used():
-            for frame in video.decode(stream):
-                n = round(frame.pts * per_tick)
-                if n in wanted:
-                    yield frame.reformat(width, height, "rgb24", interpolation="POINT", threads=1).to_ndarray()
-                if n >= length - 1:
-                    return
-
-        return statistics.histograms(used())
+def _step(width: int, height: int) -> int:
+    return -(-max(width, height) // _LONG_SIDE)

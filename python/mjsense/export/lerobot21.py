@@ -7,23 +7,22 @@ import json
 import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from mjsense._arguments import checked
-from mjsense.export.frame_statistics import DEFAULT_FRAMES, check_frames, frame_histograms
+from mjsense.export.frame_statistics import image_histograms
 from mjsense.export.images import video_file
-from mjsense.export.lerobot import (
+from mjsense.export.lerobot_files import (
     FILES_PER_CHUNK,
-    Histograms,
     Statistics,
     codec_of,
     columns_of,
     exported,
     features_of,
     image_key,
+    in_folder,
     is_depth,
     key_of,
-    lists,
     number,
     table_of,
     write_json,
@@ -45,9 +44,7 @@ def export_lerobot21(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
-    trim_idle: bool = False,
-    statistics_frames: int | Literal["key"] = DEFAULT_FRAMES,
-    histograms: Callable[..., Any] = frame_histograms,
+    trim_idle: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``. See docs/export.md.
@@ -58,53 +55,46 @@ def export_lerobot21(
         map: Features and cameras: a :class:`mjsense.export.Mapping`, a TOML file, or a dict of the same form.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). Their videos are encoded again.
-        statistics_frames: Frames that the statistics of images use. ``key``: the key frames, which are every 20th unless the recording was
-            made with another ``keyint``; a number: at most so many frames of each episode and camera; 0: all, which takes ten times as long.
-        histograms: Function that computes the histograms of a video, in place of ``mjsense.export.frame_statistics.frame_histograms``.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+            places an object. Videos of episodes with such steps are encoded again.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
-    check_frames(statistics_frames)
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
+    source.print_trimming()
     if depth := [camera for camera in source.cameras if is_depth(source, camera)]:
         raise ValueError(f"LeRobot v2.1 has no depth images; leave '{depth[0]}' out of the map, or export to LeRobot v3.0")
     with new_output(out) as path:
-        _write(source, path, statistics_frames, histograms, progress)
+        _write(source, path, progress)
     return Path(out)
 
 
-def _write(source: Source, path: Path, statistics_frames: int | Literal["key"], histograms_of: Histograms,
-           progress: Callable[[int, int], None] | None) -> None:  # fmt: skip
+def _write(source: Source, path: Path, progress: Callable[[int, int], None] | None) -> None:
     entries: list[dict[str, Any]] = []
     found: list[dict[str, Any]] = []
     codec: dict[str, Any] = {}
     statistics = Statistics()
     first = 0
-    for position, episode in enumerate(source.episodes):
+    for position, episode in enumerate(source.each(progress)):
         place = {"episode_chunk": position // FILES_PER_CHUNK, "episode_index": position}
         columns = columns_of(source, episode, position, first, source.tasks.index(episode.task))
         columns[f"annotation.{_INSTRUCTION}"] = columns["task_index"]
-        file = _made(path / _DATA.format(**place))
-        needs("pyarrow.parquet").write_table(table_of(columns), file)
+        needs("pyarrow.parquet").write_table(table_of(columns), in_folder(path / _DATA.format(**place)))
         histograms = {}
         for camera in source.cameras:
             with video_file(source.video(episode, camera), path) as video:
                 codec = codec or codec_of(video)
-                histograms[image_key(camera)] = histograms_of(video, episode.length - 1, statistics_frames)
-                shutil.copyfile(video, _made(path / _VIDEO.format(video_key=image_key(camera), **place)))
-        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1})
-        stats = {name: lists(value) for name, value in statistics.add(columns, histograms).items()}
-        found.append({"episode_index": position, "stats": stats})
+                shutil.copyfile(video, in_folder(path / _VIDEO.format(video_key=image_key(camera), **place)))
+            histograms[image_key(camera)] = image_histograms(episode, source.cameras[camera])
+        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1, "trimmed_steps": episode.trimmed_steps})
+        found.append({"episode_index": position, "stats": statistics.add(columns, histograms)})
         first += episode.length - 1
-        if progress:
-            progress(position + 1, len(source))
     _write_lines(path / "meta/episodes.jsonl", entries)
     _write_lines(path / "meta/episodes_stats.jsonl", found)
     _write_lines(path / "meta/tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(source.tasks)])
-    write_json(path / "meta/stats.json", {name: lists(value) for name, value in statistics.all().items()})
+    write_json(path / "meta/stats.json", statistics.all())
     write_json(path / "meta/modality.json", modality_of(source))
     count = len(source)
     info = {
@@ -131,10 +121,5 @@ def modality_of(source: Source) -> dict[str, Any]:
     return result
 
 
-def _made(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path
-
-
 def _write_lines(path: Path, entries: list[dict[str, Any]]) -> None:
-    _made(path).write_text("".join(json.dumps(entry, ensure_ascii=False) + "\n" for entry in entries))
+    in_folder(path).write_text("".join(json.dumps(entry, ensure_ascii=False) + "\n" for entry in entries))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.dataset import Video
+from mjsense.export.images import depth_unit, to_uint16
 from mjsense.export.output import needs
 
 _NEAR_M, _FAR_M, _SHIFT_M = 0.01, 10.0, 3.5  # LeRobot's defaults
@@ -28,6 +29,20 @@ def codes_of(depth: np.ndarray) -> np.ndarray:
     """uint16 codes of distances in metres. 0, which means no measurement, and everything nearer than 0.01 m have the code 0."""
     scaled = (np.log(depth + np.float32(_SHIFT_M)) - _LOG_NEAR) * (_LARGEST / _LOG_RANGE)
     return np.rint(scaled).clip(0, _LARGEST).astype(np.uint16)
+
+
+def encode_exactly(video: Video, path: Path) -> None:
+    """Encodes a depth video without loss to the Matroska file ``path``, as the recorder does."""
+    av: Any = needs("av")
+    _, height, width = video.shape
+    with av.open(str(path), "w", format="matroska") as file:
+        stream = file.add_stream("ffv1", rate=video.fps, options={"level": "3", "g": "1", "slicecrc": "1"})
+        stream.width, stream.height, stream.pix_fmt = width, height, "gray16le"
+        for t in range(len(video)):
+            frame = av.VideoFrame.from_ndarray(to_uint16(video[t], depth_unit(video)), format="gray16le")
+            frame.pts = t
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())
 
 
 def encode_depth(video: Video, path: Path, fps: Fraction, length: int) -> tuple[np.ndarray, int]:

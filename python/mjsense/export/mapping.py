@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -14,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from mjsense._arguments import checked
+from mjsense._input_files import read_toml
 from mjsense.dataset import Dataset, Episode, Stream, Video
 from mjsense.dataset.episode import LARGE_ROW, VIDEOS, given_name
+from mjsense.dataset.files import is_unfinished
 from mjsense.errors import UnknownNameError
 
 _OF_STEPS = ("actions/", "rewards", "success", "fail", "terminated", "truncated")
@@ -45,19 +48,15 @@ class Mapping:
         """The mapping that a TOML file or a dict of the same form describes; None: the default mapping.
 
         Raises:
-            ValueError: An unknown key, or a value of the wrong type.
+            FileNotFoundError: There is no such file.
+            ValueError: The file is not valid TOML, an unknown key, or a value of the wrong type.
         """
         if isinstance(source, Mapping):
             return source
         if source is None:
             return Mapping()
         if isinstance(source, (str, Path)):
-            import tomllib
-
-            try:
-                table, about = tomllib.loads(Path(source).read_text()), str(source)
-            except tomllib.TOMLDecodeError as error:
-                raise ValueError(f"{source}: {error}") from error
+            table, about = read_toml(source), str(source)
         else:
             table, about = dict(source), "map"
         known = ("state", "action", "cameras", "features")
@@ -112,7 +111,8 @@ class Source:
         map: A :class:`Mapping`, a TOML file, or a dict of the same form; by default :class:`Mapping`'s defaults.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`); None: in episodes whose task places an
+            object.
     """
 
     def __init__(
@@ -122,16 +122,19 @@ class Source:
         map: Mapping | str | Path | dict[str, Any] | None = None,
         episodes: Iterable[int] | None = None,
         success: bool | None = None,
-        trim_idle: bool = False,
+        trim_idle: bool | None = False,
     ) -> None:
         mapping = Mapping.of(map)
-        chosen = Dataset(root, episodes=episodes, success=success, trim_idle=trim_idle)
+        chosen = Dataset(root, episodes=episodes, success=success)
         self.name: str = Path(root).resolve().name
         """Name of the recording's folder or file."""
-        self.episodes: list[Episode] = [episode for episode in chosen.episodes if episode.length > 1]
+        complete = (episode for episode in chosen.episodes if episode.length > 1)
+        self.episodes: list[Episode] = [e.trimmed() if trim_idle or (trim_idle is None and places(e)) else e for e in complete]
         """The episodes that have at least one step."""
         if not self.episodes:
             raise ValueError(f"{root}: no episode with a step matches")
+        if episodes is None and is_unfinished(chosen.root):
+            print(f"{root} is unfinished; the export has the episodes that are published", file=sys.stderr)
         self.first_step: int = 0
         """Number of steps of the episodes before, in a part of a recording."""
         self.fps: Fraction = chosen.fps
@@ -158,12 +161,24 @@ class Source:
     def __len__(self) -> int:
         return len(self.episodes)
 
+    def each(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Episode]:
+        """The episodes. After the work on each of them, ``progress`` is called with the number of finished ones and of all."""
+        for finished, episode in enumerate(self.episodes, 1):
+            yield episode
+            if progress is not None:
+                progress(finished, len(self))
+
     def part(self, begin: int, end: int) -> Source:
         """The episodes at the positions ``begin`` to ``end - 1``, with the same features and cameras."""
         part = copy.copy(self)
         part.episodes = self.episodes[begin:end]
         part.first_step = self.first_step + sum(episode.length - 1 for episode in self.episodes[:begin])
         return part
+
+    def print_trimming(self) -> None:
+        """Prints on stderr how many steps are left out, if any are."""
+        trimmed = sum(episode.trimmed_steps for episode in self.episodes)
+        print_trimming(trimmed, trimmed + sum(episode.length - 1 for episode in self.episodes))
 
     def rows(self, episode: Episode) -> dict[str, np.ndarray]:
         """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
@@ -195,6 +210,19 @@ class Source:
             columns.append(values.reshape(episode.length, size))
         rows = np.concatenate(columns, 1).astype(feature.dtype, copy=False)
         return rows[1:] if feature.of_step else rows
+
+
+def places(episode: Episode) -> bool:
+    """Whether the episode's task puts an object in, on or next to another one, as its recording says: one of its objects has the role
+    ``place_receptacle``."""
+    return "place_receptacle" in episode.obs_scene.get("objects", {}) or "place_receptacle_name" in episode.obs_scene
+
+
+def print_trimming(trimmed: int, steps: int) -> None:
+    """Prints on stderr how many of the recorded steps are left out, if any are."""
+    if trimmed:
+        share = f"{trimmed} of {steps} steps ({trimmed / steps:.0%})"
+        print(f"{share}, in which nothing moves, are left out; --no-trim-idle (trim_idle=False) keeps them", file=sys.stderr)
 
 
 def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:

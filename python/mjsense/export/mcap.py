@@ -7,20 +7,17 @@ import heapq
 import json
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense._arguments import checked
 from mjsense._rotations import quaternions_of
+from mjsense.dataset import Episode, Video
 from mjsense.export.images import CRF, depth_videos, padded
-from mjsense.export.mapping import Source
+from mjsense.export.mapping import Mapping, Source
 from mjsense.export.output import join_folders, needs, new_output
 from mjsense.export.scene import Body, Shape, bodies
-
-if TYPE_CHECKING:
-    from mjsense.dataset import Episode, Video
-    from mjsense.export.mapping import Mapping
 
 _NS = 1_000_000_000
 _WORLD = "world"
@@ -69,7 +66,7 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     for module in ("foxglove_schemas_protobuf", "av"):
         needs(module, "mcap")
     path.mkdir()
-    for i, episode in enumerate(source.episodes):
+    for episode in source.each(progress):
         with open(path / f"episode_{episode.index:08d}.mcap", "wb") as file:
             writer = writers.Writer(file)
             writer.start(library="mjsense")
@@ -77,8 +74,6 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
             writer.add_metadata("episode", about | {"file": f"{episode.path.name}/{episode.trajectory}"})
             _write(writer, schemas.register_schema, source, _messages(source, episode, encode_again))
             writer.finish()
-        if progress is not None:
-            progress(i + 1, len(source))
 
 
 join = join_folders

@@ -3,7 +3,7 @@
 
 The recording is made in the folder ``OUT.recording`` as always, so it is crash-safe and can be resumed. A thread adds each published HDF5
 file to the data set ``OUT.part``, which is renamed to ``OUT`` when the recording is complete. After a crash the data set is
-written again from the beginning; the statistics of images, which take most of the time, are kept next to the recording.
+written again from the beginning, which takes little time, because the recording contains the videos and the histograms of their images.
 """
 
 from __future__ import annotations
@@ -14,15 +14,12 @@ import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
+from typing import Any
 
 from mjsense.dataset.files import BATCH
-from mjsense.export.frame_statistics import DEFAULT_FRAMES, frame_histograms
 from mjsense.export.lerobot import Writer
-from mjsense.export.mapping import Source
-from mjsense.export.output import needs, new_output
+from mjsense.export.mapping import Mapping, Source
+from mjsense.export.output import needs, only_writer, unlocked_output
 
 _PERIOD_S = 0.3
 
@@ -32,23 +29,34 @@ class CompleteError(FileExistsError):
 
 
 @contextlib.contextmanager
-def converted(out: str | Path, *, resume: bool = False, map: Any = None, keep_recording: bool = False) -> Iterator[Path]:
+def converted(
+    out: str | Path, *, resume: bool = False, map: Any = None, trim_idle: bool | None = None, keep_recording: bool = False, quiet: bool = False
+) -> Iterator[Path]:
     """A folder to record to. At the end of the block the recording becomes the LeRobot data set ``out``, if it is complete.
 
     Args:
         out: Folder of the data set.
         resume: Whether the recording may exist.
         map: Features and cameras, as in :func:`mjsense.export_lerobot`.
+        trim_idle: Leave out idle steps, as in :func:`mjsense.export_lerobot`.
         keep_recording: Keep the recording, ``OUT.recording``, when the data set is complete.
+        quiet: Do not print how many steps are left out.
 
     Raises:
         CompleteError: ``resume`` is True, and the data set is complete.
-        FileExistsError: ``resume`` is False, and ``out`` or ``OUT.recording`` exists.
+        FileExistsError: ``resume`` is False, and ``out`` or ``OUT.recording`` exists; or another process writes ``out``.
+        FileNotFoundError, ValueError: ``map`` is not a mapping.
     """
-    final = Path(out)
-    folder, removed = (final.with_name(f"{final.name}{end}") for end in (".recording", ".removed"))
+    final, mapping = Path(out), Mapping.of(map)
     for module in ("av", "pyarrow"):
         needs(module)
+    with only_writer(final), _converted(final, resume, {"map": mapping, "trim_idle": trim_idle}, keep_recording, quiet) as folder:
+        yield folder
+
+
+@contextlib.contextmanager
+def _converted(final: Path, resume: bool, options: dict[str, Any], keep_recording: bool, quiet: bool) -> Iterator[Path]:
+    folder, removed = (final.with_name(f"{final.name}{end}") for end in (".recording", ".removed"))
     shutil.rmtree(removed, ignore_errors=True)
     if final.is_dir() and any(final.iterdir()):
         if not resume:
@@ -57,13 +65,15 @@ def converted(out: str | Path, *, resume: bool = False, map: Any = None, keep_re
         raise CompleteError(f"{final} is complete")
     if folder.exists() and not resume:
         raise FileExistsError(f"{folder} contains an unfinished recording: continue it with resume (--resume), or delete it")
-    conversion = _Conversion(folder, final, map)
+    conversion = _Conversion(folder, final, options)
     conversion.start()
     try:
         yield folder
     finally:
         conversion.end()
     if final.exists():
+        if conversion.writer is not None and not quiet:
+            conversion.writer.print_trimming()
         _remove(folder, removed, keep_recording)
 
 
@@ -77,9 +87,10 @@ def _remove(folder: Path, removed: Path, keep: bool) -> None:
 class _Conversion(threading.Thread):
     """Writes the data set while the recording grows."""
 
-    def __init__(self, recording: Path, out: Path, map: Any) -> None:
+    def __init__(self, recording: Path, out: Path, options: dict[str, Any]) -> None:
         super().__init__(name="mjsense-lerobot", daemon=True)
-        self._recording, self._out, self._map = recording, out, map
+        self._recording, self._out, self._options = recording, out, options
+        self.writer: Writer | None = None
         self._ended, self._error = threading.Event(), None
 
     def end(self) -> None:
@@ -107,8 +118,7 @@ class _Conversion(threading.Thread):
         return not any(self._recording.glob("house_*/.recording"))
 
     def _convert(self) -> None:
-        with contextlib.suppress(_UnfinishedError), new_output(self._out) as path:
-            writer: Writer | None = None
+        with contextlib.suppress(_UnfinishedError), unlocked_output(self._out) as path:
             abouts: list[tuple[Any, ...]] = []
             done: list[Path] = []
             while True:
@@ -121,43 +131,27 @@ class _Conversion(threading.Thread):
                         break
                     done.append(file)
                     try:
-                        source = Source(file, map=self._map)
+                        source = Source(file, **self._options)
                     except ValueError:  # no episode with a step
                         continue
-                    writer = writer or Writer(source, path, DEFAULT_FRAMES, self._histograms)
+                    self.writer = self.writer or Writer(source, path)
                     abouts.append((source.features, source.cameras, source.fps, source.robot))
                     for episode in source.episodes:
-                        writer.add(episode, source)
+                        self.writer.add(episode, source)
                 if ended:
                     break
                 self._ended.wait(_PERIOD_S)
             if not self._complete():
                 raise _UnfinishedError
-            if writer is None or any(about != abouts[0] for about in abouts) or done != files:
+            if self.writer is None or any(about != abouts[0] for about in abouts) or done != files:
                 # Files have different features, for example because a move group never acts in one: only all together decide them.
                 shutil.rmtree(path, ignore_errors=True)
-                whole = Source(self._recording, map=self._map)
-                writer = Writer(whole, path, DEFAULT_FRAMES, self._histograms)
+                whole = Source(self._recording, **self._options)
+                self.writer = Writer(whole, path)
                 for episode in whole.episodes:
-                    writer.add(episode)
-            writer.close()
+                    self.writer.add(episode)
+            self.writer.close()
             _sync(path)
-
-    def _histograms(self, path: Path, length: int, frames: int | Literal["key"]) -> tuple[np.ndarray, int]:
-        """The histograms of a video, kept in a file."""
-        kept = self._recording / f"statistics/{path.parent.name}_{path.name}.npy"
-        with contextlib.suppress(FileNotFoundError, ValueError, EOFError):
-            counts = np.load(kept)
-            return counts[:3], int(counts[3, 0])
-        counts, images = frame_histograms(path, length, frames)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        part = kept.with_suffix(".part")
-        with part.open("wb") as file:
-            np.save(file, np.concatenate([counts, np.full((1, counts.shape[1]), images)]))
-            file.flush()
-            os.fsync(file.fileno())
-        part.rename(kept)
-        return counts, images
 
 
 class _UnfinishedError(Exception):

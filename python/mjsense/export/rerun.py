@@ -6,20 +6,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense._arguments import checked
 from mjsense._png import png_of
+from mjsense.dataset import Episode
 from mjsense.export.images import depth_unit, depth_videos, to_uint16
-from mjsense.export.mapping import Source
+from mjsense.export.mapping import Mapping, Source
 from mjsense.export.output import join_folders, needs, new_output
 from mjsense.export.scene import Shape, bodies
-
-if TYPE_CHECKING:
-    from mjsense.dataset import Episode
-    from mjsense.export.mapping import Mapping
 
 
 @checked
@@ -56,7 +53,7 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     """Writes the files of all episodes to the new folder ``path``."""
     rr = needs("rerun", "rerun")
     path.mkdir()
-    for i, episode in enumerate(source.episodes):
+    for episode in source.each(progress):
         name = f"episode_{episode.index:08d}"
         stream = rr.RecordingStream("mjsense", recording_id=f"{source.name}_{name}")
         stream.save(path / f"{name}.rrd", default_blueprint=_blueprint(source, episode))
@@ -69,8 +66,6 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
         _log_depth(rr, stream, source, episode)
         _log_scene(rr, stream, source, episode)
         stream.disconnect()
-        if progress is not None:
-            progress(i + 1, len(source))
 
 
 join = join_folders

@@ -8,19 +8,16 @@ import re
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense._arguments import checked
 from mjsense._png import png_of
+from mjsense.dataset import Episode
 from mjsense.export.images import FLAGS, depth_unit, depth_videos, to_uint16
-from mjsense.export.mapping import Source
+from mjsense.export.mapping import Mapping, Source
 from mjsense.export.output import needs, new_output
-
-if TYPE_CHECKING:
-    from mjsense.dataset import Episode
-    from mjsense.export.mapping import Mapping
 
 _VERSION = "1.0.0"
 _SHARD_BYTES = 200_000_000
@@ -35,7 +32,7 @@ def export_rlds(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
-    trim_idle: bool = False,
+    trim_idle: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG.
@@ -46,13 +43,15 @@ def export_rlds(
         map: Which streams become which features: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+            places an object.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
+    source.print_trimming()
     _write_data_set(source, _records(source, progress), Path(out))
     return Path(out)
 
@@ -136,7 +135,7 @@ def _features(source: Source) -> dict[str, Any]:
     for name, video in depth_videos(source, source.episodes[0]).items() if source.episodes else ():
         observation[f"{name}_depth"] = _image("uint16", (*video.shape[1:], 1), f"Distance to the camera plane in units of {depth_unit(video)} m; 0: no measurement.")
     steps = {"pythonClassName": f"{_MODULE}dataset_feature.Dataset", "sequence": {"feature": _dict({"observation": _dict(observation), **step}), "length": "-1"}}
-    metadata = {"file_path": _text(), "outcome": _text(), "success": _tensor("bool"), "seed": _tensor("int64")}
+    metadata = {"file_path": _text(), "outcome": _text(), "success": _tensor("bool"), "seed": _tensor("int64"), "trimmed_steps": _tensor("int64")}
     return _dict({"steps": steps, "episode_metadata": _dict(metadata)})
 
 
@@ -165,6 +164,7 @@ def _example(source: Source, episode: Episode) -> bytes:
     values["episode_metadata/outcome"] = [episode.outcome.encode()]
     values["episode_metadata/success"] = np.array([episode.success])
     values["episode_metadata/seed"] = np.array([episode.seed or 0])
+    values["episode_metadata/trimmed_steps"] = np.array([episode.trimmed_steps])
     entries = [_field(1, _field(1, name.encode()) + _field(2, _feature(value))) for name, value in sorted(values.items())]
     return _field(1, b"".join(entries))
 
@@ -204,12 +204,10 @@ def _records(source: Source, progress: Callable[[int, int], None] | None = None)
         crc = checksum(content)
         return struct.pack("<I", ((crc >> 15 | crc << 17) + 0xA282EAD8) & 0xFFFFFFFF)
 
-    for i, episode in enumerate(source.episodes):
+    for episode in source.each(progress):
         data = _example(source, episode)
         length = struct.pack("<Q", len(data))
         yield length + masked(length) + data + masked(data)
-        if progress is not None:
-            progress(i + 1, len(source))
 
 
 def _read_records(path: Path) -> Iterator[bytes]:

@@ -6,20 +6,17 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense._arguments import checked
 from mjsense._gymnasium import env_id
+from mjsense.dataset import Episode, Video
 from mjsense.dataset.model_xml import model_xml
 from mjsense.export.images import FLAGS, depth_videos
-from mjsense.export.mapping import Source
+from mjsense.export.mapping import Mapping, Source
 from mjsense.export.output import needs, new_output
-
-if TYPE_CHECKING:
-    from mjsense.dataset import Episode, Video
-    from mjsense.export.mapping import Mapping
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _VALID_EVERY = 10
@@ -33,7 +30,7 @@ def export_robomimic(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
-    trim_idle: bool = False,
+    trim_idle: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
@@ -45,13 +42,15 @@ def export_robomimic(
         map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+            places an object.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
+    source.print_trimming()
     with new_output(out) as path:
         write(source, path, progress)
     return Path(out)
@@ -61,10 +60,8 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     """Writes all episodes to the new file ``path``."""
     with needs("h5py", "robomimic").File(path, "w") as file:
         models: dict[bytes, Any] = {}
-        for i, episode in enumerate(source.episodes):
+        for i, episode in enumerate(source.each(progress)):
             _write_demo(file.create_group(f"data/demo_{i}"), models, source, episode)
-            if progress is not None:
-                progress(i + 1, len(source))
         _finish(file, source)
 
 
@@ -128,7 +125,8 @@ def _write_demo(demo: Any, models: dict[bytes, Any], source: Source, episode: Ep
     """
     steps = episode.length - 1
     demo.attrs["num_samples"] = steps
-    demo.attrs["ep_meta"] = json.dumps({"lang": episode.task, "seed": episode.seed, "outcome": episode.outcome})
+    about = {"lang": episode.task, "seed": episode.seed, "outcome": episode.outcome, "trimmed_steps": episode.trimmed_steps}
+    demo.attrs["ep_meta"] = json.dumps(about)
     rows = source.rows(episode)
     demo["actions"], demo["rewards"] = rows["action"], rows["reward"][:, 0]
     for name, feature in source.features.items():

@@ -5,17 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.export.images import depth_videos
-from mjsense.export.mapping import Source
+from mjsense.export.mapping import Mapping, Source
 from mjsense.export.output import needs, new_output
-
-if TYPE_CHECKING:
-    from mjsense.export.mapping import Mapping
 
 _ROWS = 4096  # rows of a chunk of numbers
 _CHUNK_BYTES = 2_000_000  # of a chunk of images, as Diffusion Policy's own
@@ -29,7 +26,7 @@ def export_zarr(
     map: Mapping | str | Path | dict[str, Any] | None = None,
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
-    trim_idle: bool = False,
+    trim_idle: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion
@@ -41,13 +38,15 @@ def export_zarr(
         map: Which streams become which arrays: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`).
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+            places an object.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
+    source.print_trimming()
     with new_output(out) as path:
         write(source, path, progress)
     return Path(out)
@@ -61,7 +60,7 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     steps = int(ends[-1])
     arrays = {name: data.create_dataset(name, shape=(steps, feature.size), chunks=(_ROWS, feature.size), dtype=feature.dtype)
               for name, feature in source.features.items()}  # fmt: skip
-    for i, episode in enumerate(source.episodes):
+    for i, episode in enumerate(source.each(progress)):
         begin, end = int(ends[i]) - episode.length + 1, int(ends[i])
         for name, rows in source.rows(episode).items():
             arrays[name][begin:end] = rows[: end - begin]
@@ -75,8 +74,6 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
             frames = arrays[name].chunks[0]
             for t in range(0, end - begin, frames):
                 arrays[name][begin + t : min(begin + t + frames, end)] = video[t : min(t + frames, end - begin)]
-        if progress is not None:
-            progress(i + 1, len(source))
     _finish(group, source)
 
 
@@ -133,5 +130,5 @@ def _attributes(source: Source) -> dict[str, Any]:
         "fps": float(source.fps),
         "robot": source.robot,
         "names": {name: list(feature.names) for name, feature in source.features.items()},
-        "episodes": [{"task": e.task, "outcome": e.outcome, "seed": e.seed} for e in source.episodes],
+        "episodes": [{"task": e.task, "outcome": e.outcome, "seed": e.seed, "trimmed_steps": e.trimmed_steps} for e in source.episodes],
     }

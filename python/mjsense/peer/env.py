@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core, _mujoco
+from mjsense import _core, _mujoco, _mujoco_views
+from mjsense.peer.by_world import ByWorld
 from mjsense.peer.cameras import Cameras
 from mjsense.peer.robot import PeerRobot
 from mjsense.peer.task import PeerTask
@@ -19,21 +20,6 @@ if TYPE_CHECKING:
     import mujoco
 
     from mjsense.simulation import Simulation
-
-
-class _Models(Sequence):
-    """The models of the worlds, each created on first access."""
-
-    def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
-
-    def __len__(self) -> int:
-        return self._sim.num_worlds
-
-    def __getitem__(self, world: Any) -> Any:
-        if isinstance(world, slice):
-            return [self._sim.model_of(w) for w in range(*world.indices(len(self)))]
-        return self._sim.model_of(range(len(self))[world])
 
 
 class PeerEnv:
@@ -84,7 +70,7 @@ class PeerEnv:
     @property
     def mj_models(self) -> Sequence[mujoco.MjModel]:
         """A mujoco.MjModel of each world with the world's own values: :meth:`mjsense.Simulation.model_of`."""
-        return _Models(self.sim)
+        return ByWorld(self.n_batch, self.sim.model_of)
 
     @property
     def mj_model(self) -> mujoco.MjModel:
@@ -100,7 +86,7 @@ class PeerEnv:
         These are copies: writing to them does not change the worlds.
         """
         if self._copies is None:
-            self._datas = [_mujoco.data_of(model) for model in self.mj_models]
+            self._datas = [_mujoco_views.data_of(model) for model in self.mj_models]
             self._copies = self.sim._core.data_copies(self._datas)
         self._make_current()
         return self._datas
@@ -111,12 +97,12 @@ class PeerEnv:
         return self.mj_datas[self._world]
 
     def _make_current(self) -> None:
-        self.sim._follow_models()
+        self.sim._models.follow()
         if self._copies is not None:
             self.sim._core.refresh(self._copies)
 
     @contextmanager
-    def _asked(self) -> Iterator[PeerEnv]:
+    def _computing_sensors(self) -> Iterator[PeerEnv]:
         """Context in which sensors are computed: MjModel and MjData objects that they keep are current.
 
         It may be nested, because a sensor may read another.
@@ -175,8 +161,5 @@ class PeerEnv:
             picture = self.render_segmentation_frame(camera_name)
         finally:
             self._world = before
-        below = np.zeros(model.nbody, bool)
-        for body in range(root, model.nbody):  # parents come first
-            below[body] = body == root or (body > root and below[model.body_parentid[body]])
-        geoms = np.flatnonzero(below[model.geom_bodyid] & (model.geom_group < 3))
+        geoms = np.flatnonzero(_mujoco.bodies_below(model, root)[model.geom_bodyid] & (model.geom_group < 3))
         return (picture[..., 1] == _mujoco.Obj.GEOM) & np.isin(picture[..., 0], geoms)

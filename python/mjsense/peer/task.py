@@ -11,29 +11,12 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.peer import policy
+from mjsense.peer.by_world import ByWorld
 from mjsense.peer.config import PeerConfig
 from mjsense.peer.policy import PeerPolicy
 
 if TYPE_CHECKING:
     from mjsense.peer.env import PeerEnv
-
-
-class _Infos(Sequence):
-    """The task's information about each world, read on access."""
-
-    def __init__(self, view: _core.TaskView, worlds: int) -> None:
-        self._view: Any = view
-        self._worlds = worlds
-
-    def __len__(self) -> int:
-        return self._worlds
-
-    def __getitem__(self, world: Any) -> Any:
-        if isinstance(world, slice):
-            return [self[w] for w in range(*world.indices(self._worlds))]
-        if not -self._worlds <= world < self._worlds:
-            raise IndexError(world)
-        return json.loads(self._view.info(int(world) % self._worlds))
 
 
 class PeerTask:
@@ -81,7 +64,7 @@ class PeerTask:
 
     def get_info(self) -> Sequence[dict[str, Any]]:
         """The task's information about the state, by world: errors, success, step."""
-        return _Infos(self._view, self._env.n_batch)
+        return ByWorld(self._env.n_batch, lambda world: json.loads(self._view.info(world)))
 
     def get_task_objects(self, batch_index: int = 0) -> dict[str, str]:
         """Bodies by role: the grippers, then the objects of the task."""

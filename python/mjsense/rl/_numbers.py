@@ -69,11 +69,6 @@ def is_image(spec: Any) -> bool:
     return len(spec.shape) == 3 and spec.dtype == "uint8"
 
 
-def on_host(values: Any) -> np.ndarray:
-    """A NumPy array, also of a tensor on another device."""
-    return values.cpu().numpy() if hasattr(values, "detach") else values
-
-
 def stream_of(observation: Any, path: Sequence[str]) -> Any:
     """A stream of a nested observation."""
     for key in path:

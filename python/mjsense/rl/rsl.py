@@ -15,7 +15,8 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(f"mjsense.rl.rsl needs rsl-rl: pip install rsl-rl-lib ({error})", name=error.name) from error
 
-from mjsense.rl._numbers import Actions, Numbers, checked_env, on_host
+from mjsense._arrays import on_host
+from mjsense.rl._numbers import Actions, Numbers, checked_env
 
 
 class RslRlVecEnv(VecEnv):

@@ -16,7 +16,8 @@ except ModuleNotFoundError as error:
         f"mjsense.rl.sb3 needs Stable-Baselines3: pip install stable-baselines3 ({error})", name=error.name
     ) from error
 
-from mjsense.rl._numbers import Actions, Numbers, checked_env, on_host, stream_of
+from mjsense._arrays import on_host
+from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
 
 
 class SB3VecEnv(VecEnv):

@@ -32,7 +32,7 @@ def first_view(model: Any, xpos: np.ndarray, xmat: np.ndarray) -> View:
     """
     robot = [i for i in range(model.nbody) if model.body(i).name.startswith("robot_0/")] or _largest_mechanism(model)
     if not robot:
-        return free_camera(model)
+        return free_view(model)
     base = next((i for i in robot if model.body_geomnum[i] > 0), robot[0])  # mobile robots have bodies without geoms before it
     forward = xmat[base].reshape(3, 3)[:2, 0]
     yaw = float(np.arctan2(forward[1], forward[0]))
@@ -94,9 +94,7 @@ def _free(start: np.ndarray, offset: np.ndarray, centres: np.ndarray, turns: np.
     return float(hits.min()) if len(hits) else 1.0
 
 
-def free_camera(model: Any) -> View:
-    """MuJoCo's free camera."""
-    azimuth, elevation = np.radians([float(model.vis.global_.azimuth), float(model.vis.global_.elevation)])
-    forward = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    centre = np.array(model.stat.center)
-    return centre - 1.5 * float(model.stat.extent) * forward, centre, float(np.radians(float(model.vis.global_.fovy)))
+def free_view(model: Any) -> View:
+    """The view of MuJoCo's free camera."""
+    position, _ = _mujoco.free_camera(model)
+    return position, np.array(model.stat.center), float(np.radians(float(model.vis.global_.fovy)))

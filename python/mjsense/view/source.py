@@ -41,7 +41,6 @@ class LiveSource:
         self.num_worlds = sim.num_worlds
         self.period = sim.step_dt
         """Time between two steps, s."""
-        self.can_seed = True
         self.policy: bool | None = None
         """Whether the policy acts; None: there is no policy."""
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from mjsense._arguments import checked
+from mjsense._optional import optional
 from mjsense.view.layer import ShapeLayer
 from mjsense.view.stage import Stage
 
@@ -25,13 +26,9 @@ _IDLE = 0.1  # s between two looks for a browser or for events while nothing mov
 
 def import_viser() -> Any:
     """viser, or an error that says how to install it."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            import viser  # pyright: ignore[reportMissingImports]  # optional
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"The viewer needs viser: pip install 'mjsense[view]' ({error})", name=error.name) from error
-    return viser
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return optional("viser", "view", "The viewer")
 
 
 @contextlib.contextmanager

@@ -6,8 +6,9 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import numpy as np
 import warp as wp
+
+from mjsense._arrays import on_host
 
 
 @cache
@@ -23,13 +24,6 @@ def torch() -> Any:
 def share(array: wp.array) -> Any:
     """The same memory as a tensor, or the array itself without torch."""
     return array if torch() is None else wp.to_torch(array, requires_grad=False)
-
-
-def on_host(values: Any) -> np.ndarray:
-    """Values of any kind of array as a NumPy array."""
-    if isinstance(values, wp.array):
-        return values.numpy()
-    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
 
 
 def write(array: wp.array, values: Any, rows: Any = slice(None)) -> None:

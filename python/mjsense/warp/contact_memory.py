@@ -21,22 +21,22 @@ class State:
 
     dt: wp.float64
     decimation: int
-    substep: wp.array2d(dtype=wp.int32)  # type: ignore[valid-type]  # index in the control step
-    elapsed: wp.array2d(dtype=wp.float64)  # type: ignore[valid-type]  # s since the control step began
-    since: wp.array2d(dtype=wp.float64)  # type: ignore[valid-type]  # s in contact if > 0, in the air if < 0
-    touch: wp.array2d(dtype=wp.int32)  # type: ignore[valid-type]  # at the last substep
-    peak: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]  # maximum force of the control step; -1 without contact
-    current_air_time: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]
-    last_air_time: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]
-    current_contact_time: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]
-    last_contact_time: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]
-    touchdown: wp.array2d(dtype=wp.bool)  # type: ignore[valid-type]
-    liftoff: wp.array2d(dtype=wp.bool)  # type: ignore[valid-type]
-    found_any: wp.array2d(dtype=wp.bool)  # type: ignore[valid-type]
-    first_touch_time: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]
-    dist_at_peak: wp.array2d(dtype=wp.float32)  # type: ignore[valid-type]
-    force_peak: wp.array2d(dtype=wp.vec3)  # type: ignore[valid-type]
-    pos_at_peak: wp.array2d(dtype=wp.vec3)  # type: ignore[valid-type]
+    substep: wp.array2d(dtype=wp.int32)  # index in the control step
+    elapsed: wp.array2d(dtype=wp.float64)  # s since the control step began
+    since: wp.array2d(dtype=wp.float64)  # s in contact if > 0, in the air if < 0
+    touch: wp.array2d(dtype=wp.int32)  # at the last substep
+    peak: wp.array2d(dtype=wp.float32)  # maximum force of the control step; -1 without contact
+    current_air_time: wp.array2d(dtype=wp.float32)
+    last_air_time: wp.array2d(dtype=wp.float32)
+    current_contact_time: wp.array2d(dtype=wp.float32)
+    last_contact_time: wp.array2d(dtype=wp.float32)
+    touchdown: wp.array2d(dtype=wp.bool)
+    liftoff: wp.array2d(dtype=wp.bool)
+    found_any: wp.array2d(dtype=wp.bool)
+    first_touch_time: wp.array2d(dtype=wp.float32)
+    dist_at_peak: wp.array2d(dtype=wp.float32)
+    force_peak: wp.array2d(dtype=wp.vec3)
+    pos_at_peak: wp.array2d(dtype=wp.vec3)
 
 
 @wp.func
@@ -56,8 +56,8 @@ def _clear_step(state: State, w: int, p: int):
 
 @wp.kernel
 def _substep(
-    state: State, count: wp.array2d(dtype=wp.int32), norm: wp.array2d(dtype=wp.float32), force: wp.array2d(dtype=wp.vec3),  # type: ignore[valid-type]
-    dist: wp.array2d(dtype=wp.float32), pos: wp.array2d(dtype=wp.vec3),  # type: ignore[valid-type]
+    state: State, count: wp.array2d(dtype=wp.int32), norm: wp.array2d(dtype=wp.float32), force: wp.array2d(dtype=wp.vec3),
+    dist: wp.array2d(dtype=wp.float32), pos: wp.array2d(dtype=wp.vec3),
 ):  # fmt: skip
     """``norm`` and so on are those of the strongest contact of this substep."""
     w, p = wp.tid()
@@ -102,7 +102,7 @@ def _substep(
 
 
 @wp.kernel
-def _reset(mask: wp.array(dtype=wp.bool), state: State):  # type: ignore[valid-type]
+def _reset(mask: wp.array(dtype=wp.bool), state: State):
     w, p = wp.tid()
     if mask[w]:
         state.substep[w, p] = 0
@@ -118,7 +118,7 @@ def _reset(mask: wp.array(dtype=wp.bool), state: State):  # type: ignore[valid-t
 
 
 @wp.kernel
-def _push(values: wp.array3d(dtype=wp.float32), history: wp.array4d(dtype=wp.float32)):  # type: ignore[valid-type]
+def _push(values: wp.array3d(dtype=wp.float32), history: wp.array4d(dtype=wp.float32)):
     """Adds the newest values ``[B, N, dim]`` at the front of ``[B, N, H, dim]``."""
     w, n, i = wp.tid()
     h = history.shape[2] - 1
@@ -129,7 +129,7 @@ def _push(values: wp.array3d(dtype=wp.float32), history: wp.array4d(dtype=wp.flo
 
 
 @wp.kernel
-def _clear(mask: wp.array(dtype=wp.bool), history: wp.array2d(dtype=wp.float32)):  # type: ignore[valid-type]
+def _clear(mask: wp.array(dtype=wp.bool), history: wp.array2d(dtype=wp.float32)):
     w, i = wp.tid()
     if mask[w]:
         history[w, i] = 0.0

@@ -34,6 +34,7 @@ class Clock:
     last_tick: wp.array(dtype=wp.int64)  # [B]
     fresh: wp.array(dtype=bool)  # [B] no row since the reset
     first: wp.array(dtype=bool)  # [B] the first row of an episode
+    started: wp.array(dtype=wp.int64)  # [B] tick at which the episode began
     advance: wp.array(dtype=bool)  # [B] false: this tick's row is measured again
     elapsed: wp.array(dtype=wp.float64)  # [B] s since the previous row
 

@@ -73,65 +73,60 @@ class _Noise(Effect):
         self.per_element(_noise, self.stream, self.draw, OPERATIONS[self.cfg.operation], self.density, self.factor, row)
 
 
+@wp.struct
+class Bias:
+    """The bias of each episode, and its distribution."""
+
+    stream: wp.uint32
+    draw: Draw
+    operation: int
+    per_component: bool
+    value: wp.array2d(dtype=wp.float64)  # [B, size]
+    drawn: wp.array2d(dtype=bool)  # [B, size]
+
+
 @wp.func
-def _new_bias(
-    clock: Clock, stream: wp.uint32, draw: Draw, operation: int, shared: bool, w: int, i: int, old: wp.float64
-) -> wp.float64:
+def _draw_bias(clock: Clock, bias: Bias, w: int, i: int):
     component = i
-    if shared:
+    if not bias.per_component:
         component = 0
-    if clock.episode[w] <= wp.int64(1):
-        old = ZERO
-    return operate(operation, old, sample(draw, episode_rng(clock, w, stream), component, component))
+    old = ZERO
+    if clock.episode[w] > wp.int64(1):
+        old = bias.value[w, i]
+    drawn = sample(bias.draw, episode_rng(clock, w, bias.stream), component, component)
+    bias.value[w, i] = operate(bias.operation, old, drawn)
+    bias.drawn[w, i] = True
 
 
 @wp.kernel
-def _draw_bias(
-    clock: Clock,
-    mask: wp.array(dtype=bool),
-    stream: wp.uint32,
-    draw: Draw,
-    operation: int,
-    shared: bool,
-    bias: wp.array2d(dtype=wp.float64),
-    drawn: wp.array2d(dtype=bool),
-):
+def _begin_bias(clock: Clock, mask: wp.array(dtype=bool), bias: Bias):
     w, i = wp.tid()
     if mask[w]:
-        bias[w, i] = _new_bias(clock, stream, draw, operation, shared, w, i, bias[w, i])
-        drawn[w, i] = True
+        _draw_bias(clock, bias, w, i)
 
 
 @wp.kernel
-def _add_bias(
-    clock: Clock,
-    stream: wp.uint32,
-    draw: Draw,
-    operation: int,
-    shared: bool,
-    bias: wp.array2d(dtype=wp.float64),
-    drawn: wp.array2d(dtype=bool),
-    row: wp.array2d(dtype=float),
-):
+def _add_bias(clock: Clock, bias: Bias, row: wp.array2d(dtype=float)):
     w, i = wp.tid()
-    if not drawn[w, i]:
-        bias[w, i] = _new_bias(clock, stream, draw, operation, shared, w, i, bias[w, i])
-        drawn[w, i] = True
-    row[w, i] = float(wp.float64(row[w, i]) + bias[w, i])
+    if not bias.drawn[w, i]:
+        _draw_bias(clock, bias, w, i)
+    row[w, i] = float(wp.float64(row[w, i]) + bias.value[w, i])
 
 
 class _EpisodeBias(Effect):
     def initialize(self) -> None:
-        self.bias = self.zeros(self.num_worlds, self.size, dtype=wp.float64)
-        self.drawn = self.zeros(self.num_worlds, self.size, dtype=bool)
-        draw = draw_of(self.cfg.draw, self.size, self.device)
-        self.fixed = (self.stream, draw, OPERATIONS[self.cfg.operation], not self.cfg.per_component, self.bias, self.drawn)
+        cfg, bias = self.cfg, Bias()
+        bias.stream, bias.draw = self.stream, draw_of(cfg.draw, self.size, self.device)
+        bias.operation, bias.per_component = OPERATIONS[cfg.operation], cfg.per_component
+        bias.value = self.zeros(self.num_worlds, self.size, dtype=wp.float64)
+        bias.drawn = self.zeros(self.num_worlds, self.size, dtype=bool)
+        self.bias = bias
 
     def reset(self, mask: wp.array) -> None:
-        self.per_element(_draw_bias, mask, *self.fixed)
+        self.per_element(_begin_bias, mask, self.bias)
 
     def apply(self, row: wp.array) -> None:
-        self.per_element(_add_bias, *self.fixed, row)
+        self.per_element(_add_bias, self.bias, row)
 
 
 @wp.kernel
@@ -220,16 +215,27 @@ class _Quantize(Effect):
         self.per_element(_quantize, self.step, row)
 
 
+@wp.struct
+class Axes:
+    """The matrix of each episode that misaligns the axes, and its distribution."""
+
+    stream: wp.uint32
+    scale_error: wp.vec3d
+    angle: wp.vec3d  # rad
+    scale_error_std: wp.float64
+    angle_std: wp.float64
+    matrix: wp.array(dtype=wp.mat33d)  # [B]
+    drawn: wp.array(dtype=bool)  # [B]
+
+
 @wp.func
-def _new_matrix(
-    clock: Clock, stream: wp.uint32, scale: wp.vec3d, angle: wp.vec3d, scale_std: wp.float64, angle_std: wp.float64, w: int
-) -> wp.mat33d:
-    rng = episode_rng(clock, w, stream)
+def _draw_axes(clock: Clock, axes: Axes, w: int):
+    rng = episode_rng(clock, w, axes.stream)
     s = wp.vec3d()
     a = wp.vec3d()
     for k in range(3):
-        s[k] = ONE + scale[k] + scale_std * normal(rng, k)
-        a[k] = angle[k] + angle_std * normal(rng, 3 + k)
+        s[k] = ONE + axes.scale_error[k] + axes.scale_error_std * normal(rng, k)
+        a[k] = axes.angle[k] + axes.angle_std * normal(rng, 3 + k)
     cx = wp.cos(a[0])
     sx = wp.sin(a[0])
     cy = wp.cos(a[1])
@@ -237,7 +243,7 @@ def _new_matrix(
     cz = wp.cos(a[2])
     sz = wp.sin(a[2])
     # diag(s) Rz Ry Rx
-    return wp.mat33d(
+    axes.matrix[w] = wp.mat33d(
         s[0] * (cz * cy),
         s[0] * (cz * sy * sx - sz * cx),
         s[0] * (cz * sy * cx + sz * sx),
@@ -248,43 +254,22 @@ def _new_matrix(
         s[2] * (cy * sx),
         s[2] * (cy * cx),
     )
+    axes.drawn[w] = True
 
 
 @wp.kernel
-def _draw_matrix(
-    clock: Clock,
-    mask: wp.array(dtype=bool),
-    stream: wp.uint32,
-    scale: wp.vec3d,
-    angle: wp.vec3d,
-    scale_std: wp.float64,
-    angle_std: wp.float64,
-    matrix: wp.array(dtype=wp.mat33d),
-    drawn: wp.array(dtype=bool),
-):
+def _begin_axes(clock: Clock, mask: wp.array(dtype=bool), axes: Axes):
     w = wp.tid()
     if mask[w]:
-        matrix[w] = _new_matrix(clock, stream, scale, angle, scale_std, angle_std, w)
-        drawn[w] = True
+        _draw_axes(clock, axes, w)
 
 
 @wp.kernel
-def _misalign(
-    clock: Clock,
-    stream: wp.uint32,
-    scale: wp.vec3d,
-    angle: wp.vec3d,
-    scale_std: wp.float64,
-    angle_std: wp.float64,
-    matrix: wp.array(dtype=wp.mat33d),
-    drawn: wp.array(dtype=bool),
-    row: wp.array2d(dtype=float),
-):
+def _misalign(clock: Clock, axes: Axes, row: wp.array2d(dtype=float)):
     w = wp.tid()
-    if not drawn[w]:
-        matrix[w] = _new_matrix(clock, stream, scale, angle, scale_std, angle_std, w)
-        drawn[w] = True
-    m = matrix[w]
+    if not axes.drawn[w]:
+        _draw_axes(clock, axes, w)
+    m = axes.matrix[w]
     for k in range(row.shape[1] // 3):
         x = wp.float64(row[w, 3 * k])
         y = wp.float64(row[w, 3 * k + 1])
@@ -295,23 +280,17 @@ def _misalign(
 
 class _Misalignment(Effect):
     def initialize(self) -> None:
-        cfg = self.cfg
-        matrix, drawn = self.zeros(self.num_worlds, dtype=wp.mat33d), self.zeros(self.num_worlds, dtype=bool)
-        self.fixed = (
-            self.stream,
-            wp.vec3d(*cfg.scale_error),
-            wp.vec3d(*cfg.angle),
-            cfg.scale_error_std,
-            cfg.angle_std,
-            matrix,
-            drawn,
-        )
+        cfg, axes = self.cfg, Axes()
+        axes.stream, axes.scale_error, axes.angle = self.stream, wp.vec3d(*cfg.scale_error), wp.vec3d(*cfg.angle)
+        axes.scale_error_std, axes.angle_std = cfg.scale_error_std, cfg.angle_std
+        axes.matrix, axes.drawn = self.zeros(self.num_worlds, dtype=wp.mat33d), self.zeros(self.num_worlds, dtype=bool)
+        self.axes = axes
 
     def reset(self, mask: wp.array) -> None:
-        self.per_world(_draw_matrix, mask, *self.fixed)
+        self.per_world(_begin_axes, mask, self.axes)
 
     def apply(self, row: wp.array) -> None:
-        self.per_world(_misalign, *self.fixed, row)
+        self.per_world(_misalign, self.axes, row)
 
 
 @wp.kernel

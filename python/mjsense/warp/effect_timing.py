@@ -233,7 +233,8 @@ class _Rate(Effect):
 @wp.kernel
 def _lose(clock: Clock, stream: wp.uint32, probability: wp.float64, arrived: wp.array(dtype=bool)):
     w = wp.tid()
-    arrived[w] = clock.first[w] or uniform(step_rng(clock, w, stream), 0) >= probability
+    # Without memory, the first row that is read may be a later one than the first of the episode.
+    arrived[w] = clock.tick[w] == clock.started[w] or uniform(step_rng(clock, w, stream), 0) >= probability
 
 
 @wp.kernel

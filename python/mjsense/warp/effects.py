@@ -43,6 +43,7 @@ def _start_episodes(mask: wp.array(dtype=bool), clock: Clock):
     w = wp.tid()
     if mask[w]:
         clock.fresh[w] = True
+        clock.started[w] = clock.tick[w]
 
 
 @wp.kernel
@@ -103,7 +104,7 @@ class Chain:
         clock = self.clock = Clock()
         clock.seed, clock.key, clock.tick, clock.episode = worlds.seed, worlds.key, worlds.tick, worlds.episode
         clock.tick_s = worlds.physics_dt
-        clock.last_tick = wp.zeros(count, dtype=wp.int64, device=device)
+        clock.last_tick, clock.started = (wp.zeros(count, dtype=wp.int64, device=device) for _ in range(2))
         clock.fresh = wp.full(count, True, dtype=bool, device=device)
         clock.first, clock.advance = (wp.zeros(count, dtype=bool, device=device) for _ in range(2))
         clock.elapsed = wp.zeros(count, dtype=wp.float64, device=device)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from mjsense import _core
+from mjsense._written_rows import WrittenRows
 from mjsense.sensor import Sensor
 
 
@@ -18,21 +18,16 @@ class HostRows:
     def __init__(self, sensors: Sequence[Any], fields: Sequence[Mapping[str, wp.array]], num_worlds: int, device: Any) -> None:
         """``fields``: the arrays of each sensor."""
         self._copies: list[tuple[wp.array, slice, np.ndarray]] = []
-        self.handles: list[Any] = []
-        """C++ handles of the streams, which have the names, units and frames of those of a simulation on the CPU."""
-        size = 0
+        streams, size = WrittenRows(num_worlds), 0
         for sensor, arrays in zip(sensors, fields):
             for name, array in arrays.items():
-                rows = self._stream(sensor, name, num_worlds)
+                rows = streams.add_spec(*stream_of(sensor, name))
                 self._copies.append((array, slice(size, size + rows.nbytes), rows))
                 size += -(-rows.nbytes // 16) * 16
+        self.handles = streams.handles
+        """C++ handles of the streams, which have the names, units and frames of those of a simulation on the CPU."""
         self._device = wp.empty(size, dtype=wp.uint8, device=device)
         self._host = wp.empty(size, dtype=wp.uint8, device="cpu", pinned=wp.get_device(device).is_cuda)
-
-    def _stream(self, sensor: Any, field: str, num_worlds: int) -> np.ndarray:
-        """Adds a stream and returns its rows, which read() writes."""
-        self.handles.append(_core.written_rows(*stream_of(sensor, field), num_worlds))
-        return self.handles[-1].arrays(writable=True)[""]
 
     def read(self) -> None:
         """Copies the current rows of all worlds."""

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from mjsense import _core
+from mjsense._arrays import on_host
+from mjsense._written_values import numbers
 from mjsense.configs import SceneCfg
 from mjsense.scene import Scene
 from mjsense.simulation import Simulation
 from mjsense.task import Task, WorldState
 from mjsense.vector import TaskVectorEnv
-from mjsense.warp.arrays import on_host, torch
+from mjsense.warp.arrays import torch
 from mjsense.warp.host_rows import stream_of
 from mjsense.warp.scene_robot import SceneRobot
 
@@ -37,6 +39,8 @@ class WarpTaskVectorEnv(TaskVectorEnv):
         return rollout
 
     def _numbers(self, actions: Any) -> Any:
+        if not torch().is_tensor(actions):
+            actions = numbers("actions", actions)
         return torch().as_tensor(actions, dtype=torch().float32, device=self._device)
 
     def _copy(self, rows: Any) -> Any:

@@ -50,7 +50,9 @@ class Worlds:
     key: wp.array
     """Key of each world's random numbers, uint32 ``[B]``."""
     substep: wp.array
-    """Physics steps since each world's reset, int64 ``[B]``; its time is ``substep * physics_dt``."""
+    """Physics steps since each world's reset, int64 ``[B]``."""
+    start: wp.array
+    """The time is ``start + substep * physics_dt``; a reset and a written time change it, s, float64 ``[B]``."""
     tick: wp.array
     """Physics steps since the last seeding, int64 ``[B]``."""
     episode: wp.array
@@ -87,6 +89,8 @@ class WarpSensor:
     """True if update() must run once in each control step, even if the sensor is not read."""
     wants_substep = False
     """True if substep() must run after every physics step."""
+    stores_writes = False
+    """True if substep() must also run after the state was written; it replaces what it stored at that time."""
     substep_fills_rows = False
     """True if the rows are complete after the last substep(), without update()."""
     on_host = False

@@ -3,36 +3,24 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import mujoco_warp as mjw
 import numpy as np
 import warp as wp
 
-from mjsense import _mujoco, data
+from mjsense import _mujoco
 from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense._arrays import ids_of_worlds, on_host
 from mjsense._randomizable import check_randomizable, valid_values
+from mjsense.errors import did_you_mean
 from mjsense.sensor import Sensor
-from mjsense.warp import (
-    arrays,
-    builtin,
-    camera,
-    contact,
-    effect_sensor,
-    host_rows,
-    imu,
-    kernels,
-    lidar,
-    limits,
-    physics,
-    rays,
-    user,
-)
-from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, scalar_view, unsupported
-from mjsense.warp.state import MEMORY, STATE, Component, DerivedFields, ids_of
+from mjsense.warp import arrays, builtin, host_rows, kernels, limits, physics
+from mjsense.warp.graphs import Graphs
+from mjsense.warp.scene_sensors import SceneSensors
+from mjsense.warp.sensor import Worlds, scalar_view, unsupported
+from mjsense.warp.state import MEMORY, STATE, Component, DerivedFields
 from mjsense.warp.stepper import FINITE, Stepper
 from mjsense.warp.world_models import WorldModels
 
@@ -40,32 +28,12 @@ if TYPE_CHECKING:
     from mjsense.scene import Scene
     from mjsense.simulation import Simulation
 
-__all__ = [
-    "WarpSimulation",
-    "builtin",
-    "camera",
-    "contact",
-    "effect_sensor",
-    "imu",
-    "lidar",
-    "rays",
-]  # each registers its sensors
-
-
 @checked
 class WarpSimulation(KnownAttributes):
     """B parallel worlds of a scene on mujoco_warp, made by ``mjs.Simulation(scene, num_worlds, backend="warp", device="cuda:0")``.
 
     Arrays are on the device: torch tensors if torch is installed, otherwise ``wp.array``. After ``step()``, ``reset()`` and
     ``forward()``, every sensor belongs to the current state.
-
-    Attributes:
-        scene: The scene that all worlds share; ``sim.scene["name"].data`` is a sensor's measurement.
-        num_worlds: Number of worlds, ``B``.
-        decimation: Physics steps (substeps) per control step.
-        physics_dt: Duration of a physics step, s.
-        step_dt: Duration of a control step, s.
-        device: Name of the device, ``"cuda:0"``.
     """
 
     def __init__(
@@ -88,8 +56,9 @@ class WarpSimulation(KnownAttributes):
             raise ValueError(f"num_worlds must be at least 1, not {num_worlds}")
         self._device = arrays.device_of(device)
         self.device = str(self._device)
-        """Name of the device."""
+        """Name of the device, ``"cuda:0"``."""
         self.scene: Scene = compiled.scene
+        """The scene that all worlds share; ``sim.scene["name"].data`` is a sensor's measurement."""
         self.num_worlds = num_worlds
         """Number of worlds, ``B``."""
         self.decimation: int = compiled.decimation
@@ -102,10 +71,8 @@ class WarpSimulation(KnownAttributes):
         self._seed = int(compiled.seed)
         self._closed = False
         self._failures: list[tuple[int, str]] = []
-        self._graphs: dict[Any, Any] = {}
+        self._graphs = Graphs(self._device, enabled=self._device.is_cuda)
         self._views: dict[str, Any] = {}
-        self._moment = 1  # changes with every change of the state
-        self._forces_at = 0  # the moment of the current forces
         self._behind = False  # True after step_raw(): derived quantities belong to the state before the step
         model: Any = compiled.model
         with wp.ScopedDevice(self._device):
@@ -123,107 +90,30 @@ class WarpSimulation(KnownAttributes):
             self._models = WorldModels(self._model, self._data, self._device, self._graphs.clear)
             self._every_world = wp.full(num_worlds, True, dtype=wp.bool)
             self._time = wp.zeros(num_worlds, dtype=wp.float64)
-            self._make_sensors()
+            self._sensors = SceneSensors(self, self._worlds, self._stepper, self._graphs)
         self._complete = True
-        for sensor in self._sensors.values():
-            if isinstance(sensor, user.UserSensor):
-                sensor.initialize()
+        self._sensors.initialize()
         self.reset()
 
     # ---------------------------------------------------------------------------------------------------------- sensors
-
-    def _make_sensors(self) -> None:
-        reader = self._reader = _Reader(self)
-        self._sensors: dict[str, WarpSensor] = self._worlds.sensors
-        self._moments: dict[str, int] = {}
-        for name in list(self.scene.sensors):
-            self._make_sensor(name, reader)
-        for made in self._sensors.values():
-            if made.every_step:
-                self._use(made)
-        substepped = self._stepper.substepped = [made for made in self._sensors.values() if made.wants_substep]
-        self._stepper.substep_stage = max((made.needs for made in substepped), default=Stage.NONE)
-
-    def _make_sensor(self, name: str, reader: _Reader) -> None:
-        if name in self._sensors:
-            return
-        sensor: Any = self.scene.sensors[name]
-        if isinstance(sensor, Sensor):
-            self._sensors[name] = user.UserSensor(self._worlds, sensor, self, reader)
-            return
-        if sensor.kind == "contact_field" and not contact.has_field(self._worlds, name):
-            del self.scene._sensors[name]
-            return
-        if sensor.kind == "effect":
-            self._make_sensor(sensor.cfg.sensor, reader)
-        make = REGISTRY.get(sensor.kind)
-        if make is None:
-            raise unsupported(name, f"a sensor of kind {sensor.kind}")
-        sensor._bind(self._compiled._core)  # so that its values in the compiled world can be read
-        made = self._sensors[name] = make(self._worlds, sensor)
-        sensor._core = reader
-        shared = {field: arrays.share(array) for field, array in made.fields.items()}
-        sensor._fields = MappingProxyType(shared)
-        sensor._data = shared[""] if "" in shared else data.make_data(data.DATA_OF_KIND.get(sensor.kind, data.SensorData), shared)
-
-    def _use(self, sensor: WarpSensor) -> None:
-        """Computes this sensor with every step from now on."""
-        for source in sensor.inputs:
-            self._use(source)
-        if sensor not in self._stepper.used and not sensor.on_host:
-            self._stepper.used.append(sensor)
-            self._graphs.clear()
-
-    def _refresh(self, sensor: WarpSensor, again: bool = False) -> None:
-        """Computes the sensor for the current state if it is not up to date, or ``again``."""
-        self._check_open()
-        if self._moments.get(sensor.name) != self._moment or again:
-            self._compute(sensor)
-        if (check := getattr(sensor, "check", None)) is not None:
-            check()
-
-    def _compute(self, sensor: WarpSensor) -> None:
-        for source in sensor.inputs:
-            self._refresh(source)
-        with wp.ScopedDevice(self._device):
-            if sensor.needs == Stage.ACC:
-                self._need_forces()
-            sensor.update()
-        self._moments[sensor.name] = self._moment
-        self._use(sensor)
-
-    def _need_forces(self) -> None:
-        """Computes accelerations and forces unless they belong to the current state."""
-        if self._forces_at != self._moment:
-            with wp.ScopedDevice(self._device):
-                physics.compute_forces(self._model, self._data)
-            self._forces_at = self._moment
 
     def add(self, sensor: Any) -> Any:
         """Adds a sensor written in Python that is not part of the scene, and returns it. Others belong in ``SceneCfg.sensors``."""
         self._check_open()
         if not isinstance(sensor, Sensor):
             raise NotImplementedError(f"Simulation.add() is for sensors written in Python with backend='warp', not {sensor!r}")
-        if sensor._mjs_core is not None:
-            raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
-        if sensor.uuid in self._sensors:
-            raise ValueError(f"sensor '{sensor.uuid}': there is one of that name already")
-        with wp.ScopedDevice(self._device):
-            made = user.UserSensor(self._worlds, sensor, self, self._reader)
-        made.initialize()
-        self._sensors[sensor.uuid] = made
+        self._sensors.add(sensor)
         return sensor
 
     def refresh(self, sensors: Sequence[Any]) -> None:
         """Computes several sensors (as returned by ``scene["name"]``)."""
         for sensor in sensors:
-            self._refresh(self._sensors[sensor.uuid if isinstance(sensor, Sensor) else sensor.name])
+            self._sensors.refresh(self._sensors.by_name[sensor.uuid if isinstance(sensor, Sensor) else sensor.name])
 
     def _host_rows(self, sensors: Sequence[Any]) -> host_rows.HostRows:
         """The rows of these sensors for a recorder."""
-        return host_rows.HostRows(
-            sensors, [self._sensors[sensor.name].fields for sensor in sensors], self.num_worlds, self._device
-        )
+        fields = [self._sensors.by_name[sensor.name].fields for sensor in sensors]
+        return host_rows.HostRows(sensors, fields, self.num_worlds, self._device)
 
     # ---------------------------------------------------------------------------------------------------------- physics
 
@@ -236,17 +126,13 @@ class WarpSimulation(KnownAttributes):
         if self._behind:
             self.forward()
         for _ in range(control_steps):
-            self._moment += 1
-            stepper = self._stepper
-            self._run("step", stepper.control_step)
-            if stepper.substep_stage == Stage.ACC or any(sensor.needs == Stage.ACC for sensor in stepper.used):
-                self._forces_at = self._moment
-            self._moments.update((sensor.name, self._moment) for sensor in stepper.used)
+            self._sensors.state_changed()
+            self._graphs.run("step", self._stepper.control_step)
+            self._sensors.computed_by_step()
             self._report()
             failures += self._failures
-            for sensor in self._sensors.values():
-                if sensor.on_host:
-                    sensor.substep()
+            for sensor in self._sensors.on_host:
+                sensor.substep()
         self._failures = failures
 
     def step_raw(self, substeps: int = 1) -> None:
@@ -254,10 +140,9 @@ class WarpSimulation(KnownAttributes):
         self._check_open()
         for _ in range(substeps):
             behind = self._behind
-            self._run("step_raw behind" if behind else "step_raw", lambda: self._stepper.raw_step(behind))
+            self._graphs.run("step_raw behind" if behind else "step_raw", lambda: self._stepper.raw_step(behind))
             self._behind = True
-        self._moment += 1
-        self._forces_at = self._moment
+        self._sensors.state_changed(has_forces=True)
         self._report()
 
     def update_sensors(self, dt: float = 0.0) -> None:
@@ -268,32 +153,15 @@ class WarpSimulation(KnownAttributes):
                 f"update_sensors(): dt is {dt} s, and the timestep is {self.physics_dt} s; others are not available with backend='warp'"
             )
         with wp.ScopedDevice(self._device):
-            for sensor in [*self._stepper.substepped, *(sensor for sensor in self._sensors.values() if sensor.on_host)]:
+            for sensor in (*self._stepper.substepped, *self._sensors.on_host):
                 sensor.substep()
 
     def reset_sensors(self, world_ids: Any = None) -> None:
         """Resets the sensors' episode state in these worlds without resetting the physics."""
         mask = self._mask(world_ids)
-        self._moment += 1
-        if self._behind:
-            self._forces_at = self._moment
+        self._sensors.state_changed(has_forces=self._behind)
         with wp.ScopedDevice(self._device):
             self._stepper.reset_sensors(mask, on_host=True)
-
-    def _run(self, name: str, function: Callable[[], None]) -> None:
-        """Calls the function, on CUDA devices as a graph from the second call on."""
-        with wp.ScopedDevice(self._device):
-            if not self._device.is_cuda:
-                function()
-            elif name not in self._graphs:
-                function()  # compiles the kernels and allocates
-                self._graphs[name] = None
-            else:
-                if self._graphs[name] is None:
-                    with wp.ScopedCapture() as capture:
-                        function()
-                    self._graphs[name] = capture.graph
-                wp.capture_launch(self._graphs[name])
 
     def reset(self, world_ids: Any = None, *, seed: Seed | None = None, key: int | str | None = None) -> None:
         """Starts a new episode.
@@ -346,12 +214,11 @@ class WarpSimulation(KnownAttributes):
 
     def _settle(self) -> None:
         """Makes derived quantities and sensors those of the state."""
-        self._moment += 1
+        self._sensors.state_changed()
         self._behind = False
         self._stepper.settle()
-        for sensor in self._stepper.used:
-            if sensor.every_step:
-                self._refresh(sensor)
+        self._stepper.store_again()
+        self._sensors.refresh_every_step()
         self._report()
 
     def _report(self) -> None:
@@ -366,9 +233,8 @@ class WarpSimulation(KnownAttributes):
             self._failures.append((world, f"{', '.join(names)}: NaN, infinity or a number beyond 1e10; the world was reset"))
         if self._failures:
             failed = arrays.share(self._stepper.failed)
-            for sensor in self._sensors.values():
-                if sensor.on_host:
-                    sensor.reset(failed)
+            for sensor in self._sensors.on_host:
+                sensor.reset(failed)
         if (status & kernels.OVERFLOW).any():
             limits.check_overflow(self._data, self._limits)
         stale = np.flatnonzero(status & kernels.STALE)
@@ -383,18 +249,25 @@ class WarpSimulation(KnownAttributes):
     def set_state(self, world_ids: Any = None, *, forward: bool = True, **components: Any) -> None:
         """Writes components of the state, ``set_state(qpos=..., qvel=...)``, then calls forward().
 
-        Values are on the device or not, with the shape ``[n]`` (the same for every world) or ``[worlds, n]``.
+        Values are on the device or not, with the shape ``[n]`` (the same for every world) or ``[worlds, n]``; ``time`` (s) is a
+        number or has the shape ``[worlds]``. Sensors' update periods, histories and delays count the steps since the reset,
+        whatever ``time`` is.
         """
         self._check_open()
-        ids = None if world_ids is None else ids_of(world_ids, self.num_worlds)
+        ids = None if world_ids is None else ids_of_worlds(world_ids, self.num_worlds)
         rows, count = (slice(None), self.num_worlds) if ids is None else (ids, len(ids))
         for name, value in components.items():
             array = self._component(name)
             shape = tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
             if shape not in ((count, *array.shape[1:]), array.shape[1:], (1, *array.shape[1:])):
                 raise ValueError(f"{name}: shape {shape} is neither {(count, *array.shape[1:])} nor {array.shape[1:]}")
+        if not np.isfinite(on_host(components.get("time", 0.0))).all():
+            raise ValueError("time: values must be finite")
         for name, value in components.items():
             arrays.write(self._component(name), value, rows)
+        if "time" in components:
+            with wp.ScopedDevice(self._device):
+                self._stepper.set_times(self._mask(world_ids), self._time)
         if forward:
             self.forward(world_ids)
 
@@ -413,10 +286,10 @@ class WarpSimulation(KnownAttributes):
         self._check_open()
         if name == "ctrl":
             return self._stepper.ctrl
+        if name == "time":
+            return self._current_times()
         if name not in STATE:
-            near = difflib.get_close_matches(name, [*STATE, "ctrl"], 3)
-            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join([*STATE, 'ctrl'])}"
-            raise ValueError(f"the state has no component '{name}'; {hint}")
+            raise ValueError(f"the state has no component '{name}'{did_you_mean(name, [*STATE, 'ctrl', 'time'], 'there are')}")
         return scalar_view(getattr(self._data, name))
 
     def _shared(self, name: str) -> Any:
@@ -442,10 +315,14 @@ class WarpSimulation(KnownAttributes):
 
     @property
     def time(self) -> Any:
-        """Simulation time of each world since its reset, s, float64 ``[B]``; an exact multiple of the substep."""
+        """Simulation time of each world, s, float64 ``[B]``; overwritten by the next read. It is 0 after a reset, or the keyframe's
+        time, and ``set_state(time=...)`` changes it. Unless it began elsewhere than at 0, it is an exact multiple of the substep."""
+        return arrays.share(self._current_times())
+
+    def _current_times(self) -> wp.array:
         with wp.ScopedDevice(self._device):
-            wp.launch(kernels.times, self.num_worlds, [self.physics_dt, self._worlds.substep, self._time])
-        return arrays.share(self._time)
+            wp.launch(kernels.times, self.num_worlds, [self.physics_dt, self._worlds.substep, self._worlds.start, self._time])
+        return self._time
 
     @property
     def failures(self) -> list[tuple[int, str]]:
@@ -473,12 +350,12 @@ class WarpSimulation(KnownAttributes):
         self._check_open()
         check_randomizable(self._compiled.model, field)
         self._models.array(field)
-        for sensor in self._sensors.values():
+        for sensor in self._sensors.by_name.values():
             if field in sensor.fixed_fields:
                 raise unsupported(sensor.name, f"randomize('{field}')")
-        rows = np.arange(self.num_worlds) if world_ids is None else ids_of(world_ids, self.num_worlds)
+        rows = np.arange(self.num_worlds) if world_ids is None else ids_of_worlds(world_ids, self.num_worlds)
         like = np.zeros((len(rows), *getattr(self.model, field).shape), np.float32)
-        values = valid_values(self._compiled.model, field, arrays.on_host(values), like, rows)
+        values = valid_values(self._compiled.model, field, on_host(values), like, rows)
         self._models.write(field, values, rows)
         self.forward(world_ids)
 
@@ -493,7 +370,7 @@ class WarpSimulation(KnownAttributes):
         if world_ids is None:
             return self._every_world
         mask = np.zeros(self.num_worlds, bool)
-        mask[ids_of(world_ids, self.num_worlds)] = True
+        mask[ids_of_worlds(world_ids, self.num_worlds)] = True
         return wp.array(mask, dtype=wp.bool, device=self._device)
 
     def _key_row(self, key: int | str | None) -> int:
@@ -541,30 +418,11 @@ class WarpSimulation(KnownAttributes):
         raise AttributeError(f"{type(self).__name__} has no attribute '{name}'")
 
 
-class _Reader:
-    """What the Python objects of the scene's sensors call to read their arrays."""
-
-    def __init__(self, sim: WarpSimulation) -> None:
-        self._sim = sim
-        self.meansize = float(sim.model.stat.meansize)
-
-    @property
-    def closed(self) -> bool:
-        return self._sim.closed
-
-    def refresh(self, handle: Any, again: bool = False) -> None:
-        self._sim._refresh(self._sim._sensors[handle.name], again)
-
-    def draw(self, *_: Any) -> Any:
-        raise NotImplementedError("debug drawing is not available with backend='warp'; use backend='cpu'")
-
-
 def _worlds(compiled: Simulation, model: mjw.Model, data: mjw.Data, device: Any) -> Worlds:
     """What sensors can read, with all clocks at 0."""
     count = data.nworld
     seed, key = wp.array([compiled.seed], dtype=wp.uint64), wp.array(np.arange(count), dtype=wp.uint32)
     substep, tick, episode = (wp.zeros(count, dtype=wp.int64) for _ in range(3))
-    first = wp.zeros(count, dtype=wp.bool)
-    return Worlds(
-        compiled, model, data, count, device, compiled.decimation, compiled.physics_dt, seed, key, substep, tick, episode, first
-    )
+    start, first = wp.zeros(count, dtype=wp.float64), wp.zeros(count, dtype=wp.bool)
+    clocks = seed, key, substep, start, tick, episode, first
+    return Worlds(compiled, model, data, count, device, compiled.decimation, compiled.physics_dt, *clocks)

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 import warp as wp
 
+from mjsense.errors import did_you_mean
 from mjsense.warp import arrays
 from mjsense.warp.sensor import scalar_view
 
@@ -35,7 +35,15 @@ class Component:
         return self if sim is None else sim._shared(self._name)
 
     def __set__(self, sim: WarpSimulation, value: Any) -> None:
-        arrays.write(sim._component(self._name), value)
+        array = sim._component(self._name)
+        shape = tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
+        try:
+            fits = np.broadcast_shapes(shape, array.shape) == tuple(array.shape)
+        except ValueError:
+            fits = False
+        if not fits:
+            raise ValueError(f"{self._name}: shape {shape} does not broadcast to {tuple(array.shape)}")
+        arrays.write(array, value)
 
 
 class DerivedFields:
@@ -57,25 +65,9 @@ class DerivedFields:
             return sim._shared(name)
         array = getattr(sim._data, name, None)
         if not isinstance(array, wp.array):
-            near = difflib.get_close_matches(name, dir(self), 3)
-            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-            raise AttributeError(f"mujoco_warp's Data has no array '{name}'{hint}")
-        sim._need_forces()
+            raise AttributeError(f"mujoco_warp's Data has no array '{name}'{did_you_mean(name, dir(self))}")
+        sim._sensors.need_forces()
         return arrays.share(scalar_view(array))
-
-
-def ids_of(world_ids: Any, count: int) -> np.ndarray:
-    ids = arrays.on_host(world_ids)
-    if ids.dtype == bool:
-        if ids.shape != (count,):
-            raise ValueError(f"world_ids: a mask of shape {ids.shape} for {count} worlds")
-        return np.flatnonzero(ids)
-    if ids.size and not np.issubdtype(ids.dtype, np.integer):
-        raise TypeError(f"world_ids must be integers or a mask, not {world_ids!r}")
-    for world in ids.reshape(-1).tolist():
-        if not 0 <= world < count:
-            raise ValueError(f"world id {world}: must be in [0, {count})")
-    return ids.reshape(-1).astype(np.int64)
 
 
 def start_states(model: Any, rows: dict[str, wp.array]) -> dict[str, wp.array]:

@@ -46,6 +46,8 @@ class Stepper:
         self._known = {name: wp.clone(self.rows[name]) for name in _DERIVED_FROM}
         self.starts = start_states(worlds.compiled.model, self.rows)
         """Components of the state after a reset, ``[1 + nkey, n]``: the model's own pose, then its keyframes."""
+        times = np.concatenate([[0.0], worlds.compiled.model.key_time])
+        self._start_times = worlds.array(times, wp.float64)
         self.start_row = worlds.zeros(B, wp.int32)
         self._own_row = wp.array(np.arange(B), dtype=wp.int32, device=worlds.device)
 
@@ -68,6 +70,7 @@ class Stepper:
                 sensor.substep()
         self._remember()
         self.reset_sensors(self.failed)
+        self.store_again()
         self._update_used(has_forces)
 
     def raw_step(self, behind: bool) -> None:
@@ -98,6 +101,17 @@ class Stepper:
         self._begin_episode(mask)
         self.reset_sensors(mask, on_host=True)
 
+    def set_times(self, mask: wp.array, times: wp.array) -> None:
+        """Gives these worlds their times, float64 ``[B]``."""
+        w = self.worlds
+        wp.launch(kernels.set_times, w.num_worlds, [mask, w.physics_dt, w.substep, times, w.start, w.data.time])
+
+    def store_again(self) -> None:
+        """Sensors that cast rays from earlier poses store those of the current state, which was reset or written."""
+        for sensor in self.substepped:
+            if sensor.stores_writes:
+                sensor.substep()
+
     def apply_ctrl(self, mask: wp.array) -> None:
         """Gives the physics of these worlds the controls of the next step."""
         self._launch(kernels.copy_rows, "ctrl", [mask, self._own_row, self._next_ctrl, self.rows["ctrl"]])
@@ -123,7 +137,7 @@ class Stepper:
         """``last``: the next episode of worlds that fail begins now."""
         w = self.worlds
         physics.integrate(w.model, w.data)
-        wp.launch(kernels.advance_clocks, w.num_worlds, [w.physics_dt, w.substep, w.tick, w.first, w.data.time])
+        wp.launch(kernels.advance_clocks, w.num_worlds, [w.physics_dt, w.substep, w.tick, w.first, w.start, w.data.time])
         self._restore_failed(begin=last)
 
     def _update_used(self, has_forces: bool) -> None:
@@ -151,7 +165,8 @@ class Stepper:
 
     def _begin_episode(self, mask: wp.array) -> None:
         w = self.worlds
-        wp.launch(kernels.begin_episode, w.num_worlds, [mask, w.substep, w.episode, w.first, w.data.time])
+        inputs = [mask, self.start_row, self._start_times, w.substep, w.episode, w.first, w.start, w.data.time]
+        wp.launch(kernels.begin_episode, w.num_worlds, inputs)
 
     def _remember(self) -> None:
         for name, known in self._known.items():

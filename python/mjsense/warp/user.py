@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from mjsense._arrays import on_host
 from mjsense._rows import leaves, nested, rows_of_space
 from mjsense._user_code import named, required, takes
 from mjsense.warp import arrays
@@ -84,7 +85,7 @@ class UserSensor(WarpSensor):
     def reset(self, mask: Any) -> None:
         if not self._started:
             return
-        worlds: Sequence[int] = np.flatnonzero(arrays.on_host(mask)).tolist()
+        worlds: Sequence[int] = np.flatnonzero(on_host(mask)).tolist()
         with named(self.name, "reset"):
             if not takes(self.sensor.reset, 1):
                 self.sensor.reset()

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import typing
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from mjsense import _core
+from mjsense.errors import did_you_mean
 from mjsense.warp import physics
 
 _SET_CONST = (
@@ -37,10 +37,9 @@ class WorldModels:
         """The array of a field that can differ between worlds, with the leading dimension 1 or B."""
         by_world = _fields()
         if field not in by_world:
-            near = difflib.get_close_matches(field, by_world, 3)
-            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
             raise ValueError(
-                f"{field}: not a field of the model that can differ between worlds with backend='warp'{hint} There are {', '.join(by_world)}"
+                f"{field}: not a field of the model that can differ between worlds with backend='warp'{did_you_mean(field, by_world)} "
+                f"There are {', '.join(by_world)}"
             )
         return getattr(self._model, field)
 

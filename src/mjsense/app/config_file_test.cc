@@ -13,6 +13,7 @@
 #include "mjsense/app/record_command.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense::app {
@@ -102,12 +103,7 @@ TEST(ConfigFile, EveryKeySetsItsOptionOnly) {
 
 TEST(ConfigFile, WrongKeysAndTypesAreErrors) {
   const auto fault = [](const std::string& toml) -> std::string {
-    try {
-      read(toml);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return error_of([&] { read(toml); });
   };
   EXPECT_THAT(fault("seed = 1\nsamles = 2\n"),
               HasSubstr(":2: no key named 'samles'; did you mean 'samples'?"));

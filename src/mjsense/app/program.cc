@@ -54,6 +54,18 @@ void list_names(CLI::App& app) {
   list_names(app.get_option("--policy"), rollout::policy_names());
 }
 
+// Throws if the words that the command did not expect include an option.
+void throw_unknown_option(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  for (const std::string& word : command.remaining()) {
+    if (const std::string name = word.substr(0, word.find('=')); name.starts_with("--"))
+      throw_unknown(command.get_name(), "option", name, names);
+  }
+}
+
 Choices choices() {
   Choices choices;
   add_choices(struct_of<rollout::RecordJobCfg>(), choices);
@@ -80,6 +92,9 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
       ->type_name("FILE");
   app.add_flag_callback(
       "--no-sheet", [&options] { options.sheet = false; }, "Do not write a contact sheet.");
+  app.add_flag_callback(
+         "--no-tree", [&options] { options.tree = false; }, "Do not print the tree of the files.")
+      ->group("");
   // Options of the Python package, which handles a command with --ray or --format itself.
   const auto add_python = [&](const char* name, const char* type, const char* help) {
     app.add_option_function<std::string>(
@@ -102,13 +117,19 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
              "With --ray: Python packages that workers install, separated by commas.");
   add_python("--format", "FORMAT", "lerobot: write a LeRobot data set (v3.0) instead of HDF5.");
   add_python("--map", "FILE", "With --format: TOML file that chooses features and cameras.");
-  app.add_flag_callback(
-      "--keep-recording",
-      [] {
-        throw ValueError(
-            "--keep-recording needs the Python package and --format: run python -m mjsense record");
-      },
-      "With --format: keep the recording itself too.");
+  auto add_python_flag = [&](const char* name, const char* help) {
+    app.add_flag_callback(
+        name,
+        [name] {
+          throw ValueError(fmt::format(
+              "{} needs the Python package and --format: run python -m mjsense record", name));
+        },
+        help);
+  };
+  add_python_flag("--trim-idle", "With --format: leave out the steps in which nothing moves.");
+  add_python_flag("--no-trim-idle",
+                  "With --format: keep these steps in episodes whose task places an object too.");
+  add_python_flag("--keep-recording", "With --format: keep the recording itself too.");
   app.add_flag("--json", options.json, "Print the summary as JSON.");
   app.add_flag("-q,--quiet", options.quiet, "Print nothing but errors.");
   add_examples(app, {{"mjsense record pick --episodes 8 --worlds 4 --out data",
@@ -345,6 +366,7 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
+    for (const CLI::App* command : program.get_subcommands()) throw_unknown_option(*command);
     throw ValueError(
         fmt::format("{}; see mjsense{} --help", e.what(), word.starts_with('-') ? "" : " " + word));
   }

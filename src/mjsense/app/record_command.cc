@@ -84,7 +84,7 @@ struct Sheet {
   std::string path, shows;
 };
 
-std::string summary_text(const rollout::RecordSummary& s, const Sheet& sheet) {
+std::string summary_text(const rollout::RecordSummary& s, const Sheet& sheet, bool tree) {
   const rollout::RecordProgress& p = s.progress;
   const int ended = p.succeeded + p.failed;
   std::string out;
@@ -108,7 +108,7 @@ std::string summary_text(const rollout::RecordSummary& s, const Sheet& sheet) {
     out += fmt::format("  (in parallel: encoders {:.1f} s, files {:.1f} s)\n",
                        s.record.encode_cpu_s, s.record.write_s + s.record.commit_s);
   }
-  if (std::filesystem::exists(s.house_dir)) {
+  if (tree && std::filesystem::exists(s.house_dir)) {
     out += fmt::format("\n{}{} in total\n", tree_text(s.house_dir.string()),
                        bytes_text(static_cast<double>(bytes_below(s.house_dir))));
   }
@@ -171,7 +171,7 @@ int run_record(const RecordOptions& options) {
   if (options.json) {
     fmt::print("{}", summary_json(summary, sheet));
   } else if (!options.quiet) {
-    fmt::print("{}", summary_text(summary, sheet));
+    fmt::print("{}", summary_text(summary, sheet, options.tree));
   }
   for (const std::string& damage : summary.damage) print_stderr("mjsense: {}\n", damage);
   if (summary.interrupted) {

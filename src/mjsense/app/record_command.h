@@ -14,6 +14,7 @@ struct RecordOptions {
   bool json = false;
   bool quiet = false;
   bool sheet = true;  // write the contact sheet
+  bool tree = true;   // print the tree of the files
 };
 
 // Exit code: 0 all wanted episodes are on disk, 1 some are not.

@@ -10,6 +10,7 @@
 
 #include "mjsense/cameras/visibility.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/rays/ray_scene.h"
 
@@ -185,7 +186,7 @@ std::string CameraSystem::make_visible(int camera, const World& world, Rng& rng,
   const double wanted = cfg_.cameras[camera].min_visible;
   if (wanted == 0) return "";
   const int body = world.model->cam_bodyid[ids_[camera]];
-  const Pose mount{vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+  const Pose mount = body_pose(world.data, body);
   Lens in_world{mount * lens.pose, lens.fovy};
   const double shown = lowest_visible_share(camera, world, in_world, objects);
   if (shown >= wanted) return "";

@@ -12,6 +12,8 @@
 #include "mjsense/cameras/frozen_cameras.h"
 #include "mjsense/cameras/visibility.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
@@ -93,8 +95,7 @@ struct Bench {
     Pose found;
     Hooks hooks([&](const World& w) {
       const int id = mj_name2id(w.model, mjOBJ_CAMERA, camera);
-      if (w.id == world)
-        found = pose_from_mat(w.data->cam_xpos + 3 * id, w.data->cam_xmat + 9 * id);
+      if (w.id == world) found = camera_pose(w.data, id);
     });
     sim->worlds().visit(worlds::all_worlds, hooks);
     return found;
@@ -380,12 +381,7 @@ TEST(CameraSystem, ErrorsNameTheCamera) {
     cfg.cameras = {mount("eye_1", kind)};
     cfg.cameras[0].pos = {1, 0, 0};
     change(cfg.cameras[0]);
-    try {
-      CameraSystem(cfg, "robot_0/", "base");
-    } catch (const ValueError& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return error_of<ValueError>([&] { CameraSystem(cfg, "robot_0/", "base"); });
   };
   EXPECT_THAT(fault([](auto& c) { c.camera = ""; }, MountKind::kMjcf), HasSubstr("camera 'eye_1'"));
   EXPECT_THAT(fault([](auto& c) { c.camera = "x"; }, MountKind::kBody),

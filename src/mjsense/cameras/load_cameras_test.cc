@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/data_file.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense::cameras {
@@ -19,16 +20,6 @@ using ::testing::HasSubstr;
 
 constexpr char kCamera[] =
     "[[cameras]]\nname = 'eye'\nmount = 'fixed'\npos = [1, 0, 1]\nfovy = 50\n";
-
-template <class Body>
-std::string fault(Body&& body) {
-  try {
-    body();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
-}
 
 // Every embedded file of every robot is valid.
 TEST(LoadCameras, EveryEmbeddedSystemIsReadable) {
@@ -55,12 +46,12 @@ TEST(LoadCameras, LoadsSystemsOfARobotOnDisk) {
   EXPECT_THAT(camera_system_names(robot), ElementsAre("corner"));
   EXPECT_EQ(load_camera_system("corner", robot).cameras.at(0).name, "eye");
   EXPECT_EQ(load_camera_system(dir.file("mine.toml"), robot).width, 32);
-  EXPECT_THAT(fault([&] { (void)load_camera_system("corn", robot); }),
+  EXPECT_THAT(error_of([&] { (void)load_camera_system("corn", robot); }),
               HasSubstr("did you mean 'corner'?"));
-  EXPECT_THAT(fault([&] { (void)load_camera_system(dir.file("no.toml"), robot); }),
+  EXPECT_THAT(error_of([&] { (void)load_camera_system(dir.file("no.toml"), robot); }),
               HasSubstr("no such file"));
   std::ofstream(dir.path / "wrong.toml") << "[[cameras]]\nname = 'a'\nmonut = 'fixed'\n";
-  EXPECT_THAT(fault([&] { (void)load_camera_system(dir.file("wrong.toml"), robot); }),
+  EXPECT_THAT(error_of([&] { (void)load_camera_system(dir.file("wrong.toml"), robot); }),
               HasSubstr("'monut'; did you mean 'mount'"));
 }
 

@@ -13,6 +13,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/system/thread_pool.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/text/json.h"
 #include "mjsense/core/text/utf8.h"
 
@@ -28,12 +29,8 @@ TEST(Array, RowOfWrongTypeThrows) {
   EXPECT_THROW(a.row<double>(2), RuntimeError);
   EXPECT_THROW(a.row<std::int32_t>(0), RuntimeError);
   EXPECT_THROW(a.all<std::uint8_t>(), RuntimeError);
-  try {
-    std::as_const(a).row<double>(0);
-    FAIL();
-  } catch (const RuntimeError& e) {
-    EXPECT_STREQ(e.what(), "an array (3, 2) of float32 cannot be read as float64");
-  }
+  EXPECT_EQ(error_of<RuntimeError>([&] { std::as_const(a).row<double>(0); }),
+            "an array (3, 2) of float32 cannot be read as float64");
 }
 
 TEST(Array, SharesMemoryIfRowsHaveEqualSize) {

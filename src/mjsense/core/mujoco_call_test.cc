@@ -7,21 +7,13 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/memory_limit.h"
 
 namespace mjsense {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::string error_of(auto&& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
-}
 
 TEST(MujocoCall, ReturnsTheResult) {
   EXPECT_EQ(call_mujoco(mju_springDamper, 1, 0, 0, 1, 0), mju_springDamper(1, 0, 0, 1, 0));

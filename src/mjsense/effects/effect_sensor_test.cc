@@ -4,12 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <memory>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/noise.h"
+#include "mjsense/effects/testing/bench.h"
 #include "mjsense/effects/timing.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
@@ -157,12 +160,7 @@ TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
 
 TEST(EffectSensor, ErrorsNameSensorsAndFields) {
   const auto message = [](EffectSensorCfg cfg) -> std::string {
-    try {
-      sim::Simulation sim(make_scene(std::move(cfg)), {});
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { sim::Simulation sim(make_scene(std::move(cfg)), {}); });
   };
   EffectSensorCfg cfg;
   cfg.name = "x";
@@ -173,6 +171,33 @@ TEST(EffectSensor, ErrorsNameSensorsAndFields) {
   cfg.sensor = "robot/gyro";
   cfg.fields = {"force"};
   EXPECT_THAT(message(cfg), HasSubstr("no field of 'robot/gyro' named 'force'"));
+}
+
+TEST(EffectSensor, InvalidEffectsAreRefusedAtBuild) {
+  const auto message = [](Effects effects) -> std::string {
+    EffectSensorCfg cfg;
+    cfg.name = "noisy";
+    cfg.sensor = "clean";
+    cfg.effects = std::move(effects);
+    return error_of<ValueError>([&] { cfg.build(); });
+  };
+  const double nan = std::nan("");
+  EXPECT_EQ(message(one(Dropout(0.5))), "");
+  EXPECT_EQ(message(one(Dropout(2))),
+            "sensor 'noisy': effects[0]: probability is 2: must be between 0 and 1");
+  EXPECT_THAT(message({nullptr}), HasSubstr("effects[0] is null"));
+  StepDelay lags(2, 1);
+  BiasDrift drift;
+  drift.std = {-1};
+  Misalignment tilt;
+  tilt.angle = {nan, 0, 0};
+  for (const Effects& wrong :
+       {one(Noise(Draw::gaussian({nan}))), one(Noise(Draw::uniform({1}, {0}))),
+        one(Noise(Draw::constant({}))), one(EpisodeBias(Draw::gaussian({-1}))), one(drift),
+        one(Scale({nan})), one(tilt), one(Clip({2}, {1})), one(Quantize({-1})), one(Delay(nan)),
+        one(lags), one(Rate(nan)), one(Dropout(nan))}) {
+    EXPECT_THAT(message(wrong), HasSubstr("sensor 'noisy': effects[0]"));
+  }
 }
 
 }  // namespace

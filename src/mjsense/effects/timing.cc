@@ -177,11 +177,16 @@ void Dropout::initialize(const EffectInit& init) {
   if (mode == Mode::kNan) check_numeric(init);
   row_bytes_ = init.size * dtype_size(init.dtype);
   if (mode == Mode::kHold) held_.assign(init.num_worlds * row_bytes_, std::byte{0});
+  started_.assign(init.num_worlds, 0);
   stream_ = init.stream;
 }
 
+void Dropout::reset(const EffectTime& moment) { started_[moment.world] = moment.tick; }
+
 void Dropout::apply(const EffectTime& moment, const EffectRow& row) {
-  const bool lost = !moment.first && moment.rng(stream_).uniform() < probability;
+  // Without memory, the first row that is read may be a later one than the first of the episode.
+  const bool first = mode == Mode::kHold ? moment.first : moment.tick == started_[moment.world];
+  const bool lost = !first && moment.rng(stream_).uniform() < probability;
   if (mode == Mode::kHold) {
     std::byte* held = held_.data() + moment.world * row_bytes_;
     std::memcpy(lost ? row.data : held, lost ? held : row.data, row_bytes_);

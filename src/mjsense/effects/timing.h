@@ -166,13 +166,15 @@ struct Dropout : Effect {
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Dropout>(*this); }
   std::string kind() const override { return "dropout"; }
   void initialize(const EffectInit& init) override;
+  void reset(const EffectTime& moment) override;
   void apply(const EffectTime& moment, const EffectRow& row) override;
   bool needs_every_step() const override { return mode == Mode::kHold; }
 
  private:
   std::uint32_t stream_ = 0;
   std::size_t row_bytes_ = 0;
-  std::vector<std::byte> held_;  // [B, row]
+  std::vector<std::byte> held_;        // [B, row]
+  std::vector<std::int64_t> started_;  // [B] tick at which the episode began
 };
 template <class V>
 void visit_fields(V& v, Dropout& c) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/named.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/observe/pose_sensor.h"
@@ -57,8 +58,7 @@ std::shared_ptr<Sensor> body_poses_sensor(const Task& task, const std::string& n
         for (const NamedBody& one : bodies) {
           const int body = one.body(world.id);
           if (body < 0) continue;
-          const Pose pose =
-              to_base * Pose{vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+          const Pose pose = to_base * body_pose(world.data, body);
           const Vec3 x = rotate(pose.q, {1, 0, 0}), y = rotate(pose.q, {0, 1, 0}),
                      z = rotate(pose.q, {0, 0, 1});
           json.key(one.name).begin_array();

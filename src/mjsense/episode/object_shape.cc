@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
@@ -104,23 +105,14 @@ void sample_geom(const mjModel* model, int geom, double spacing, std::vector<Vec
   }
 }
 
-// Pose of a body's frame in the frame of `root`, at the model's reference configuration.
-Pose body_in(const mjModel* model, int body, int root) {
-  Pose pose;
-  for (; body != root; body = model->body_parentid[body])
-    pose = Pose{vec3(model->body_pos + 3 * body), quat(model->body_quat + 4 * body)} * pose;
-  return pose;
-}
-
 }  // namespace
 
 ObjectShape object_shape(const mjModel* model, int body, double spacing) {
   ObjectShape shape;
   for (int g = 0; g < model->ngeom; ++g) {
-    if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    if (!observe::is_descendant_or_self(model, model->geom_bodyid[g], body)) continue;
-    const Pose pose = body_in(model, model->geom_bodyid[g], body) *
-                      Pose{vec3(model->geom_pos + 3 * g), quat(model->geom_quat + 4 * g)};
+    const int own = model->geom_bodyid[g];
+    if (!is_solid(model, g) || !observe::is_descendant_or_self(model, own, body)) continue;
+    const Pose pose = in_ancestor(model, {}, own, body) * geom_frame(model, g);
     std::vector<Vec3> local;
     sample_geom(model, g, spacing, local);
     for (Vec3 p : local) shape.points.push_back(pose * p);

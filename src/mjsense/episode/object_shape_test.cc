@@ -7,18 +7,14 @@
 #include <string>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scene/mj_spec.h"
+#include "mjsense/core/testing/test_model.h"
 
 namespace mjsense::episode {
 namespace {
 
-scene::ModelPtr compile(const std::string& geoms) {
-  const std::string xml =
-      "<mujoco><worldbody><body><freejoint/>" + geoms + "</body></worldbody></mujoco>";
-  char error[500] = "";
-  const scene::SpecPtr spec(mj_parseXMLString(xml.c_str(), nullptr, error, sizeof(error)));
-  if (!spec) throw ValueError(error);
-  return scene::ModelPtr(mj_compile(spec.get(), nullptr));
+ModelPtr compile(const std::string& geoms) {
+  return compile_mjcf("<mujoco><worldbody><body><freejoint/>" + geoms +
+                      "</body></worldbody></mujoco>");
 }
 
 // Maximum distance of a point from the surface; `distance` returns the distance of one point.

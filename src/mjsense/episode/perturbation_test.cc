@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/scene.h"
 
@@ -63,7 +64,7 @@ struct Perturbed : ::testing::Test {
   scene::Scene scene{scene_cfg()};
   const mjModel* model = scene.model();
   robots::Robot robot{robots::robot_cfg("franka"), model, 1};
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{mj_makeData(model), mj_deleteData};
+  DataPtr data = make_data(model);
   World world{.id = 0, .model = model, .data = data.get()};
   Perturbation perturbation;
 };

@@ -8,6 +8,7 @@
 #include <new>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
 namespace mjsense::hdf5 {
@@ -50,16 +51,13 @@ TEST(InChild, KilledChildIsNotReportedAsDamage) {
 
 // An intact file must not be reported as damaged because the machine was busy.
 TEST(InChild, BusyMachineIsNotReportedAsDamage) {
-  try {
-    static_cast<void>(in_child(
-        "x.h5", 0, [] { return pause() == 0 ? std::string() : std::string(); }, 1));
-    FAIL();
-  } catch (const ReaderInterrupted& e) {
-    EXPECT_STREQ(
-        e.what(),
-        "x.h5: reading it was stopped after 1 s, of which 0 s were CPU time: the machine or the "
-        "disk is busy");
-  }
+  EXPECT_EQ(
+      error_of<ReaderInterrupted>([&] {
+        static_cast<void>(in_child(
+            "x.h5", 0, [] { return pause() == 0 ? std::string() : std::string(); }, 1));
+      }),
+      "x.h5: reading it was stopped after 1 s, of which 0 s were CPU time: the machine or the "
+      "disk is busy");
 }
 
 // As in a daemon: the pipe of the answer gets the numbers of closed standard streams.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/hdf5/untrusted_file.h"
 
@@ -40,12 +41,7 @@ Id dataset(hid_t file, const Id& properties) {
 }
 
 std::string complaint(hid_t made) {
-  try {
-    check_chunks(made, "x");
-  } catch (const RuntimeError& e) {
-    return e.what();
-  }
-  return "";
+  return error_of<RuntimeError>([&] { check_chunks(made, "x"); });
 }
 
 class Chunks : public ::testing::Test {

@@ -316,6 +316,13 @@ void set_attribute(hid_t object, const char* name, std::uint64_t value) {
   write_attribute(object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, scalar(), &value);
 }
 
+void set_attribute(hid_t object, const char* name, std::span<const std::uint64_t> values,
+                   std::span<const hsize_t> dims) {
+  const Id space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), H5Sclose,
+                 name);
+  write_attribute(object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, space, values.data());
+}
+
 bool has_attribute(hid_t object, const char* name) { return H5Aexists(object, name) > 0; }
 
 std::string text_attribute(hid_t object, const char* name) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -87,6 +88,8 @@ void set_attribute(hid_t object, const char* name, std::string_view value);
 void set_attribute(hid_t object, const char* name, double value);
 void set_attribute(hid_t object, const char* name, std::int64_t value);
 void set_attribute(hid_t object, const char* name, std::uint64_t value);
+void set_attribute(hid_t object, const char* name, std::span<const std::uint64_t> values,
+                   std::span<const hsize_t> dims);
 // Creates a text attribute whose value is written later. Creating it together with the other
 // attributes of its object makes it a third cheaper.
 Id create_text_attribute(hid_t object, const char* name);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense::hdf5 {
@@ -15,15 +16,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-std::string complaint(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const RuntimeError& e) {
-    return e.what();
-  }
-  return "";
-}
 
 class Guard : public ::testing::Test {
  protected:
@@ -37,10 +29,10 @@ class Guard : public ::testing::Test {
   }
   Id bytes(const std::string& name) { return bytes(name, {3}, dataset_properties()); }
   std::string storage(const Id& dataset) {
-    return complaint([&] { check_storage(dataset, "x"); });
+    return error_of<RuntimeError>([&] { check_storage(dataset, "x"); });
   }
   std::string walk() {
-    return complaint([&] { each_dataset(file_, [](const std::string&) {}); });
+    return error_of<RuntimeError>([&] { each_dataset(file_, [](const std::string&) {}); });
   }
 
   H5Lock lock_;
@@ -64,8 +56,9 @@ TEST_F(Guard, LinksAreNotFollowed) {
   ASSERT_GE(H5Lcreate_soft("/real", file_, "group", H5P_DEFAULT, H5P_DEFAULT), 0);
   EXPECT_FALSE(exists(file_, "soft"));
   EXPECT_FALSE(exists(file_, "group/x"));
-  EXPECT_THAT(complaint([&] { (void)open_dataset(file_, "soft"); }), HasSubstr("'soft' is a soft"));
-  EXPECT_THAT(complaint([&] { (void)open_dataset(file_, "group/x"); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)open_dataset(file_, "soft"); }),
+              HasSubstr("'soft' is a soft"));
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)open_dataset(file_, "group/x"); }),
               HasSubstr("'group' is a soft link, which is not followed"));
   EXPECT_THAT(walk(), HasSubstr("is a soft link, which is not followed"));
 
@@ -73,7 +66,7 @@ TEST_F(Guard, LinksAreNotFollowed) {
   ASSERT_GE(H5Lcreate_external(dir_.file("other.h5").c_str(), "/", file_, "outside", H5P_DEFAULT,
                                H5P_DEFAULT),
             0);
-  EXPECT_THAT(complaint([&] { (void)open_group(file_, "outside"); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)open_group(file_, "outside"); }),
               HasSubstr("'outside' is an external link"));
 }
 
@@ -103,7 +96,7 @@ TEST_F(Guard, DataInOtherFilesIsNotRead) {
   ASSERT_GE(H5Tset_size(text, 3), 0);
   const Id secret(H5Dcreate2(file_, "text", text, one, link_properties(), elsewhere, H5P_DEFAULT),
                   H5Dclose, "text");
-  EXPECT_THAT(complaint([&] { read_text(file_, "text"); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { read_text(file_, "text"); }),
               HasSubstr("is stored in external files"));
 
   const Id composed = dataset_properties();
@@ -136,15 +129,15 @@ TEST_F(Guard, ReadsRowsOfBytes) {
   const Id written = bytes("x");
   ASSERT_GE(H5Dwrite(written, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, "abc"), 0);
   EXPECT_EQ(read_bytes(file_, "x", 3), "abc");
-  EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "x", 2); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)read_bytes(file_, "x", 2); }),
               HasSubstr("has 3 bytes, expected at most 2"));
   bytes("table", {2, 2}, dataset_properties());
-  EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "table", 100); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)read_bytes(file_, "table", 100); }),
               HasSubstr("is not a one-dimensional array of bytes"));
-  EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "missing", 3); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)read_bytes(file_, "missing", 3); }),
               HasSubstr("'missing' does not exist"));
   create_group(file_, "group");
-  EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "group", 3); }),
+  EXPECT_THAT(error_of<RuntimeError>([&] { (void)read_bytes(file_, "group", 3); }),
               HasSubstr("is not a dataset"));
 }
 

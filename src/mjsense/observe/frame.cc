@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 
 namespace mjsense::observe {
 
@@ -21,8 +22,8 @@ void BodyRef::resolve(const mjModel* model, std::string_view context) {
 }
 
 Pose Frame::pose(const mjData* data) const {
-  if (type == mjOBJ_BODY) return {vec3(data->xpos + 3 * id), quat(data->xquat + 4 * id)};
-  return pose_from_mat(data->site_xpos + 3 * id, data->site_xmat + 9 * id);
+  if (type == mjOBJ_BODY) return body_pose(data, id);
+  return site_pose(data, id);
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/observe/shared_field.h"
 #include "mjsense/observe/testing/world.h"
 #include "mjsense/scene/scene.h"
@@ -25,15 +26,6 @@ class Picture : public Sensor {
   }
   void compute(const World&) override {}
 };
-
-std::string error_of(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
-}
 
 TEST(Suite, KeepsOrderAndNamesBothOwnersOfADuplicate) {
   SensorSuite suite;

@@ -15,8 +15,6 @@
 namespace mjsense::rays {
 namespace {
 
-using testing::TestModel;
-
 class ManyGeoms : public testing::EveryKernel {};
 INSTANTIATE_TEST_SUITE_P(Isas, ManyGeoms, testing::every_isa(), testing::isa_of);
 
@@ -82,8 +80,6 @@ TEST_P(ManyGeoms, BlocksDoNotChangeHits) {
         ASSERT_EQ(focused.t[i], expected.t[i]) << n << " " << i;
         hits += found.geom[i] > 0;
       }
-      ASSERT_EQ(scene.occluded(0, filter, rays, scratch) != 0,
-                std::ranges::any_of(std::span(expected.geom), [](int g) { return g >= 0; }));
     }
     // Move the bodies far from where the blocks were computed.
     for (int j = 0; j < m.model->njnt; ++j) {

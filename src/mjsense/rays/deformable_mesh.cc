@@ -2,7 +2,6 @@
 #include "mjsense/rays/deformable_mesh.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "mjsense/rays/mesh_geometry.h"
 
@@ -27,19 +26,6 @@ void refit_scene(RTCScene scene) {
   rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
   rtcCommitGeometry(geometry);
   rtcCommitScene(scene);
-}
-
-void box_around(std::span<const float> points, float box[6]) {
-  constexpr float kEndless = std::numeric_limits<float>::infinity();
-  for (int k = 0; k < 3; ++k) {
-    float low = kEndless, high = -kEndless;
-    for (std::size_t i = k; i < points.size(); i += 3) {
-      low = std::min(low, points[i]);
-      high = std::max(high, points[i]);
-    }
-    box[k] = 0.5f * (low + high);
-    box[3 + k] = 0.5f * (high - low);
-  }
 }
 
 DeformableMesh::DeformableMesh(RTCDevice device, std::span<const int> faces,

@@ -39,7 +39,4 @@ SceneHandle moving_scene(RTCDevice device, RTCGeometry geometry);
 // Call after the geometry's vertices have moved.
 void refit_scene(RTCScene scene);
 
-// Centre and half sizes of the bounding box of points [N, 3].
-void box_around(std::span<const float> points, float box[6]);
-
 }  // namespace mjsense::rays

@@ -14,8 +14,6 @@
 namespace mjsense::rays {
 namespace {
 
-using testing::TestModel;
-
 // MuJoCo's abstract scene of the model.
 struct Drawn {
   mjvScene scene;

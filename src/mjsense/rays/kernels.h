@@ -73,8 +73,6 @@ struct RayKernels {
   int (*gather_from)(const KernelBoxes&, const RayPacket&, RayCandidate* out);
   void (*trace)(const KernelScene&, const KernelWorld&, const KernelFilter&, const RayPacket&,
                 HitPacket&, const RayCandidate*, int count);
-  std::uint32_t (*occluded)(const KernelScene&, const KernelWorld&, const KernelFilter&,
-                            const RayPacket&, const RayCandidate*, int count);
   // Discards hits nearer than `nearest` and clamps the distance of others to `farthest`. `bodies`
   // and `materials` are indexed by geom; null if those ids were not requested.
   void (*rows)(const RayPacket&, float nearest, float farthest, const int* bodies,

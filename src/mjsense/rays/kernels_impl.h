@@ -87,18 +87,6 @@ void trace_solid(const RayGeom& g, int id, bool cull, const RayPacket& rays, Hit
   }
 }
 
-template <class Shape>
-std::uint32_t occluded_solid(const RayGeom& g, bool cull, const RayPacket& rays) {
-  const Frame frame(g, rays.origin);
-  std::uint32_t hit = 0;
-  for (int k = 0; k < kPacket; k += kWidth) {
-    const Float t =
-        Shape::intersect(g.size, frame.point(rays.o, k), frame.direction(rays.d, k), cull);
-    hit |= bits((t <= load(rays.tmax + k)) & (t < Float(kNoHit))) << k;
-  }
-  return hit;
-}
-
 // kWidth rays in a mesh's frame. Each starts shortly before it enters the mesh's bounding box;
 // `start` is the distance of that point along the original ray.
 struct MeshRays {
@@ -159,19 +147,6 @@ void trace_triangles(RTCScene scene, const RayGeom& g, int id, bool cull, const 
   }
 }
 
-std::uint32_t occluded_triangles(RTCScene scene, const RayGeom& g, bool cull,
-                                 const RayPacket& rays) {
-  const Frame frame(g, rays.origin);
-  MeshRays mesh;
-  std::uint32_t hit = 0;
-  for (int k = 0; k < kPacket; k += kWidth) {
-    if (!mesh.prepare(g, frame, rays, k, load(rays.tmax + k))) continue;
-    embree_occluded(mesh.valid, scene, &mesh.rh.ray, cull, false);
-    hit |= bits(less(load(mesh.valid), int_of(0)) & (load(mesh.rh.ray.tfar) < Float(0.0f))) << k;
-  }
-  return hit;
-}
-
 void trace_height_field(const HeightField& field, const RayGeom& g, int id, bool cull,
                         const RayPacket& rays, HitPacket& hits) {
   const Frame frame(g, rays.origin);
@@ -182,19 +157,6 @@ void trace_height_field(const HeightField& field, const RayGeom& g, int id, bool
     const Mask m = nearer(hits, rays, k, hit.t, id);
     if (any(m)) put(hits, k, m, hit.t, id, hit.prim, frame.to_world(hit.normal));
   }
-}
-
-std::uint32_t occluded_height_field(const HeightField& field, const RayGeom& g, bool cull,
-                                    const RayPacket& rays) {
-  const Frame frame(g, rays.origin);
-  std::uint32_t hit = 0;
-  for (int k = 0; k < kPacket; k += kWidth) {
-    const Float limit = load(rays.tmax + k);
-    const FieldHit h = intersect_height_field(field, frame.point(rays.o, k),
-                                              frame.direction(rays.d, k), limit, cull);
-    hit |= bits((h.t <= limit) & (h.t < Float(kNoHit))) << k;
-  }
-  return hit;
 }
 
 // The BVH of a mesh, SDF or flex; null if it has no triangles.
@@ -253,50 +215,6 @@ void trace(const KernelScene& scene, const KernelWorld& world, const KernelFilte
   }
 }
 
-std::uint32_t occluded(const KernelScene& scene, const KernelWorld& world,
-                       const KernelFilter& filter, const RayPacket& rays,
-                       const RayCandidate* candidates, int count) {
-  std::uint32_t active = 0;
-  for (int k = 0; k < kPacket; k += kWidth) active |= bits(load(rays.tmax + k) >= Float(0.0f)) << k;
-  std::uint32_t hit = 0;
-  const bool cull = filter.cull_solid, cull_mesh = filter.cull_mesh;
-  for (int c = 0; c < count && (hit & active) != active; ++c) {
-    const RayGeom& g = world.geoms[candidates[c].geom];
-    switch (g.type) {
-      case mjGEOM_PLANE:
-        hit |= occluded_solid<Plane>(g, cull, rays);
-        break;
-      case mjGEOM_SPHERE:
-        hit |= occluded_solid<Sphere>(g, cull, rays);
-        break;
-      case mjGEOM_CAPSULE:
-        hit |= occluded_solid<Capsule>(g, cull, rays);
-        break;
-      case mjGEOM_ELLIPSOID:
-        hit |= occluded_solid<Ellipsoid>(g, cull, rays);
-        break;
-      case mjGEOM_CYLINDER:
-        hit |= occluded_solid<Cylinder>(g, cull, rays);
-        break;
-      case mjGEOM_BOX:
-        hit |= occluded_solid<Box>(g, cull, rays);
-        break;
-      case mjGEOM_HFIELD:
-        hit |= occluded_height_field(scene.height_fields[g.data], g, cull, rays);
-        break;
-      case mjGEOM_MESH:
-      case mjGEOM_SDF:
-      case kFlexType:
-        if (const RTCScene triangles = triangles_of(scene, world, g))
-          hit |= occluded_triangles(triangles, g, cull_mesh, rays);
-        break;
-      default:
-        break;
-    }
-  }
-  return hit & active;
-}
-
 void to_world(const LocalPacket& local, const float* r, float tmax, RayPacket& out) {
   for (int k = 0; k < kPacket; k += kWidth) {
     const Vec3f o = {load(local.o[0] + k), load(local.o[1] + k), load(local.o[2] + k)};
@@ -310,8 +228,7 @@ void to_world(const LocalPacket& local, const float* r, float tmax, RayPacket& o
   }
 }
 
-constexpr RayKernels kKernels = {&to_world, &cull,     &gather, &gather_from,
-                                 &trace,    &occluded, &rows,   &returns};
+constexpr RayKernels kKernels = {&to_world, &cull, &gather, &gather_from, &trace, &rows, &returns};
 
 }  // namespace
 }  // namespace mjsense::rays

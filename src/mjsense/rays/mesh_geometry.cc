@@ -5,28 +5,14 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <mutex>
 
-#include "mjsense/core/content_cache.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense::rays {
 namespace {
-
-std::array<float, 6> box_around(std::span<const float> vertices) {
-  std::array<float, 6> box{};
-  for (int k = 0; k < 3; ++k) {
-    float low = std::numeric_limits<float>::infinity(), high = -low;
-    for (std::size_t i = k; i < vertices.size(); i += 3) {
-      low = std::min(low, vertices[i]);
-      high = std::max(high, vertices[i]);
-    }
-    box[k] = 0.5f * (low + high);
-    box[3 + k] = 0.5f * (high - low);
-  }
-  return box;
-}
 
 // Message of Embree's last error in this thread.
 std::string& last_error() {
@@ -92,28 +78,66 @@ SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
   return scene;
 }
 
-std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
-                                                  std::span<const int> faces, bool clusters,
-                                                  BuildQuality quality) {
-  static ContentCache<MeshGeometry> all;
-  const ContentKey key = ContentKey()
-                             .add(vertices)
-                             .add(faces)
-                             .add(std::span(&clusters, 1))
-                             .add(std::span(&quality, 1));
-  return all.get(key, [&] {
-    auto made = std::make_shared<MeshGeometry>();
-    made->box = box_around(vertices);
-    if (faces.empty()) return made;
-    made->device = ray_device();
-    made->scene = build_triangles(made->device.get(), vertices, faces, quality);
-    if (clusters) {
-      made->clusters =
-          build_clusters(vertices.data(), faces.data(), static_cast<int>(faces.size() / 3));
-      made->horizons = std::make_unique<Horizons>(made->clusters);
+void box_around(std::span<const float> points, float box[6]) {
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  std::array<float, 3> low = {inf, inf, inf}, high = {-inf, -inf, -inf};
+  std::size_t i = 0;
+  // Four points at once: three vectors, whose lanes have the coordinates x y z x, y z x y, z x y z.
+  using Four [[gnu::vector_size(16)]] = float;
+  Four least[3], most[3];
+  std::fill_n(least, 3, Four{inf, inf, inf, inf});
+  std::fill_n(most, 3, Four{-inf, -inf, -inf, -inf});
+  for (; i + 12 <= points.size(); i += 12)
+    for (std::size_t j = 0; j < 3; ++j) {
+      Four x;
+      std::memcpy(&x, points.data() + i + 4 * j, sizeof x);
+      least[j] = x < least[j] ? x : least[j];
+      most[j] = most[j] < x ? x : most[j];
     }
+  for (int j = 0; j < 12; ++j) {
+    low[j % 3] = std::min(low[j % 3], least[j / 4][j % 4]);
+    high[j % 3] = std::max(high[j % 3], most[j / 4][j % 4]);
+  }
+  for (; i < points.size(); ++i) {
+    low[i % 3] = std::min(low[i % 3], points[i]);
+    high[i % 3] = std::max(high[i % 3], points[i]);
+  }
+  for (int k = 0; k < 3; ++k) {
+    box[k] = 0.5f * (low[k] + high[k]);
+    box[3 + k] = 0.5f * (high[k] - low[k]);
+  }
+}
+
+std::shared_ptr<const MeshScene> mesh_scene(const MeshArrays& mesh, BuildQuality quality) {
+  static ContentCache<MeshScene> all;
+  return all.get(ContentKey(mesh.key).add(std::span(&quality, 1)), [&] {
+    auto made = std::make_shared<MeshScene>();
+    made->device = ray_device();
+    made->scene = build_triangles(made->device.get(), mesh.vertices, mesh.faces, quality);
     return made;
   });
+}
+
+std::shared_ptr<const Clusters> mesh_clusters(const MeshArrays& mesh) {
+  static ContentCache<Clusters> all;
+  return all.get(mesh.key, [&] {
+    return std::make_shared<Clusters>(build_clusters(mesh.vertices.data(), mesh.faces.data(),
+                                                     static_cast<int>(mesh.faces.size() / 3)));
+  });
+}
+
+std::shared_ptr<const Horizons> mesh_horizons(const MeshArrays& mesh) {
+  static ContentCache<Horizons> all;
+  return all.get(mesh.key, [&] { return std::make_shared<Horizons>(*mesh_clusters(mesh)); });
+}
+
+MeshGeometry::MeshGeometry(const MeshArrays& mesh, bool images) {
+  box_around(mesh.vertices, box.data());
+  if (mesh.faces.empty()) return;
+  scene = mesh_scene(mesh, BuildQuality::kHigh);
+  if (!images) return;
+  clusters = mesh_clusters(mesh);
+  horizons = mesh_horizons(mesh);
 }
 
 }  // namespace mjsense::rays

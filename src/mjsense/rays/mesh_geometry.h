@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A triangle mesh in the form that rays and cameras use. Simulations of the same model in one
-// process share it.
+// Triangle meshes in the forms that rays and cameras use: a BVH, clusters and horizons. Everything in
+// the process that has an equal mesh shares them.
 
 #include <array>
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "mjsense/core/content_cache.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/horizons.h"
 #include "mjsense/rays/triangle_clusters.h"
@@ -45,18 +46,40 @@ enum class BuildQuality : std::uint8_t {
 SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
                             std::span<const int> faces, BuildQuality quality);
 
-struct MeshGeometry {
-  std::shared_ptr<RTCDeviceTy> device;
-  SceneHandle scene;                   // null if the mesh has no faces
-  Clusters clusters;                   // empty unless requested
-  std::unique_ptr<Horizons> horizons;  // null unless clusters were requested
-  std::array<float, 6> box{};          // bounding box of all vertices: centre, half sizes, m
+// A mesh's arrays, vertices [n, 3] (m) and faces [m, 3], with their key in the process-wide caches.
+struct MeshArrays {
+  MeshArrays(std::span<const float> mesh_vertices, std::span<const int> mesh_faces)
+      : vertices(mesh_vertices),
+        faces(mesh_faces),
+        key(ContentKey().add(mesh_vertices).add(mesh_faces)) {}
+
+  std::span<const float> vertices;
+  std::span<const int> faces;
+  ContentKey key;
 };
 
-// Returns the geometry of these vertices [n, 3] (m) and faces [m, 3]. `clusters`: also build what
-// cameras need.
-std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
-                                                  std::span<const int> faces, bool clusters,
-                                                  BuildQuality quality = BuildQuality::kHigh);
+struct MeshScene {
+  std::shared_ptr<RTCDeviceTy> device;
+  SceneHandle scene;
+};
+
+// Centre and half sizes of the bounding box of points [n, 3].
+void box_around(std::span<const float> points, float box[6]);
+
+// The parts of a mesh with faces. Each is built if nothing in the process has it.
+std::shared_ptr<const MeshScene> mesh_scene(const MeshArrays& mesh, BuildQuality quality);
+std::shared_ptr<const Clusters> mesh_clusters(const MeshArrays& mesh);
+std::shared_ptr<const Horizons> mesh_horizons(const MeshArrays& mesh);
+
+// All parts of a mesh. Without faces there are none.
+struct MeshGeometry {
+  // `images`: also what only cameras need.
+  MeshGeometry(const MeshArrays& mesh, bool images);
+
+  std::shared_ptr<const MeshScene> scene;
+  std::shared_ptr<const Clusters> clusters;  // null unless requested
+  std::shared_ptr<const Horizons> horizons;  // null unless requested
+  std::array<float, 6> box;                  // bounding box of all vertices: centre, half sizes, m
+};
 
 }  // namespace mjsense::rays

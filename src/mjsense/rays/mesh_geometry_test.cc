@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
+#include <span>
 #include <thread>
 #include <vector>
 
@@ -16,26 +18,59 @@ namespace {
 const std::vector<float> kVertices{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 const std::vector<int> kFaces{0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
 
+MeshArrays arrays(std::span<const float> vertices, std::span<const int> faces) {
+  return {vertices, faces};
+}
+
 TEST(MeshGeometry, EqualContentIsShared) {
-  const auto a = mesh_geometry(kVertices, kFaces, true);
-  const auto b = mesh_geometry(std::vector(kVertices), std::vector(kFaces), true);
-  EXPECT_EQ(a.get(), b.get());
-  EXPECT_FALSE(a->clusters.nodes.empty());
-  EXPECT_EQ(a->box, (std::array<float, 6>{0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f}));
-  EXPECT_EQ(a->device.get(), ray_device().get());
+  const std::vector<float> vertices = kVertices;
+  const MeshGeometry a(arrays(kVertices, kFaces), true), b(arrays(vertices, kFaces), true);
+  EXPECT_EQ(a.scene, b.scene);
+  EXPECT_EQ(a.clusters, b.clusters);
+  EXPECT_EQ(a.horizons, b.horizons);
+  EXPECT_FALSE(a.clusters->nodes.empty());
+  EXPECT_EQ(a.box, (std::array<float, 6>{0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ(a.scene->device.get(), ray_device().get());
 }
 
 TEST(MeshGeometry, DifferentContentIsNotShared) {
-  const auto a = mesh_geometry(kVertices, kFaces, true);
-  EXPECT_NE(a, mesh_geometry(kVertices, kFaces, false));
+  const auto a = mesh_clusters(arrays(kVertices, kFaces));
   for (std::size_t i = 0; i < kVertices.size(); ++i) {
     std::vector<float> other = kVertices;
     other[i] += 1e-6f;
-    EXPECT_NE(a, mesh_geometry(other, kFaces, true)) << i;
+    EXPECT_NE(a, mesh_clusters(arrays(other, kFaces))) << i;
   }
   std::vector<int> turned = kFaces;
   std::swap(turned[0], turned[1]);
-  EXPECT_NE(a, mesh_geometry(kVertices, turned, true));
+  EXPECT_NE(a, mesh_clusters(arrays(kVertices, turned)));
+  const auto scene = mesh_scene(arrays(kVertices, kFaces), BuildQuality::kHigh);
+  EXPECT_NE(scene, mesh_scene(arrays(kVertices, kFaces), BuildQuality::kFast));
+}
+
+TEST(MeshGeometry, HasWhatOnlyImagesNeedOnRequest) {
+  const MeshGeometry geometry(arrays(kVertices, kFaces), false);
+  EXPECT_NE(geometry.scene, nullptr);
+  EXPECT_EQ(geometry.clusters, nullptr);
+  EXPECT_EQ(geometry.horizons, nullptr);
+  EXPECT_EQ(MeshGeometry(arrays(kVertices, {}), true).scene, nullptr);  // no faces
+}
+
+TEST(MeshGeometry, BoxContainsAllPoints) {
+  for (int count = 1; count < 12; ++count) {
+    std::vector<float> points;
+    float low[3], high[3];
+    for (int i = 0; i < 3 * count; ++i) {
+      points.push_back(static_cast<float>((i * 7919) % 101 - 50));
+      low[i % 3] = i < 3 ? points[i] : std::min(low[i % 3], points[i]);
+      high[i % 3] = i < 3 ? points[i] : std::max(high[i % 3], points[i]);
+    }
+    float box[6];
+    box_around(points, box);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_EQ(box[k], 0.5f * (low[k] + high[k])) << count;
+      EXPECT_EQ(box[3 + k], 0.5f * (high[k] - low[k])) << count;
+    }
+  }
 }
 
 // Embree reports no error by itself; rays would hit nothing. Memory runs out at each allocation in
@@ -66,22 +101,22 @@ TEST(MeshGeometry, FailedBuildThrows) {
 }
 
 TEST(MeshGeometry, IsReleasedWithItsLastOwner) {
-  std::weak_ptr<const MeshGeometry> seen;
+  std::weak_ptr<const MeshScene> seen;
   {
-    const auto a = mesh_geometry(kVertices, kFaces, false);
-    seen = a;
+    const MeshGeometry a(arrays(kVertices, kFaces), false);
+    seen = a.scene;
   }
   EXPECT_TRUE(seen.expired());
-  EXPECT_NE(mesh_geometry(kVertices, kFaces, false), nullptr);
+  EXPECT_NE(mesh_scene(arrays(kVertices, kFaces), BuildQuality::kHigh), nullptr);
 }
 
 TEST(MeshGeometry, IsThreadSafe) {
-  std::vector<std::shared_ptr<const MeshGeometry>> made(8);
+  std::vector<std::shared_ptr<const Horizons>> made(8);
   {
     std::vector<std::jthread> threads;
     threads.reserve(made.size());
     for (auto& one : made)
-      threads.emplace_back([&one] { one = mesh_geometry(kVertices, kFaces, true); });
+      threads.emplace_back([&one] { one = mesh_horizons(arrays(kVertices, kFaces)); });
   }
   for (const auto& one : made) EXPECT_EQ(one, made[0]);
 }

@@ -115,14 +115,6 @@ void RayScene::trace(int world, const RayFilter& filter, const RayPacket& rays, 
   trace_candidates(world, filter, rays, hits, scratch.candidates());
 }
 
-std::uint32_t RayScene::occluded(int world, const RayFilter& filter, const RayPacket& rays,
-                                 RayScratch& scratch) const {
-  gather(world, filter, rays, scratch);
-  const KernelScene scene{shared_->mesh_scenes.data(), shared_->height_fields.data()};
-  return kernels_->occluded(scene, kernel_world(worlds_[world]), kernel_filter(filter), rays,
-                            scratch.data(), static_cast<int>(scratch.count));
-}
-
 Hit RayScene::trace(int world, const RayFilter& filter, const double origin[3],
                     const double direction[3]) const {
   RayScratch scratch(num_objects());

@@ -92,9 +92,6 @@ class RayScene {
             HitPacket& hits, RayOutputs& out) const;
   void returns(int world, const LocalPacket& local, const RayPacket& rays, const HitPacket& hits,
                LidarReturns& out) const;
-  // Bit i is set if a geom blocks ray i before its tmax.
-  [[nodiscard]] std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
-                                       RayScratch& scratch) const;
 
   // Casts one ray, for tests and tools. `direction` need not have length 1; t is in metres in any
   // case.

@@ -15,6 +15,7 @@
 
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/rays/ray_scene.h"
 
 namespace mjsense::rays {
@@ -53,15 +54,14 @@ std::string field(int count, bool one_mesh) {
 }
 
 struct Field {
-  mjModel* model;
-  mjData* data;
+  ModelPtr owned_model;
+  DataPtr owned_data = make_data(owned_model.get());
+  mjModel* model = owned_model.get();
+  mjData* data = owned_data.get();
   std::vector<double> directions;  // [5760, 3]
 
-  explicit Field(int count, bool one_mesh = false) {
-    mjSpec* spec = mj_parseXMLString(field(count, one_mesh).c_str(), nullptr, nullptr, 0);
-    model = mj_compile(spec, nullptr);
-    mj_deleteSpec(spec);
-    data = mj_makeData(model);
+  explicit Field(int count, bool one_mesh = false)
+      : owned_model(compile_mjcf(field(count, one_mesh))) {
     for (int p = 0; p < 360; ++p) {
       for (int i = 0; i < kPacket; ++i) {
         const double azimuth = p * std::numbers::pi / 180, elevation = 0.03 * i - 0.3;
@@ -70,10 +70,6 @@ struct Field {
                            std::sin(azimuth) * std::cos(elevation), std::sin(elevation)});
       }
     }
-  }
-  ~Field() {
-    mj_deleteData(data);
-    mj_deleteModel(model);
   }
   int num_rays() const { return static_cast<int>(directions.size() / 3); }
   // Moves the moving box and computes the poses. Not timed, since a simulation computes them

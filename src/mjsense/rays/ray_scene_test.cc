@@ -24,7 +24,6 @@ using testing::disagreement;
 using testing::mujoco_ray;
 using testing::ray_count;
 using testing::Reference;
-using testing::TestModel;
 
 class RandomRays : public ::testing::TestWithParam<const char*> {};
 
@@ -181,29 +180,6 @@ TEST_P(Kernels, RowsEqualTheHits) {
   EXPECT_GT(before, 20);
   EXPECT_GT(behind, 20);
   EXPECT_GT(there, 500);
-}
-
-TEST_P(Kernels, OccludedWhereSomethingIsHit) {
-  Rng rng(4, 0, 0, 0);
-  const TestModel m(testing::random_scene(
-      rng, {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}, 40,
-      4));
-  RayScene scene(m.model, 1, isa());
-  scene.update(m.world());
-  RayScratch scratch(scene.num_objects());
-  int hit_lanes = 0, wrong = 0;
-  for (int trial = 0; trial < 500; ++trial) {
-    const RayPacket rays = random_packet(rng, 5, 0.2 * (trial % 5));
-    HitPacket hits;
-    scene.trace(0, {}, rays, hits, scratch);
-    const std::uint32_t hidden = scene.occluded(0, {}, rays, scratch);
-    for (int i = 0; i < kPacket; ++i) {
-      hit_lanes += hits.geom[i] >= 0;
-      wrong += (hits.geom[i] >= 0) != ((hidden >> i & 1) != 0);
-    }
-  }
-  EXPECT_GT(hit_lanes, 500);
-  EXPECT_LE(wrong, 2);  // a surface exactly at tmax
 }
 
 TEST_P(Kernels, PreciseFarFromTheWorldOrigin) {
@@ -441,11 +417,9 @@ TEST_P(Kernels, RaysInThePlaneOfABoxSideMissTheMesh) {
   const RayFilter filter{.hidden = hidden};
   HitPacket hits;
   s.scene.trace(0, filter, rays, hits, scratch);
-  const std::uint32_t dark = s.scene.occluded(0, filter, rays, scratch);
   for (int i = 0; i < kPacket; ++i) {
     const bool on = std::abs(rays.o[0][i]) < 1;
     EXPECT_EQ(hits.geom[i], on ? s.id("cube") : -1) << i;
-    EXPECT_EQ(dark >> i & 1, on) << i;
   }
 }
 
@@ -588,7 +562,6 @@ TEST(RayScene, AllocatesNothingAfterTheFirstRay) {
     scene.update(m.world());
     const RayPacket rays = random_packet(rng, 5, 0.3);
     scene.trace(0, {}, rays, hits, scratch);
-    static_cast<void>(scene.occluded(0, {}, rays, scratch));
   }
   EXPECT_EQ(count.since(), 0);
 }

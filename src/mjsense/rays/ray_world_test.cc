@@ -51,7 +51,7 @@ void expect_same(const RayWorld& a, const RayWorld& b, const std::string& after)
 }
 
 TEST(RayWorld, UpdateDetectsEveryChange) {
-  const testing::TestModel model(field());
+  const TestModel model(field());
   mjModel* m = model.model;
   mjData* d = model.data;
   const SharedGeometry shapes(m);

@@ -13,7 +13,6 @@ namespace {
 
 using testing::agree;
 using testing::Neighbours;
-using testing::TestModel;
 
 Hit at(double t, std::array<float, 3> normal = {0, 0, 1}) {
   Hit hit;

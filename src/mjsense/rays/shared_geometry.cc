@@ -77,11 +77,12 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
   const bool images = m->ncam > 0;
   for (int i = 0; i < m->nmesh; ++i) {
     const auto count = [](int n) { return 3 * static_cast<std::size_t>(n); };
-    meshes.push_back(mesh_geometry(
-        {m->mesh_vert + count(m->mesh_vertadr[i]), count(m->mesh_vertnum[i])},
-        {m->mesh_face + count(m->mesh_faceadr[i]), count(m->mesh_facenum[i])}, images));
-    mesh_scenes.push_back(meshes[i]->scene.get());
-    bounds.meshes.push_back(meshes[i]->box);
+    const MeshGeometry& made = meshes.emplace_back(
+        MeshArrays({m->mesh_vert + count(m->mesh_vertadr[i]), count(m->mesh_vertnum[i])},
+                   {m->mesh_face + count(m->mesh_faceadr[i]), count(m->mesh_facenum[i])}),
+        images);
+    mesh_scenes.push_back(made.scene ? made.scene->scene.get() : nullptr);
+    bounds.meshes.push_back(made.box);
   }
   for (int i = 0; i < m->nflex; ++i) flexes.push_back(flex_surface(m, i));
   for (int i = 0; i < m->nhfield; ++i) {
@@ -92,8 +93,8 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     std::copy_n(m->hfield_size + 4 * i, 4, field.size);
     if (images) {
       const Triangles surface = surface_of(field);
-      surfaces.push_back(mesh_geometry(surface.vertices, surface.faces, images));
-      field.scene = surfaces.back()->scene.get();
+      surfaces.emplace_back(MeshArrays(surface.vertices, surface.faces), images);
+      field.scene = surfaces.back().scene->scene.get();
     }
     block_tops.push_back(highest_points(field));
     field.block_tops = block_tops.back().data();

@@ -24,28 +24,24 @@ struct SharedGeometry {
   explicit SharedGeometry(const mjModel* model);
 
   std::shared_ptr<RTCDeviceTy> device;
-  std::vector<std::shared_ptr<const MeshGeometry>> meshes;
+  std::vector<MeshGeometry> meshes;
   std::vector<void*> mesh_scenes;  // scenes of `meshes`, for the kernels; null without faces
   std::vector<HeightField> height_fields;      // `data` points into the model
   std::vector<std::vector<float>> block_tops;  // of each height field
   // Triangle meshes of the height fields; empty if the model has no cameras, because rays march
   // over the height field itself.
-  std::vector<std::shared_ptr<const MeshGeometry>> surfaces;
+  std::vector<MeshGeometry> surfaces;
   ShapeBounds bounds;
   std::vector<FlexSurface> flexes;  // the parts of flexes that do not depend on the world
 
   // For images; null if the model has no cameras.
-  const Clusters* clusters_of_mesh(int id) const { return clusters(meshes, id); }
-  const Clusters* clusters_of_height_field(int id) const { return clusters(surfaces, id); }
-  const Horizons* horizons_of_mesh(int id) const { return meshes[id]->horizons.get(); }
-  const Horizons* horizons_of_height_field(int id) const {
-    return clusters_of_height_field(id) ? surfaces[id]->horizons.get() : nullptr;
+  const Clusters* clusters_of_mesh(int id) const { return meshes[id].clusters.get(); }
+  const Clusters* clusters_of_height_field(int id) const {
+    return surfaces.empty() ? nullptr : surfaces[id].clusters.get();
   }
-
- private:
-  static const Clusters* clusters(const std::vector<std::shared_ptr<const MeshGeometry>>& all,
-                                  std::size_t id) {
-    return id < all.size() && !all[id]->clusters.nodes.empty() ? &all[id]->clusters : nullptr;
+  const Horizons* horizons_of_mesh(int id) const { return meshes[id].horizons.get(); }
+  const Horizons* horizons_of_height_field(int id) const {
+    return surfaces.empty() ? nullptr : surfaces[id].horizons.get();
   }
 };
 

@@ -229,6 +229,13 @@ void EpisodeFile::write_array(const EpisodeArray& array) {
   hdf5::set_attribute(dataset, kChecksumAttribute, sum.text());
 }
 
+void EpisodeFile::write_histogram(const VideoStream& video, const ImageHistogram& histogram) {
+  const hsize_t dims[] = {ImageHistogram::kChannels, ImageHistogram::kLevels};
+  const hdf5::H5Lock lock;
+  const hdf5::Id dataset = hdf5::open_dataset(trajectory_, std::string(kVideos) + video.key);
+  hdf5::set_attribute(dataset, "histogram", histogram.counts(), dims);
+}
+
 void EpisodeFile::carry_over(const EpisodeSource& source) {
   const hdf5::H5Lock lock;
   const hdf5::Id file = hdf5::open_file(source.file);

@@ -13,6 +13,7 @@
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"
+#include "mjsense/record/image_histogram.h"
 #include "mjsense/record/recording_plan.h"
 
 namespace mjsense::record {
@@ -40,6 +41,8 @@ class EpisodeFile {
   // `steps`: policy steps of the episode, which is one less than its observations.
   void write_scene(std::string_view obs_scene, std::string_view outcome, std::int64_t steps);
   void write_array(const EpisodeArray& array);
+  // Stores the levels of all frames of a colour video: an attribute of the dataset of its name.
+  void write_histogram(const VideoStream& video, const ImageHistogram& histogram);
   // Copies what this file does not have yet. Throws RuntimeError if the source cannot be read.
   void carry_over(const EpisodeSource& source);
   // Checksums and sizes of the videos, in the order of the plan. finish() writes them and closes

@@ -11,8 +11,6 @@
 namespace mjsense::record {
 namespace {
 
-using testing::error_of;
-
 struct Numbers final : Sensor {
   explicit Numbers(std::string name) : Sensor(std::move(name)) {}
   std::string_view kind() const override { return "numbers"; }

@@ -12,6 +12,7 @@
 #include <cstdlib>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 
 namespace mjsense::record {
 namespace {
@@ -31,13 +32,10 @@ TEST(Process, OnlyStandardStreamsAreInherited) {
 }
 
 TEST(Process, MissingProgramThrows) {
-  try {
-    run_process({"mjsense_no_such_program", "x"});
-    FAIL();
-  } catch (const RuntimeError& e) {
-    EXPECT_STREQ(e.what(),
-                 "cannot start the program 'mjsense_no_such_program': No such file or directory");
-  }
+  EXPECT_EQ(error_of<RuntimeError>([&] {
+              run_process({"mjsense_no_such_program", "x"});
+            }),
+            "cannot start the program 'mjsense_no_such_program': No such file or directory");
 }
 
 TEST(Process, LeadsAProcessGroupWithDefaultSignals) {

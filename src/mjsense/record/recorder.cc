@@ -144,6 +144,7 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
   episode->parts = 1;
   episode->chunks.resize(streams);
   episode->chunk_fill.assign(streams, 0);
+  episode->histograms.resize(plan.videos.size());
   {
     const std::lock_guard lock(mutex);
     if (failure) std::rethrow_exception(failure);
@@ -170,7 +171,8 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
 
 void Recorder::Impl::check_number(std::int64_t number) const {
   if (house->ended())
-    throw ValueError(fmt::format("'{}' is complete: no more episodes", house->dir().string()));
+    throw ValueError(
+        fmt::format("'{}' is complete; append to it to add episodes", house->dir().string()));
   if (number < cfg.first_attempt) {
     throw ValueError(fmt::format("recording: episode {} is before the first one, {}", number,
                                  cfg.first_attempt));

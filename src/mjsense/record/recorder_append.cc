@@ -50,7 +50,7 @@ void Recorder::Impl::append(int world, const StepRow& row) {
       wait_for_failure();
     }
     const Clock::time_point start = Clock::now();
-    copy_frame(plan.videos[v], world, frame);
+    copy_frame(plan.videos[v], world, frame, episode.histograms[v]);
     copy_s += seconds_since(start);
     pool->commit(episode.videos[v]);
   }
@@ -90,15 +90,16 @@ void Recorder::Impl::check_texts(int world, Episode& episode) const {
   }
 }
 
-void Recorder::Impl::copy_frame(const VideoStream& video, int world,
-                                std::span<std::uint8_t> frame) const {
+void Recorder::Impl::copy_frame(const VideoStream& video, int world, std::span<std::uint8_t> frame,
+                                ImageHistogram& histogram) const {
   const std::byte* from = video.field->data.row_data(world);
   const std::size_t pixels = static_cast<std::size_t>(video.width) * video.height;
   const std::span<const float> metres(reinterpret_cast<const float*>(from), pixels);
+  const std::span<const std::uint8_t> rgb(reinterpret_cast<const std::uint8_t*>(from), 3 * pixels);
   switch (video.kind) {
     case VideoKind::kRgb:
-      encode_yuv420({reinterpret_cast<const std::uint8_t*>(from), 3 * pixels}, video.width,
-                    video.height, frame);
+      encode_yuv420(rgb, video.width, video.height, frame);
+      histogram.add(rgb, video.width, video.height);
       break;
     case VideoKind::kDepth16:
       encode_depth16(metres, cfg.video.depth_unit,

@@ -46,10 +46,11 @@ struct Recorder::Impl {
     double waited_s = 0;   // waiting time for free buffers
     std::string why;
     std::vector<EncoderPool::Stream*> videos;
-    std::vector<Buffer> chunks;            // one per stream, being filled
-    std::vector<std::int64_t> chunk_fill;  // rows in each chunk
-    std::unique_ptr<EpisodeFile> file;     // used by the writer thread only
-    std::atomic<int> parts{0};             // unfinished parts: HDF5 file and videos
+    std::vector<ImageHistogram> histograms;  // one per video; those of depth stay empty
+    std::vector<Buffer> chunks;              // one per stream, being filled
+    std::vector<std::int64_t> chunk_fill;    // rows in each chunk
+    std::unique_ptr<EpisodeFile> file;       // used by the writer thread only
+    std::atomic<int> parts{0};               // unfinished parts: HDF5 file and videos
   };
   using EpisodePtr = std::shared_ptr<Episode>;
 
@@ -107,7 +108,9 @@ struct Recorder::Impl {
   // Throws if a text was truncated, because it is not valid JSON any more. Nothing of that step is
   // stored.
   void check_texts(int world, Episode& episode) const;
-  void copy_frame(const VideoStream& video, int world, std::span<std::uint8_t> frame) const;
+  // Converts an image for the encoder, and counts the levels of a colour image.
+  void copy_frame(const VideoStream& video, int world, std::span<std::uint8_t> frame,
+                  ImageHistogram& histogram) const;
   // Buffer for the next row of a stream, filled with zeros; null if the row has no bytes.
   std::uint8_t* next_row(Episode& episode, int s);
   void end_row(Episode& episode, int world, int s);

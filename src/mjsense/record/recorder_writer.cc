@@ -69,6 +69,10 @@ void Recorder::Impl::run(Job& job, bool failed) {
       if (!failed && episode.file && episode.outcome == Outcome::kKept) {
         episode.file->write_scene(job.obs_scene, job.outcome, episode.rows - 1);
         for (const EpisodeArray& array : job.arrays) episode.file->write_array(array);
+        for (std::size_t v = 0; v < plan.videos.size(); ++v) {
+          if (plan.videos[v].kind == VideoKind::kRgb)
+            episode.file->write_histogram(plan.videos[v], episode.histograms[v]);
+        }
       }
       break;
     case Job::kSettle:

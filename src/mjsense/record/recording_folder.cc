@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 namespace mjsense::record {
 namespace {
 
-constexpr const char* kEndingFile = "ending";  // publish_all() has begun
+constexpr const char* kEndingFile = "ending";  // publish_all() has begun to publish
 
 void make_dir(const fs::path& path) {
   std::error_code error;
@@ -290,28 +290,33 @@ void RecordingFolder::publish_ready() {
   for (; next_batch_ < batches_.count &&
          batches_.first(next_batch_ + 1) <= static_cast<std::int64_t>(kept.size());
        ++next_batch_) {
-    if (!published_.contains(next_batch_)) publish(next_batch_, batch_of(next_batch_, kept));
+    if (!published_.contains(next_batch_)) publish(next_batch_, batch_of(next_batch_, kept), false);
   }
 }
 
 void RecordingFolder::publish_all() {
   if (ended_) return;
   publish_ready();
-  // From here on the order of episodes is final, also for a process that resumes after an
-  // interruption.
-  require_in_place();
-  staging_.write(kEndingFile, "");
-  staging_.sync();
   const std::vector<std::int64_t> kept = decisions_.all_kept();
   for (int b = next_batch_; b < batches_.count; ++b) {
     const std::vector<std::int64_t> episodes = batch_of(b, kept);
     if (episodes.empty()) break;
-    if (!published_.contains(b)) publish(b, episodes);
+    if (!published_.contains(b)) publish(b, episodes, true);
   }
+  require_in_place();
+  mark_ending();
   end_or_throw();
 }
 
-void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episodes) {
+// From here on the order of episodes is final, also for a process that resumes after an
+// interruption.
+void RecordingFolder::mark_ending() {
+  if (staging_.contains(kEndingFile)) return;
+  staging_.write(kEndingFile, "");
+  staging_.sync();
+}
+
+void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episodes, bool ending) {
   require_in_place();
   const std::string part = "batch.part";
   const std::string what = fmt::format("cannot write '{}'", staging_.display_path(part));
@@ -349,6 +354,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   }
   seal_file(staging_, part);
   staging_.sync(part);
+  if (ending) mark_ending();  // not earlier: if the disk is full, the recording may continue
   for (const Move& move : moves) {
     // A missing video was already moved by an earlier, interrupted publication.
     const Folder staged = staging_.open_dir(move.episode);

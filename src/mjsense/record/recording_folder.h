@@ -73,7 +73,8 @@ class RecordingFolder {
   void load_staged();
   void bring_back(const std::map<std::int64_t, StagedEpisode>& staged);
   void set_aside(const std::string& name, const std::string& why);
-  void publish(int batch, const std::vector<std::int64_t>& episodes);
+  void publish(int batch, const std::vector<std::int64_t>& episodes, bool ending);
+  void mark_ending();
   // Whether a published file belongs to a recording that this one continues.
   bool is_continued(const std::string& name) const;
   std::string file_of(int batch) const;

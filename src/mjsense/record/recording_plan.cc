@@ -324,8 +324,9 @@ std::string fingerprint_difference(const std::string& was, const std::string& no
   if (!a.is_object() || !b.is_object()) return "its description cannot be read";
   const nlohmann::json difference = nlohmann::json::diff(a, b);
   if (difference.empty()) return "";
-  // A changed setting may also have changed the model and the streams, so it is reported first.
-  constexpr std::string_view kConsequences[] = {"/model", "/streams"};
+  // A changed setting may also have changed the model, the streams and the number of batches, so it
+  // is reported first.
+  constexpr std::string_view kConsequences[] = {"/batches", "/model", "/streams"};
   const auto is_consequence = [&](const nlohmann::json& change) {
     const auto& path = change["path"].get_ref<const std::string&>();
     return std::ranges::any_of(kConsequences, [&](auto start) { return path.starts_with(start); });

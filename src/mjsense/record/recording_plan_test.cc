@@ -18,7 +18,6 @@ namespace mjsense::record {
 namespace {
 
 using ::testing::ElementsAre;
-using testing::error_of;
 using ::testing::HasSubstr;
 
 class Plain final : public Sensor {
@@ -212,12 +211,12 @@ TEST(Layout, FingerprintDifferencesAreDescribed) {
   a.num_worlds = b.num_worlds = 2;
   a.sensors = b.sensors = suite.sensors();
   a.episodes = 8;
-  b.episodes = 10;
+  b.episodes = 12;  // the number of batches follows
   a.settings = b.settings = R"({"task": "pick"})";
   const auto difference = [&] {
     return fingerprint_difference(plan_recording(a).fingerprint, plan_recording(b).fingerprint);
   };
-  EXPECT_EQ(difference(), "'episodes' was 8 and is now 10");
+  EXPECT_EQ(difference(), "'episodes' was 8 and is now 12");
   b.episodes = 8;
   b.video.max_encoders = 3;  // does not affect the files
   b.num_worlds = 1;

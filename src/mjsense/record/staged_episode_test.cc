@@ -7,6 +7,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/hdf5/h5.h"
 
@@ -40,12 +41,9 @@ void write_episode(const std::filesystem::path& path, const std::string& chunk) 
 TEST(StagedEpisode, CorruptChunkThrows) {
   const testing::TempDir dir;
   write_episode(dir.file("traj.h5"), "no stream");
-  try {
-    static_cast<void>(read_staged(Folder::open(dir.path)));
-    FAIL() << "a damaged episode was read";
-  } catch (const RuntimeError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("'x' is damaged: one of its chunks does not decompress"));
-  }
+  EXPECT_THAT(
+      error_of<RuntimeError>([&] { static_cast<void>(read_staged(Folder::open(dir.path))); }),
+      HasSubstr("'x' is damaged: one of its chunks does not decompress"));
 }
 
 }  // namespace

@@ -28,9 +28,9 @@ struct Mesh {
 
 // Sine of the horizon of a face; Horizons::kNever if no ray is known to be clear.
 float sine(const Mesh& mesh, int face, int octant) {
-  const auto geometry = rays::mesh_geometry(mesh.vertices, mesh.faces, true);
-  const float* h = geometry->box.data() + 3;
-  return find_horizon(geometry->clusters, geometry->horizons->slot(face), octant,
+  const rays::MeshGeometry geometry(rays::MeshArrays(mesh.vertices, mesh.faces), true);
+  const float* h = geometry.box.data() + 3;
+  return find_horizon(*geometry.clusters, geometry.horizons->slot(face), octant,
                       std::hypot(h[0], h[1], h[2]));
 }
 
@@ -161,8 +161,8 @@ TEST(Horizon, RaysAboveItAreClear) {
       mesh.add({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]});
     }
     for (int face = 0; face < mesh.size(); face += 5) {
-      const auto geometry = rays::mesh_geometry(mesh.vertices, mesh.faces, true);
-      const float* normal = geometry->horizons->plane(face);
+      const auto horizons = rays::mesh_horizons(rays::MeshArrays(mesh.vertices, mesh.faces));
+      const float* normal = horizons->plane(face);
       float sines[rays::Horizons::kOctants];
       for (int i = 0; i < rays::Horizons::kOctants; ++i) sines[i] = sine(mesh, face, i);
       for (int ray = 0; ray < 40; ++ray) {

@@ -18,6 +18,7 @@ namespace {
 
 using namespace testing;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 record::FakeSuiteCfg without_video() { return {1, 16, 12, false, false}; }
@@ -47,9 +48,11 @@ TEST(Live, ActiveRecordingIsReportedAsSuch) {
     ASSERT_THAT(found.findings, SizeIs(1)) << found.text();
     EXPECT_THAT(found.text(), HasSubstr("error: house_0 is being recorded: verify it again"));
     ASSERT_THAT(inspect(dir.path).files, SizeIs(1));
+    EXPECT_THAT(inspect(dir.path).text(), HasSubstr("house_0: the recording has not ended"));
     play(3);
     recorder.complete();
   }
+  EXPECT_THAT(inspect(dir.path).unfinished, IsEmpty());
   EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
   EXPECT_THAT(inspect(dir.path).files, SizeIs(2));
 }

@@ -13,6 +13,7 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/outcome_details.h"
+#include "mjsense/record/recorded_house.h"
 #include "mjsense/record/recording_description.h"
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/json_text.h"
@@ -245,20 +246,28 @@ InspectResult inspect(const fs::path& path) {
   for (const RecordedFile& file : files)
     bytes += static_cast<std::uint64_t>(
         size_of(open_plain(file.path.parent_path(), file.path.filename().string())));
-  return from_json(
+  InspectResult result = from_json(
       hdf5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(files)); }));
+  for (const fs::path& house : recorded_houses(path))
+    if (fs::exists(house / record::kStagingDir))
+      result.unfinished.push_back(house.filename().string());
+  return result;
 }
 
 std::string InspectResult::text() const {
   std::string out;
   for (const File& f : files) {
-    out += fmt::format("{}  {}, {} episodes, {} successes, {} steps\n", f.path, size_text(f.bytes),
-                       f.episodes, f.successes, f.steps);
+    out += fmt::format("{}  {}, {} episodes, {} successes, {} observations\n", f.path,
+                       size_text(f.bytes), f.episodes, f.successes, f.steps);
     for (const auto& [outcome, names] : f.outcomes) {
       if (outcome != "success") out += outcome_line(outcome, names);
     }
   }
-  out += fmt::format("{} videos\n\n", videos.size());
+  out += fmt::format("{} videos\n", videos.size());
+  for (const std::string& house : unfinished)
+    out += fmt::format("{}: the recording has not ended; mjsense verify says what is missing\n",
+                       house);
+  out += "\n";
 
   // Printed as a tree: parts of a name that equal the line above are left blank.
   std::vector<std::string> last;
@@ -276,7 +285,9 @@ std::string InspectResult::text() const {
 }
 
 std::string InspectResult::json() const {
-  nlohmann::json j{{"videos", videos}, {"recording", record::parse_description(settings)}};
+  nlohmann::json j{{"videos", videos},
+                   {"unfinished", unfinished},
+                   {"recording", record::parse_description(settings)}};
   if (j["recording"].is_discarded()) j["recording"] = nullptr;
   for (const File& f : files) {
     j["files"].push_back({{"path", f.path},

@@ -70,8 +70,9 @@ struct InspectResult {
   };
   std::vector<File> files;
   std::vector<std::string> videos;
-  std::vector<StreamStats> streams;  // over all episodes
-  std::string settings;              // JSON text of the recording, "" if unknown
+  std::vector<StreamStats> streams;     // over all episodes
+  std::string settings;                 // JSON text of the recording, "" if unknown
+  std::vector<std::string> unfinished;  // houses whose recording has not ended
   std::string text() const;
   std::string json() const;
 };

@@ -27,6 +27,7 @@ namespace {
 using namespace testing;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
 
 TEST(Replay, EpisodesReadBackAsWritten) {
   TempDir dir;
@@ -97,7 +98,42 @@ TEST(Replay, UnfinishedRecordingIsReadableAndRepairable) {
   EXPECT_FALSE(fs::exists(dir.path / "house_0/.recording"));
 }
 
+// A full disk is simulated by a file size limit.
+TEST(Replay, RepairThatCannotWriteLeavesTheRecordingUnfinished) {
+  TempDir dir;
+  write_recording(dir.path, 8, {.worlds = 2, .stop_after = 3}, true);
+  const std::vector<std::string> names = tree(dir.path);
+  const pid_t pid = fork();
+  if (pid == 0) {
+    const rlimit limit{1000, 1000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    const RepairResult result = repair(dir.path);
+    _exit(result.actions.empty() && result.failures.size() == 1 &&
+                  result.failures[0].find("File too large") != std::string::npos
+              ? 0
+              : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(pid, &status, 0), pid);
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(tree(dir.path), names);
+}
+
 // A video must have as many frames as its episode has steps, of the stated size.
+TEST(Verify, ANoteAboutManyEpisodesIsOneLine) {
+  VerifyResult result;
+  result.findings = {{false, "a.h5 traj_0", "has no 'qpos'"},
+                     {true, "a.h5 traj_0", "has no 'fail'"},
+                     {false, "a.h5 traj_1", "has no 'qpos'"},
+                     {true, "a.h5 traj_1", "has no 'fail'"},
+                     {false, "a.h5 traj_1", "has no 'qvel'"}};
+  EXPECT_THAT(result.text(), StartsWith("note: a.h5 traj_0 has no 'qpos' (and 1 more)\n"
+                                        "error: a.h5 traj_0 has no 'fail'\n"
+                                        "error: a.h5 traj_1 has no 'fail'\n"
+                                        "note: a.h5 traj_1 has no 'qvel'\n"
+                                        "NOT intact"));
+}
+
 TEST(Verify, CountsTheFramesOfEveryVideo) {
   TempDir dir, other;
   write_recording(dir.path, 3, {.worlds = 1}, true);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -269,9 +270,20 @@ bool VerifyResult::ok() const {
 
 std::string VerifyResult::text() const {
   std::string out;
-  for (const Finding& f : findings)
-    out += fmt::format("{}: {} {}\n", f.error ? "error" : "note", f.context, f.text);
-  out += fmt::format("{}: {} files, {} episodes, {} steps, {} videos",
+  std::map<std::string, int> notes;  // a note about many episodes is one line
+  for (const Finding& f : findings) {
+    if (!f.error) ++notes[f.text];
+  }
+  for (const Finding& f : findings) {
+    if (f.error) {
+      out += fmt::format("error: {} {}\n", f.context, f.text);
+    } else if (const auto same = notes.extract(f.text)) {
+      out += fmt::format("note: {} {}", f.context, f.text);
+      if (same.mapped() > 1) out += fmt::format(" (and {} more)", same.mapped() - 1);
+      out += "\n";
+    }
+  }
+  out += fmt::format("{}: {} files, {} episodes, {} observations, {} videos",
                      ok() ? "intact" : "NOT intact", files, episodes, steps, videos);
   if (unpublished > 0) out += fmt::format(", {} episodes not published", unpublished);
   return out + "\n";

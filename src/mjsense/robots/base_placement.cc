@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense::robots {
@@ -14,10 +15,6 @@ namespace {
 
 // m and rad; two poses that are closer than this are the same.
 constexpr double kSame = 1e-9;
-
-Pose body_pose(const mjModel* m, int body) {
-  return {vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)};
-}
 
 double distance(const Pose& a, const Pose& b) {
   return std::max(norm(a.p - b.p), angle_between(a.q, b.q));
@@ -39,7 +36,7 @@ BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const in
     if (m->body_mocapid[b] >= 0) {
       mocap_ = m->body_mocapid[b];
       is_mocap_ = b == base_body;
-      root_ = body_pose(m, b);
+      root_ = body_frame(m, b);
       break;
     }
     path.push_back(b);
@@ -47,7 +44,7 @@ BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const in
   std::ranges::reverse(path);
   Pose fixed;
   for (int b : path) {
-    fixed = fixed * body_pose(m, b);
+    fixed = fixed * body_frame(m, b);
     for (int j = m->body_jntadr[b]; j < m->body_jntadr[b] + m->body_jntnum[b]; ++j) {
       const int type = m->jnt_type[j];
       if (type != mjJNT_SLIDE && type != mjJNT_HINGE) {

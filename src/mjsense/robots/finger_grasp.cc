@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include "mjsense/observe/function_sensor.h"
+#include "mjsense/observe/touches.h"
+#include "mjsense/robots/robot_sensors.h"
 
 namespace mjsense::robots {
 
@@ -11,26 +13,18 @@ bool fingers_touch(const World& world, const MoveGroup& gripper, int body) {
   if (body < 0 || gripper.pad_sites[0] < 0 || gripper.pad_sites[1] < 0) return false;
   const mjModel* m = world.model;
   bool touches[2] = {false, false};
-  for (int c = 0; c < world.data->ncon; ++c) {
-    const mjContact& contact = world.data->contact[c];
-    if (contact.exclude != 0 || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-    const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-    const bool first = observe::is_descendant_or_self(m, a, body);
-    if (first == observe::is_descendant_or_self(m, b, body)) continue;
+  observe::each_touch(world, body, [&](const observe::Touch& touch) {
     for (int f = 0; f < 2; ++f) {
-      if (observe::is_descendant_or_self(m, first ? b : a, m->site_bodyid[gripper.pad_sites[f]]))
+      if (observe::is_descendant_or_self(m, touch.other, m->site_bodyid[gripper.pad_sites[f]]))
         touches[f] = true;
     }
-  }
+  });
   return touches[0] && touches[1];
 }
 
 std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
                                                           const observe::BodyRef& object) {
-  std::vector<const MoveGroup*> grippers;
-  for (const MoveGroup& group : robot.groups()) {
-    if (group.kind == GroupKind::kGripper) grippers.push_back(&group);
-  }
+  const std::vector<const MoveGroup*> grippers = grippers_of(robot);
   std::vector<std::shared_ptr<Sensor>> sensors;
   if (grippers.size() < 2) return sensors;
   for (const MoveGroup* gripper : grippers) {
@@ -40,9 +34,8 @@ std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
     spec.high = 1;
     spec.description = fmt::format("Both fingers of '{}' touch the task's object.", gripper->name);
     sensors.push_back(std::make_shared<observe::FunctionSensor<std::uint8_t>>(
-        fmt::format("{}_{}_grasp_state", robot.name(),
-                    gripper->name.substr(0, gripper->name.find('_'))),
-        spec, [gripper, object](const World& world, std::span<std::uint8_t> row) {
+        fmt::format("{}_{}_grasp_state", robot.name(), side_of(*gripper)), spec,
+        [gripper, object](const World& world, std::span<std::uint8_t> row) {
           row[0] = fingers_touch(world, *gripper, object(world.id)) ? 1 : 0;
         }));
   }

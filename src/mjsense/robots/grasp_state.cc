@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/observe/touches.h"
 
 namespace mjsense::robots {
 
@@ -20,12 +21,12 @@ void GraspStateSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
   const std::string context = fmt::format("sensor '{}'", name());
   object_.resolve(m, context);
-  gripper_bits_.assign(m->ngeom, 0);
+  gripper_bits_.assign(m->nbody, 0);
   clear_fields();
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
     const int root = observe::object_id(m, mjOBJ_BODY, context, grippers_[i].body);
-    for (int g = 0; g < m->ngeom; ++g) {
-      if (observe::is_descendant_or_self(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
+    for (int b = 0; b < m->nbody; ++b) {
+      if (observe::is_descendant_or_self(m, b, root)) gripper_bits_[b] |= 1u << i;
     }
     SensorSpec spec;
     spec.dtype = DType::kBool;
@@ -40,20 +41,11 @@ void GraspStateSensor::initialize(const SensorInit& init) {
 void GraspStateSensor::compute(const World& world) {
   std::uint32_t touching = 0;
   bool foreign = false;
-  const mjModel* m = world.model;
-  const mjData* d = world.data;
-  const int root = object_(world.id);
-  const auto in_object = [&](int geom) {
-    return observe::is_descendant_or_self(m, m->geom_bodyid[geom], root);
-  };
-  for (int c = 0; root >= 0 && c < d->ncon; ++c) {
-    const mjContact& contact = d->contact[c];
-    const int a = contact.geom[0], b = contact.geom[1];
-    if (contact.exclude != 0 || a < 0 || b < 0 || in_object(a) == in_object(b)) continue;
-    const std::uint32_t bits = gripper_bits_[in_object(a) ? b : a];
+  observe::each_touch(world, object_(world.id), [&](const observe::Touch& touch) {
+    const std::uint32_t bits = gripper_bits_[touch.other];
     touching |= bits;
     foreign |= bits == 0;
-  }
+  });
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
     const bool touches = touching >> i & 1u;
     fields()[2 * i].data.row<bool>(world.id)[0] = touches && !foreign;

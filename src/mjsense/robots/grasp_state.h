@@ -30,7 +30,7 @@ class GraspStateSensor final : public Sensor {
   static constexpr int kMaxGrippers = 30;
   observe::BodyRef object_;
   std::vector<Gripper> grippers_;            // gripper i has fields 2 i and 2 i + 1
-  std::vector<std::uint32_t> gripper_bits_;  // [ngeom]; bit i is set if the geom is in gripper i
+  std::vector<std::uint32_t> gripper_bits_;  // [nbody]; bit i is set if the body is in gripper i
 };
 
 }  // namespace mjsense::robots

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 
 namespace mjsense::robots {
 namespace {
@@ -152,7 +153,7 @@ Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const
   std::reverse(path.begin(), path.end());
   Pose fixed;
   for (int b : path) {
-    fixed = fixed * Pose{vec3(model->body_pos + 3 * b), quat(model->body_quat + 4 * b)};
+    fixed = fixed * body_frame(model, b);
     for (int j = model->body_jntadr[b]; j < model->body_jntadr[b] + model->body_jntnum[b]; ++j) {
       if (std::find(moving.begin(), moving.end(), j) == moving.end()) continue;
       const int type = model->jnt_type[j];

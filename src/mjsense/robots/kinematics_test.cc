@@ -6,8 +6,11 @@
 #include <memory>
 #include <string>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/robots/load_robot.h"
+#include "mjsense/scene/mj_spec.h"
 
 namespace mjsense::robots {
 namespace {
@@ -15,11 +18,12 @@ namespace {
 struct Fr3 : testing::Test {
   void SetUp() override {
     const RobotCfg robot = robot_cfg("franka");
-    mjSpec* spec = mj_copySpec(robot.model.spec);
-    model = mj_compile(spec, nullptr);
-    ASSERT_TRUE(model) << mjs_getError(spec);
-    mj_deleteSpec(spec);
-    data = mj_makeData(model);
+    const scene::SpecPtr spec(mj_copySpec(robot.model.spec));
+    owned_model.reset(mj_compile(spec.get(), nullptr));
+    ASSERT_TRUE(owned_model) << mjs_getError(spec.get());
+    owned_data = make_data(owned_model.get());
+    model = owned_model.get();
+    data = owned_data.get();
     for (int i = 1; i <= 7; ++i) {
       joints.push_back(mj_name2id(model, mjOBJ_JOINT, ("fr3_joint" + std::to_string(i)).c_str()));
     }
@@ -27,16 +31,14 @@ struct Fr3 : testing::Test {
     site = mj_name2id(model, mjOBJ_SITE, "gripper/grasp_site");
     chain = std::make_unique<Chain>(model, base, site, joints);
   }
-  void TearDown() override {
-    mj_deleteData(data);
-    mj_deleteModel(model);
-  }
   std::array<double, 7> random_configuration(Rng& rng) const {
     std::array<double, 7> q;
     for (int i = 0; i < 7; ++i) q[i] = rng.uniform(chain->low()[i], chain->high()[i]);
     return q;
   }
 
+  ModelPtr owned_model;
+  DataPtr owned_data;
   mjModel* model = nullptr;
   mjData* data = nullptr;
   std::vector<int> joints;
@@ -53,7 +55,7 @@ TEST_F(Fr3, ForwardKinematicsAndJacobianAgreeWithMuJoCo) {
     for (int i = 0; i < 7; ++i) data->qpos[model->jnt_qposadr[joints[i]]] = q[i];
     mj_kinematics(model, data);
     mj_comPos(model, data);
-    const Pose expected = pose_from_mat(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
+    const Pose expected = site_pose(data, site);
     const Pose leaf = chain->jacobian(q, jac);
     EXPECT_LT(norm(leaf.p - expected.p), 1e-12);
     EXPECT_LT(angle_between(leaf.q, expected.q), 1e-7);
@@ -77,11 +79,9 @@ TEST(Chain, OffsetJointsAgreeWithMuJoCo) {
         <body pos=".2 0 0"><joint name="b" type="slide" pos=".1 0 0" axis="1 0 1" range="-1 1"/><geom size=".1"/>
           <body pos="0 .2 0"><joint name="c" pos="0 .1 -.1" axis="0 0 1" range="-90 90"/><geom size=".1"/>
             <site name="leaf" pos=".1 .1 .1" euler="0 0 40"/></body></body></body></body></worldbody></mujoco>)";
-  char error[500] = "";
-  mjSpec* spec = mj_parseXMLString(xml, nullptr, error, sizeof(error));
-  ASSERT_TRUE(spec) << error;
-  mjModel* model = mj_compile(spec, nullptr);
-  mjData* data = mj_makeData(model);
+  const TestModel own(xml);
+  const mjModel* model = own.model;
+  mjData* data = own.data;
   const int joints[] = {0, 1, 2};
   const Chain chain(model, 1, 0, joints);
   const std::array<double, 3> q{0.7, -0.3, -1.1};
@@ -94,9 +94,6 @@ TEST(Chain, OffsetJointsAgreeWithMuJoCo) {
     EXPECT_LT(norm(pose.p - leaf.p), 1e-12);
     EXPECT_LT(angle_between(pose.q, leaf.q), 1e-7);
   }
-  mj_deleteData(data);
-  mj_deleteModel(model);
-  mj_deleteSpec(spec);
 }
 
 // The joint motion is exact away from singular configurations and bounded near them. Every fourth

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/named.h"
 #include "mjsense/robots/action_noise.h"
 #include "mjsense/scene/resolve.h"
@@ -89,7 +90,7 @@ Pose Robot::base_pose(const World& world) const {
 Pose Robot::leaf_pose(const World& world, int group) const {
   const int site = groups_[group].leaf_site;
   if (site < 0) return base_pose(world);
-  return pose_from_mat(world.data->site_xpos + 3 * site, world.data->site_xmat + 9 * site);
+  return site_pose(world.data, site);
 }
 
 Pose Robot::tcp_pose(const World& world, int group) const {

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/scene.h"
 
@@ -12,10 +14,6 @@ namespace mjsense::robots {
 namespace {
 
 using testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 // A Franka without other objects, in two worlds.
 struct Franka : testing::Test {
@@ -51,7 +49,7 @@ struct Franka : testing::Test {
   scene::Scene scene{scene_cfg()};
   const mjModel* model = scene.model();
   Robot robot{robot_cfg("franka"), model, 2};
-  std::unique_ptr<mjData, DataDelete> data[2];
+  DataPtr data[2];
   World worlds[2];
 };
 
@@ -215,12 +213,8 @@ TEST_F(Franka, CommandsAreClippedAndChecked) {
 
   target.pop_back();
   action.commands[robot.arm()].set(target);
-  try {
-    robot.command(worlds[0], action);
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("move group 'arm' takes 7 commands, but the action has 6"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] { robot.command(worlds[0], action); }),
+              HasSubstr("move group 'arm' takes 7 commands, but the action has 6"));
   target.assign(7, NAN);
   action.commands[robot.arm()].set(target);
   EXPECT_THROW(robot.command(worlds[0], action), ValueError);
@@ -312,12 +306,7 @@ TEST_F(Franka, ActionNoiseIsBoundedAtSingularPostures) {
 }
 
 TEST_F(Franka, UnknownNamesAreErrorsWithASuggestion) {
-  try {
-    robot.group_index("griper");
-    FAIL();
-  } catch (const KeyError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("'gripper'"));
-  }
+  EXPECT_THAT(error_of<KeyError>([&] { robot.group_index("griper"); }), HasSubstr("'gripper'"));
   RobotCfg wrong = robot_cfg("franka");
   wrong.groups[1].joints[2] = "fr3_jont3";
   try {

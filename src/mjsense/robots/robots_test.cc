@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
@@ -17,10 +18,6 @@ namespace mjsense::robots {
 namespace {
 
 using testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 // One robot without other objects, in one world.
 struct Alone {
@@ -71,7 +68,7 @@ struct Alone {
   std::unique_ptr<scene::Scene> scene;
   const mjModel* model = nullptr;
   std::unique_ptr<Robot> robot;
-  std::unique_ptr<mjData, DataDelete> data;
+  DataPtr data;
   World world;
 };
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
 
@@ -76,7 +77,8 @@ TEST_F(SceneRobot, GroupsHaveTheJointsOfTheirActuators) {
 
 TEST_F(SceneRobot, WithoutACommandControlsStay) {
   Robot robot(scene_robot(model, "arm", {}, ""), model, 1, "arm/");
-  mjData* data = mj_makeData(model);
+  const DataPtr owned = make_data(model);
+  mjData* data = owned.get();
   const World world{.id = 0, .model = model, .data = data};
   data->ctrl[0] = 1.5;
   data->ctrl[1] = -7;
@@ -93,7 +95,6 @@ TEST_F(SceneRobot, WithoutACommandControlsStay) {
   robot.command(world, action);
   robot.write_ctrl(world, state_row(data), nullptr);
   EXPECT_THAT(std::vector<double>(data->ctrl, data->ctrl + 3), ElementsAre(2, 1, 2));
-  mj_deleteData(data);
 }
 
 TEST_F(SceneRobot, WrongNamesAreErrors) {

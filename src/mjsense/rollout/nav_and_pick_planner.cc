@@ -27,33 +27,31 @@ NavAndPickPlanner::NavAndPickPlanner() : drive_(kNear) {}
 void NavAndPickPlanner::initialize(episode::Task& task) {
   drive_.initialize(*task.children()[0]);
   pick_.initialize(*task.children()[1]);
-  picks_.assign(task.num_worlds(), 0);
+  current_.assign(task.num_worlds(), &drive_);
 }
 
 void NavAndPickPlanner::reset(const World& world) {
-  picks_[world.id] = 0;
+  current_[world.id] = &drive_;
   drive_.reset(world);
 }
 
 void NavAndPickPlanner::act(const World& world, robots::Action& action) {
-  if (!picks_[world.id]) {
-    drive_.act(world, action);
-    const bool arrived = action.done && action.success != false;
-    if (!arrived) return;
-    picks_[world.id] = 1;
-    pick_.reset(world);
-  }
+  CombinedPlanner::act(world, action);
+  const bool arrived = action.done && action.success != false;
+  if (picks(world.id) || !arrived) return;
+  current_[world.id] = &pick_;
+  pick_.reset(world);
   pick_.act(world, action);
 }
 
 std::span<const episode::Phase> NavAndPickPlanner::phases() const { return kPhases; }
 
 int NavAndPickPlanner::phase(int world) const {
-  return picks_[world] ? pick_.phase(world) : kNavigate;
+  return picks(world) ? pick_.phase(world) : kNavigate;
 }
 
 int NavAndPickPlanner::num_retries(int world) const {
-  return drive_.num_retries(world) + (picks_[world] ? pick_.num_retries(world) : 0);
+  return drive_.num_retries(world) + (picks(world) ? pick_.num_retries(world) : 0);
 }
 
 }  // namespace mjsense::rollout

@@ -14,6 +14,7 @@
 #include "mjsense/policies/planner/manipulation_planner.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
+#include "mjsense/rollout/combined_planner.h"
 #include "mjsense/rollout/nav_and_pick_planner.h"
 
 namespace mjsense::rollout {
@@ -58,7 +59,7 @@ bool picks(const episode::Task& task) { return task.grasp_scene() && !has_its_ow
 bool has_planner(const episode::Task& task) { return task.grasp_scene() || has_its_own(task); }
 
 // Picks from above if possible, otherwise with the general manipulation planner.
-class TopDownPlanner final : public episode::PlannerPolicy {
+class TopDownPlanner final : public CombinedPlanner {
  public:
   std::string_view name() const override { return "top_down_planner"; }
   void initialize(episode::Task& task) override {
@@ -68,46 +69,22 @@ class TopDownPlanner final : public episode::PlannerPolicy {
                       "'planner' selects the planner by the task's type",
                       name(), task.name(), task.type()));
     }
-    if (!policies::PickPlanner::can_use(task.robot())) {
-      throw ValueError(
-          fmt::format("policy '{}' needs a gripper that only the joints of an arm move; robot '{}' "
-                      "has none: policy 'planner' picks with any gripper",
-                      name(), task.robot().name()));
-    }
     top_down_.initialize(task);
     any_direction_.initialize(task);
-    uses_any_direction_.assign(task.num_worlds(), 0);
+    current_.assign(task.num_worlds(), &top_down_);
   }
   void reset(const World& world) override {
+    current_[world.id] = &top_down_;
     top_down_.reset(world);
-    uses_any_direction_[world.id] =
-        top_down_.last_failure(world.id) == policies::PlanFailure::kUnplanned;
-    if (uses_any_direction_[world.id]) any_direction_.reset(world);
-  }
-  void act(const World& world, robots::Action& action) override {
-    active_planner(world.id).act(world, action);
+    if (top_down_.last_failure(world.id) != policies::PlanFailure::kUnplanned) return;
+    current_[world.id] = &any_direction_;
+    any_direction_.reset(world);
   }
   std::span<const episode::Phase> phases() const override { return top_down_.phases(); }
-  int phase(int world) const override { return active_planner(world).phase(world); }
-  int num_retries(int world) const override { return active_planner(world).num_retries(world); }
-  Pose grasp_pose(int world) const override { return active_planner(world).grasp_pose(world); }
-  std::vector<episode::PlannedPath> planned_paths(const World& world) const override {
-    return active_planner(world.id).planned_paths(world);
-  }
-  std::string failure(int world) const override { return active_planner(world).failure(world); }
 
  private:
-  policies::TaskPlanner& active_planner(int world) {
-    return uses_any_direction_[world] ? static_cast<policies::TaskPlanner&>(any_direction_)
-                                      : top_down_;
-  }
-  const policies::TaskPlanner& active_planner(int world) const {
-    return const_cast<TopDownPlanner*>(this)->active_planner(world);
-  }
-
   policies::PickPlanner top_down_;
   policies::ManipulationPlanner any_direction_;
-  std::vector<char> uses_any_direction_;  // [B], 1: the episode uses any_direction_
 };
 
 // The task itself if it has a planner, or the first child that a planner exists for. Tasks without
@@ -120,7 +97,7 @@ episode::Task& first_plannable(episode::Task& task) {
   return task;
 }
 
-class AnyPlanner final : public episode::PlannerPolicy {
+class AnyPlanner final : public CombinedPlanner {
  public:
   std::string_view name() const override { return "planner"; }
   void bind(const std::shared_ptr<sim::Simulation>& simulation) override {
@@ -132,25 +109,15 @@ class AnyPlanner final : public episode::PlannerPolicy {
     if (simulation_) planner_->bind(simulation_);
     simulation_.reset();
     planner_->initialize(doable);
+    current_.assign(doable.num_worlds(), planner_.get());
   }
   void reset(const World& world) override { planner_->reset(world); }
-  void act(const World& world, robots::Action& action) override { planner_->act(world, action); }
   void reset_all(episode::ActiveWorlds& worlds) override { planner_->reset_all(worlds); }
   void act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) override {
     planner_->act_all(worlds, actions);
   }
   std::span<const episode::Phase> phases() const override {
     return planner_ ? planner_->phases() : std::span<const episode::Phase>{};
-  }
-  int phase(int world) const override { return planner_->phase(world); }
-  int num_retries(int world) const override { return planner_->num_retries(world); }
-  Pose grasp_pose(int world) const override { return planner_->grasp_pose(world); }
-  std::vector<episode::PlannedPath> planned_paths(const World& world) const override {
-    return planner_->planned_paths(world);
-  }
-  std::string failure(int world) const override { return planner_->failure(world); }
-  std::vector<std::pair<std::string, std::string>> info(int world) const override {
-    return planner_->info(world);
   }
   bool has_grasp_pose() const override { return planner_ && planner_->has_grasp_pose(); }
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override {

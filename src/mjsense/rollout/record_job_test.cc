@@ -12,7 +12,6 @@
 namespace mjsense::rollout {
 namespace {
 
-using testing::error_of;
 using ::testing::HasSubstr;
 
 RecordJobCfg shard(const std::string& name, int attempts) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 
 namespace mjsense::rollout {
 namespace {
@@ -13,12 +14,7 @@ using testing::HasSubstr;
 
 template <class Make>
 void expect_unknown(Make&& make, const char* nearest) {
-  try {
-    make();
-    FAIL();
-  } catch (const KeyError& e) {
-    EXPECT_THAT(e.what(), HasSubstr(nearest));
-  }
+  EXPECT_THAT(error_of<KeyError>([&] { make(); }), HasSubstr(nearest));
 }
 
 TEST(Registry, CreatesEveryNamedTaskAndPolicy) {

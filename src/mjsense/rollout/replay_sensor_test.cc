@@ -44,7 +44,7 @@ void append(const Sensor& replay, Recorded& out) {
   out.mocap.push_back(row_of(replay, "mocap"));
 }
 
-scene::ModelPtr model_from(const scene::Scene& scene) {
+ModelPtr model_from(const scene::Scene& scene) {
   scene::Vfs vfs;
   std::string xml;
   for (const auto& [name, bytes] : unzip(scene::model_archive(scene))) {
@@ -81,7 +81,8 @@ void write_model(const std::vector<record::EpisodeArray>& arrays, mjModel* m) {
 
 // Steps open loop and returns the number of the first row that differs, or -1.
 int first_difference(const Recorded& recorded, const mjModel* m, int substeps) {
-  mjData* d = mj_makeData(m);
+  const DataPtr owned = make_data(m);
+  mjData* d = owned.get();
   std::vector<double> state = recorded.state[0];
   int different = -1;
   for (std::size_t t = 1; t < recorded.state.size() && different < 0; ++t) {
@@ -115,7 +116,6 @@ int first_difference(const Recorded& recorded, const mjModel* m, int substeps) {
     if (std::memcmp(state.data(), recorded.state[t].data(), state.size() * sizeof(double)) != 0)
       different = static_cast<int>(t);
   }
-  mj_deleteData(d);
   return different;
 }
 
@@ -149,7 +149,7 @@ RolloutCfg cfg_of(const std::string& task, const std::string& robot) {
 void expect_replays(const RolloutCfg& cfg, int steps) {
   Rollout rollout(cfg);
   Recorded recorded = play(rollout, steps);
-  const scene::ModelPtr m = model_from(rollout.simulation().scene());
+  const ModelPtr m = model_from(rollout.simulation().scene());
   ASSERT_TRUE(m);
   EXPECT_EQ(record::model_checksums(*m),
             record::model_checksums(*rollout.simulation().scene().model()));

@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/observe/shared_field.h"
+#include "mjsense/policies/planner/start_reach.h"
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/rollout/replay_sensor.h"
 #include "mjsense/rollout/task_defaults.h"
@@ -166,6 +167,7 @@ void Rollout::make() {
     });
   }
   if (policy_) task_->register_policy(*policy_);
+  reach_ = policies::StartReach::make(*task_);
   log_ = std::make_unique<ActionLog>(cfg_.num_worlds);
   if (cfg_.use_sensors) suite_ = core_suite(*task_, *log_, cameras_, robot_sensors());
   if (cfg_.more_sensors) {

@@ -35,6 +35,10 @@
 #include "mjsense/rollout/registry.h"
 #include "mjsense/sim/simulation.h"
 
+namespace mjsense::policies {
+class StartReach;
+}  // namespace mjsense::policies
+
 namespace mjsense::rollout {
 
 class ReplaySensor;
@@ -295,6 +299,7 @@ class Rollout {
   std::shared_ptr<episode::Task> task_;
   std::unique_ptr<cameras::CameraSystem> camera_system_;
   std::vector<RecordedCamera> cameras_;
+  std::unique_ptr<policies::StartReach> reach_;  // null: any start is accepted
   std::unique_ptr<ActionLog> log_;
   std::shared_ptr<ReplaySensor> replay_;
   observe::SensorSuite suite_;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/policies/planner/start_reach.h"
 #include "mjsense/rollout/action_sensors.h"
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/rollout/replay_sensor.h"
@@ -17,6 +18,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kDraws = 10;  // maximum draws of a start until one is playable
+// Further draws are accepted even if the robot does not reach the target: there may be no other.
+constexpr int kReachDraws = 6;
 
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -111,8 +114,9 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
   finish_rows();
 }
 
-// Samples the starts and makes them fresh. Starts that cannot be played are drawn again; those that
-// still cannot after kDraws draws become faults.
+// Samples the starts and makes them fresh. Starts that cannot be played are drawn again, as are those
+// in which the robot does not reach the target; those that still cannot be played after kDraws draws
+// become faults.
 void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
   std::vector<std::int64_t> of(num_worlds());
   for (std::size_t k = 0; k < worlds.size(); ++k) of[worlds[k]] = episodes[k];
@@ -124,7 +128,11 @@ void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> 
     for (int w : left) task_->sample(w, of[w], rows_[w], draw);
     simulation_->forward(left);
     take_failures();
-    for_each(left, [&](const World& world) { why[world.id] = task_->start_error(world); });
+    for_each(left, [&](const World& world) {
+      why[world.id] = task_->start_error(world);
+      if (why[world.id].empty() && reach_ && draw < kReachDraws && !(*reach_)(world))
+        why[world.id] = "the robot does not reach the target";
+    });
     std::erase_if(left, [&](int w) { return why[w].empty() || !faults_[w].empty(); });
   }
   for (int w : left) set_fault(w, std::move(why[w]));

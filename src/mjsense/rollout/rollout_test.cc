@@ -12,6 +12,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/row_error.h"
 #include "mjsense/core/testing/allocations.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/record/molmospaces.h"
 
@@ -420,12 +421,7 @@ TEST(Rollout, WrongNamesAndNumbersThrow) {
   const auto error = [](auto change) -> std::string {
     RolloutCfg cfg = blind();
     change(cfg);
-    try {
-      Rollout rollout(cfg);
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { Rollout rollout(cfg); });
   };
   EXPECT_EQ(error([](RolloutCfg& c) { c.num_worlds = -2; }), "worlds is -2: must be at least 1");
   EXPECT_EQ(error([](RolloutCfg& c) { c.cameras = {{"wrist_camra"}}; }),

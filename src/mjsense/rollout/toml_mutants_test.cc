@@ -19,6 +19,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/data_file.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/episode/testing/played_task.h"
@@ -48,8 +49,7 @@ void use(episode::TaskCfg cfg, bool plan) {
   const std::unique_ptr<episode::Policy> policy = make_policy("planner");
   task->register_policy(*policy);
   if (!plan) return;
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(scene.model()),
-                                                               mj_deleteData);
+  const DataPtr data = make_data(scene.model());
   task->sample(0, 0, robots::state_row(data.get()));
   mj_forward(scene.model(), data.get());
   const World world{.id = 0, .model = scene.model(), .data = data.get()};

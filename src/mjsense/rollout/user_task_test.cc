@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/rollout/rollout.h"
 #include "mjsense/scene/resolve.h"
@@ -206,12 +207,8 @@ TEST_F(OwnTask, RegisteredTaskHasAName) {
   rollout.act();
   rollout.step();
   EXPECT_EQ(rollout.fault(0), "");
-  try {
-    register_task("cart", nullptr);
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "a task named 'cart' is already registered");
-  }
+  EXPECT_EQ(error_of<ValueError>([&] { register_task("cart", nullptr); }),
+            "a task named 'cart' is already registered");
   EXPECT_THROW(register_policy("planner", nullptr), ValueError);
   EXPECT_THROW(register_policy("", nullptr), ValueError);
 }
@@ -219,12 +216,8 @@ TEST_F(OwnTask, RegisteredTaskHasAName) {
 TEST_F(OwnTask, PickNeedsARobot) {
   RolloutCfg cfg = two_worlds();
   cfg.robot = "";
-  try {
-    Rollout rollout(cfg);
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "task 'pick' needs a robot, and none is given");
-  }
+  EXPECT_EQ(error_of<ValueError>([&] { Rollout rollout(cfg); }),
+            "task 'pick' needs a robot, and none is given");
 }
 
 TEST_F(OwnTask, TaskMayEditTheSuite) {
@@ -233,12 +226,8 @@ TEST_F(OwnTask, TaskMayEditTheSuite) {
   EXPECT_THAT(rollout.suite().names(), ElementsAre("mark", "qpos"));
   auto wrong = std::make_shared<CartTask>(episode::TaskCfg{});
   wrong->keep = {"qpo"};
-  try {
-    Rollout other(two_worlds(), wrong, nullptr);
-    FAIL();
-  } catch (const KeyError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("did you mean 'qpos'?"));
-  }
+  EXPECT_THAT(error_of<KeyError>([&] { Rollout other(two_worlds(), wrong, nullptr); }),
+              HasSubstr("did you mean 'qpos'?"));
 }
 
 TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallers) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense::scene {
@@ -89,15 +90,13 @@ TEST(CompiledModel, AddedSensorsAndCamerasFollowThoseOfTheModel) {
 
 TEST(CompiledModel, OtherAdditionsAreRefusedWithTheirXml) {
   const ModelPtr model = compiled(kModel);
-  try {
-    extended(model.get(), [](mjSpec* spec) {
-      mjs_setName(mjs_addSite(mjs_findBody(spec, "b"), nullptr)->element, "mark");
-    });
-    FAIL();
-  } catch (const ValueError& error) {
-    EXPECT_THAT(error.what(), testing::StartsWith("the model has no site 'mark', which a sensor "
-                                                  "needs: add <site name=\"mark\""));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] {
+                extended(model.get(), [](mjSpec* spec) {
+                  mjs_setName(mjs_addSite(mjs_findBody(spec, "b"), nullptr)->element, "mark");
+                });
+              }),
+              testing::StartsWith("the model has no site 'mark', which a sensor "
+                                  "needs: add <site name=\"mark\""));
 }
 
 TEST(CompiledModel, UnnamedElementsGetTheNamesOfABase) {

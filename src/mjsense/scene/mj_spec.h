@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scene/entity.h"
 
 namespace mjsense::scene {
@@ -22,11 +23,7 @@ struct SpecDelete {
     if (owned) mj_deleteSpec(spec);
   }
 };
-struct ModelDelete {
-  void operator()(mjModel* model) const { mj_deleteModel(model); }
-};
 using SpecPtr = std::unique_ptr<mjSpec, SpecDelete>;
-using ModelPtr = std::unique_ptr<mjModel, ModelDelete>;
 
 // Files in memory for parsing and compiling.
 class Vfs {

@@ -11,6 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/pose.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/physics_options.h"
 #include "mjsense/scene/resolve.h"
 
@@ -189,12 +190,7 @@ TEST(Scene, LooksUpWithNearestNames) {
       resolve(scene.model(), &scene, {.type = "site", .name = "imu", .entity = "robot"}, "test");
   EXPECT_EQ(name_of(scene.model(), site.type, site.id), "robot/imu");
   const auto fault_of = [&](ObjRef ref) -> std::string {
-    try {
-      resolve(scene.model(), &scene, ref, "sensor 's'");
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return error_of([&] { resolve(scene.model(), &scene, ref, "sensor 's'"); });
   };
   EXPECT_EQ(fault_of({"site", "imu", "robo"}),
             "sensor 's': no entity named 'robo'; did you mean 'robot'?");

@@ -9,6 +9,8 @@
 #include <memory>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense::scene {
@@ -16,10 +18,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 TEST(Terrain, PlaneOriginsAreAGrid) {
   Terrain plane({});
@@ -54,7 +52,7 @@ class Generated {
 
  private:
   std::unique_ptr<Scene> scene_;
-  std::unique_ptr<mjData, DataDelete> data_;
+  DataPtr data_;
 };
 
 TEST(Terrain, SpawnPointsAreOnTheGround) {
@@ -179,14 +177,11 @@ TEST(Terrain, TheColourIsThatOfTheDifficulty) {
 
 TEST(Terrain, ErrorsNameTheSetting) {
   const auto fault = [](TerrainCfg cfg) -> std::string {
-    try {
+    return error_of<ValueError>([&] {
       SceneCfg scene;
       scene.terrain = std::move(cfg);
       Scene{std::move(scene)};
-    } catch (const ValueError& error) {
-      return error.what();
-    }
-    return "";
+    });
   };
   EXPECT_THAT(fault({.terrain_type = "generator", .levels = 0}),
               HasSubstr("terrain: levels is 0: must be at least 1"));

@@ -8,8 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "mjsense/core/mujoco_call.h"
-#include "mjsense/observe/frame.h"
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/observe/touches.h"
+#include "mjsense/robots/hands.h"
 
 namespace mjsense::scenes {
 namespace {
@@ -43,7 +45,7 @@ std::vector<Vec3> targets(const mjModel* m, const EpisodeScene& scene) {
   }
   if (!points.empty()) return points;
   for (const SceneObject& object : scene.objects())
-    points.push_back(vec3(m->qpos0 + m->jnt_qposadr[m->body_jntadr[object.body]]));
+    points.push_back(vec3(m->qpos0 + free_qpos(m, object.body)));
   return points;
 }
 
@@ -97,10 +99,7 @@ class Search {
  public:
   Search(const mjModel* model, const robots::Robot& robot, const EpisodeScene& scene,
          std::span<const Vec3> surface, bool stooped)
-      : model_(model),
-        robot_(robot),
-        scene_(scene),
-        data_(call_mujoco(mj_makeData, model), mj_deleteData) {
+      : model_(model), robot_(robot), scene_(scene), data_(make_data(model)) {
     start_ = start_of(model, robot, stooped);
     for (Vec3 p : surface) {
       for (double height : kHeights) points_.push_back(p + Vec3{0, 0, height});
@@ -162,27 +161,22 @@ class Search {
     }
     // objects are placed later, at a distance from the robot
     for (const SceneObject& object : scene_.objects())
-      data_->qpos[model_->jnt_qposadr[model_->body_jntadr[object.body]]] += 100;
+      data_->qpos[free_qpos(model_, object.body)] += 100;
     mj_kinematics(model_, data_.get());
     mj_comPos(model_, data_.get());
     mj_collision(model_, data_.get());
     const int root = model_->body_rootid[robot_.base_body()];
-    for (int c = 0; c < data_->ncon; ++c) {
-      const mjContact& contact = data_->contact[c];
-      if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > -kDeep) continue;
-      const int a = model_->body_rootid[model_->geom_bodyid[contact.geom[0]]];
-      const int b = model_->body_rootid[model_->geom_bodyid[contact.geom[1]]];
-      if ((a == root) != (b == root)) return false;
-    }
-    return !stands_in_something(root);
+    bool collides = false;
+    observe::each_touch(model_, data_.get(), root, [&](const observe::Touch& touch) {
+      collides = collides || touch.contact->dist <= -kDeep;
+    });
+    return !collides && !stands_in_something(root);
   }
 
   // MuJoCo generates no contacts between static geoms, such as a robot's base and furniture.
   bool stands_in_something(int root) const {
     const auto stands = [&](int g) {
-      const int body = model_->geom_bodyid[g];
-      return model_->body_treeid[body] < 0 &&
-             (model_->geom_contype[g] || model_->geom_conaffinity[g]);
+      return model_->body_treeid[model_->geom_bodyid[g]] < 0 && is_solid(model_, g);
     };
     for (int a = 0; a < model_->ngeom; ++a) {
       if (!stands(a) || model_->body_rootid[model_->geom_bodyid[a]] != root) continue;
@@ -200,7 +194,7 @@ class Search {
   const mjModel* model_;
   const robots::Robot& robot_;
   const EpisodeScene& scene_;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data_;
+  DataPtr data_;
   robots::RobotValues start_;
   std::vector<Vec3> points_;  // m, world
 };
@@ -226,13 +220,11 @@ BasePlacementSearch::BasePlacementSearch(const mjModel* model, robots::Robot& ro
   if (surface.empty()) return;
   const SceneRobotCfg& cfg = scene.cfg().robot;
   const Pose base{{cfg.pos[0], cfg.pos[1], cfg.pos[2]}, axis_angle({0, 0, 1}, cfg.yaw * pi / 180)};
-  bool has_arm = false, floats = false;
-  for (const robots::MoveGroup& group : robot.groups()) {
-    has_arm = has_arm || (group.kind == robots::GroupKind::kArm && group.leaf_site >= 0);
-    floats = floats || (group.kind == robots::GroupKind::kBase && group.command_size == 7);
-  }
+  const bool has_arm = std::ranges::any_of(robot.groups(), [](const robots::MoveGroup& group) {
+    return group.kind == robots::GroupKind::kArm && group.leaf_site >= 0;
+  });
   if (!has_arm) {
-    if (!floats || robot.gripper() < 0) return;
+    if (robots::floating_base(robot) < 0 || robot.gripper() < 0) return;
     Vec3 middle;
     double top = surface[0].z;
     for (Vec3 p : surface) {

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <memory>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scenes/load_scene.h"
@@ -63,7 +64,7 @@ TEST(BasePlacementSearch, MovedBaseIsCollisionFree) {
   scene::Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
   const mjModel* model = scene.model();
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
+  const DataPtr data = make_data(model);
   const int root = model->body_rootid[task.robot().base_body()];
   for (int episode = 0; episode < 16; ++episode) {
     mj_resetData(model, data.get());
@@ -109,7 +110,7 @@ model = "cube.xml"
     scene::Scene scene(task.scene_cfg_with_robot());
     const mjModel* model = scene.model();
     task.initialize(model, 1);
-    const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
+    const DataPtr data = make_data(model);
     task.sample(0, 0, robots::state_row(data.get()));
     mj_kinematics(model, data.get());
     EXPECT_NEAR(task.robot().base_pose({.id = 0, .model = model, .data = data.get()}).p.z, z, 1e-9)

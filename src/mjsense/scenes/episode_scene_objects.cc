@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/model_parts.h"
 #include "mjsense/scene/resolve.h"
@@ -33,24 +34,15 @@ bool is_free(const mjModel* m, int body) {
 
 bool touches(const mjModel* m, int body) {
   for (int g = 0; g < m->ngeom; ++g) {
-    const bool solid = m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
-    if (solid && observe::is_descendant_or_self(m, m->geom_bodyid[g], body)) return true;
+    if (is_solid(m, g) && observe::is_descendant_or_self(m, m->geom_bodyid[g], body)) return true;
   }
   return false;
 }
 
 // Smallest horizontal or vertical extent of a shape, m.
 double min_extent(const episode::ObjectShape& shape) {
-  double low[3] = {1e10, 1e10, 1e10}, high[3] = {-1e10, -1e10, -1e10};
-  for (Vec3 p : shape.points) {
-    for (int i = 0; i < 3; ++i) {
-      low[i] = std::min(low[i], p[i]);
-      high[i] = std::max(high[i], p[i]);
-    }
-  }
-  double minimum = 1e10;
-  for (int i = 0; i < 3; ++i) minimum = std::min(minimum, high[i] - low[i]);
-  return minimum;
+  const Vec3 size = aabb_of(shape.points).size();
+  return std::min({size.x, size.y, size.z});
 }
 
 // A gripper grasps an object at its smallest extent.

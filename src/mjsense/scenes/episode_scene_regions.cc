@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/episode_scene.h"
@@ -24,10 +25,10 @@ struct LevelBox {
 
 std::optional<LevelBox> level_box(const mjModel* m, int g) {
   if (m->geom_type[g] != mjGEOM_BOX) return {};
-  Pose pose{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)};
+  Pose pose = geom_frame(m, g);
   for (int body = m->geom_bodyid[g]; body > 0; body = m->body_parentid[body]) {
     if (m->body_jntnum[body] > 0) return {};
-    pose = Pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)} * pose;
+    pose = body_frame(m, body) * pose;
   }
   const double* half = m->geom_size + 3 * g;
   LevelBox box{.geom = g, .x = pose.p.x, .y = pose.p.y, .top = pose.p.z};
@@ -133,18 +134,13 @@ std::vector<Pose> EpisodeScene::elsewhere(int geom) const {
   for (int body = model_->geom_bodyid[geom]; body > 0; body = model_->body_parentid[body]) {
     const auto one = furniture_.find(body);
     if (one == furniture_.end()) continue;
-    const Pose here{vec3(model_->body_pos + 3 * body), quat(model_->body_quat + 4 * body)};
-    Pose parent;
-    for (int p = model_->body_parentid[body]; p > 0; p = model_->body_parentid[p])
-      parent = Pose{vec3(model_->body_pos + 3 * p), quat(model_->body_quat + 4 * p)} * parent;
+    const Pose here = body_frame(model_, body);
+    const Pose parent = in_ancestor(model_, {}, model_->body_parentid[body]);
     if (moves.empty()) moves.emplace_back();
     std::vector<Pose> all;
     for (const double turn : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
       if (turn != 0 && one->second.angle == 0) continue;
-      for (int corner = 0; corner < 8; ++corner) {
-        const auto& by = one->second.pos;
-        const Vec3 move{corner & 1 ? by[0] : -by[0], corner & 2 ? by[1] : -by[1],
-                        corner & 4 ? by[2] : -by[2]};
+      for (Vec3 move : box_corners({}, vec3(one->second.pos.data()))) {
         const Pose there{here.p + move,
                          axis_angle({0, 0, 1}, turn * one->second.angle * pi / 180) * here.q};
         const Pose moved = parent * there * inverse(parent * here);

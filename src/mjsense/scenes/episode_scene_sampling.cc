@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/absent_objects.h"
 #include "mjsense/scenes/episode_scene.h"
@@ -96,7 +97,7 @@ std::vector<int> EpisodeScene::adopt(int world, std::uint64_t seed, std::uint64_
   draw_sizes(world, seed, episode);
   std::vector<int> here;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
-    const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[i].body]];
+    const double* qpos = state.qpos + free_qpos(model_, objects_[i].body);
     char& present = present_[world * objects_.size() + i];
     present = qpos[1] < kAway ? 1 : 0;
     if (present) here.push_back(static_cast<int>(i));
@@ -121,7 +122,7 @@ bool EpisodeScene::body_present(int world, int body) const {
 }
 
 void EpisodeScene::set_target(int world, int target, const robots::StateRow& state) {
-  const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
+  const double* qpos = state.qpos + free_qpos(model_, objects_[target].body);
   const Pose pose{vec3(qpos), quat(qpos + 3)};
   support_[world] = std::numeric_limits<double>::max();
   for (Vec3 point : shape(world, target).points)

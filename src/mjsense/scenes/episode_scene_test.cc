@@ -13,7 +13,9 @@
 #include <set>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
+#include "mjsense/scenes/load_scene.h"
 
 namespace mjsense::scenes {
 namespace {
@@ -283,12 +285,8 @@ TEST(EpisodeScene, FreeEntityThatIsNotPlacedThrows) {
       "sofa.xml",
       R"(<mujoco><worldbody><body name="sofa"><geom type="box" size=".5 .9 .4"/></body></worldbody></mujoco>)");
   files.cfg.entities.push_back({.name = "sofa", .model = files.dir.file("sofa.xml"), .free = true});
-  try {
-    Played played(files.cfg);
-    ADD_FAILURE() << "nothing said";
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("scene 'two_tables': entity 'sofa' is not graspable"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] { Played played(files.cfg); }),
+              HasSubstr("scene 'two_tables': entity 'sofa' is not graspable"));
   files.cfg.entities.back().pos = {-2, -2, .4};
   EXPECT_NO_THROW(Played played(files.cfg));
 }
@@ -416,12 +414,7 @@ TEST(EpisodeScene, FaultsNameTheSetting) {
   const auto fault = [](const std::function<void(SceneFileCfg&)>& change) {
     Files files;
     change(files.cfg);
-    try {
-      Played played(files.cfg);
-    } catch (const Error& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return error_of([&] { Played played(files.cfg); });
   };
   EXPECT_THAT(fault([](auto& c) { c.regions[0].on = "room/tap"; }),
               HasSubstr("scene 'two_tables', region 'table': no geom named 'room/tap'; did you "
@@ -439,6 +432,42 @@ TEST(EpisodeScene, FaultsNameTheSetting) {
               HasSubstr("vary light"));
   EXPECT_THAT(fault([](auto& c) { c.entities[1].name = "b"; }), HasSubstr("two entities"));
   EXPECT_THAT(fault([](auto& c) { c.entities[1].name = "room"; }), HasSubstr("two entities"));
+}
+
+TEST(EpisodeScene, VaryEntriesFollowThoseOfTheBase) {
+  const Files files;
+  files.write("base.toml", R"(
+name = "base"
+[[entities]]
+name = "room"
+model = "room.xml"
+[[vary]]
+what = "material"
+pattern = "room/top"
+brightness = [0.5, 0.6]
+[[vary]]
+what = "material"
+pattern = "absent/.*"
+)");
+  const std::string head = "name = \"mine\"\nextends = \"base.toml\"\n";
+  files.write("more.toml", head + "[[vary]]\nwhat = \"light\"\npattern = \"room/lamp\"\n");
+  files.write("none.toml", head + "vary = []\n");
+  files.write("wrong.toml", head + "[[vary]]\nwhat = \"light\"\npattern = \"room/sun\"\n");
+  const auto patterns = [&](const char* file) {
+    std::vector<std::string> found;
+    for (const SceneVaryCfg& vary : load_scene(files.dir.file(file)).vary)
+      found.push_back(vary.pattern);
+    return found;
+  };
+  EXPECT_THAT(patterns("more.toml"), ::testing::ElementsAre("room/top", "absent/.*", "room/lamp"));
+  EXPECT_THAT(patterns("none.toml"), ::testing::IsEmpty());
+
+  const auto message = [&](const char* file) -> std::string {
+    return error_of<KeyError>([&] { Played played(load_scene(files.dir.file(file))); });
+  };
+  EXPECT_EQ(message("more.toml"), "");  // the inherited 'absent/.*' matches nothing
+  EXPECT_THAT(message("base.toml"), HasSubstr("absent"));
+  EXPECT_THAT(message("wrong.toml"), HasSubstr("room/sun"));
 }
 
 // Absent objects neither move nor touch anything, though the floor extends to where they are.

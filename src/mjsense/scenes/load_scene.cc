@@ -29,8 +29,13 @@ void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
     const bool is_path = own.extends.ends_with(".toml");
     read(kScenes.find(is_path ? resolve_relative(file.path, own.extends) : own.extends), cfg,
          depth + 1);
+    for (SceneVaryCfg& vary : cfg.vary) vary.optional = true;
   }
+  const std::vector<SceneVaryCfg> inherited = cfg.vary;
   read_toml_fields(file.text, file.path, cfg);
+  // The entries of `vary` follow those of the base. `vary = []` removes the base's: then `own.vary`
+  // and `cfg.vary` are both empty.
+  if (!own.vary.empty()) cfg.vary.insert(cfg.vary.begin(), inherited.begin(), inherited.end());
   // Paths in the file are relative to its folder.
   if (!own.entities.empty()) {
     for (SceneEntityCfg& entity : cfg.entities)

@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/scenes/colour_words.h"
 
 namespace mjsense::scenes {
@@ -58,17 +59,12 @@ std::vector<Seen> present_objects(const World& world, const EpisodeScene& scene,
   for (int i = 0; i < static_cast<int>(scene.objects().size()); ++i) {
     if (!scene.present(world.id, i)) continue;
     const SceneObject& object = scene.objects()[i];
-    Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
-    for (Vec3 p : scene.shape(world.id, i).points) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
-    const Pose pose{vec3(world.data->xpos + 3 * object.body),
-                    quat(world.data->xquat + 4 * object.body)};
-    const Vec3 size = high - low;
+    const Aabb box = aabb_of(scene.shape(world.id, i).points);
+    const Pose pose = body_pose(world.data, object.body);
+    const Vec3 size = box.size();
     Seen one{.index = i,
              .names = object.others,
-             .at = to_robot * (pose * (0.5 * (low + high))),
+             .at = to_robot * (pose * box.center()),
              .edge = std::max({size.x, size.y, size.z}),
              .volume = size.x * size.y * size.z,
              .colour = colour_words(world.model, object.body),
@@ -82,7 +78,9 @@ std::vector<Seen> present_objects(const World& world, const EpisodeScene& scene,
 // Phrases about one object of `all`.
 class Describer {
  public:
-  Describer(std::vector<Seen> all, int object) : all_(std::move(all)) {
+  // `place`: the text between a noun and its place, " " or " that is ".
+  Describer(std::vector<Seen> all, int object, const char* place)
+      : all_(std::move(all)), place_(place) {
     for (Seen& one : all_) {
       if (one.index == object) it_ = &one;
     }
@@ -175,13 +173,13 @@ class Describer {
         if (along(d) < kApart || across > kSlope * along(d)) continue;
         if (std::ranges::any_of(rivals, [&](auto* r) { return along(from_mark(*r)) > 0; }))
           continue;
-        add(2, fmt::format("{} {} the {}", noun, to.text, name));
+        add(2, fmt::format("{}{}{} the {}", noun, place_, to.text, name));
       }
       if (away <= kNext && std::ranges::all_of(rivals, [&](auto* r) {
             const Vec3 v = from_mark(*r);
             return r == &mark || std::hypot(v.x, v.y) > kNotNext;
           }))
-        add(2, fmt::format("{} next to the {}", noun, name));
+        add(2, fmt::format("{}{}next to the {}", noun, place_, name));
     }
   }
 
@@ -201,7 +199,7 @@ class Describer {
                p.z > region.height && p.z < region.height + kAbove;
       };
       if (on(*it_) && std::ranges::none_of(rivals, [&](auto* r) { return on(*r); }))
-        add(2, fmt::format("{} on the {}", noun, named[i].text));
+        add(2, fmt::format("{}{}on the {}", noun, place_, named[i].text));
     }
   }
 
@@ -213,19 +211,20 @@ class Describer {
     const auto distance = [](const Seen& one) { return std::hypot(one.at.x, one.at.y); };
     const bool two = rivals.size() == 1;
     if (most([](const Seen& one) { return one.at.y; }))
-      add(3, two ? noun + " on the left" : "leftmost " + noun);
+      add(3, two ? noun + place_ + "on the left" : "leftmost " + noun);
     if (most([](const Seen& one) { return -one.at.y; }))
-      add(3, two ? noun + " on the right" : "rightmost " + noun);
+      add(3, two ? noun + place_ + "on the right" : "rightmost " + noun);
     if (most([&](const Seen& one) { return -distance(one); })) {
-      add(3, noun + (two ? " closer to the robot" : " closest to the robot"));
+      add(3, noun + place_ + (two ? "closer to the robot" : "closest to the robot"));
       add(3, two ? "nearer " + noun : "nearest " + noun);
     }
     if (most(distance))
-      add(3, noun + (two ? " farther from the robot" : " farthest from the robot"));
+      add(3, noun + place_ + (two ? "farther from the robot" : "farthest from the robot"));
   }
 
   std::vector<Seen> all_;
   const Seen* it_ = nullptr;
+  const char* place_;
   References found_;
 };
 
@@ -240,8 +239,9 @@ bool may_be_called(std::string_view name, std::string_view phrase) {
 }
 
 References object_references(const World& world, const EpisodeScene& scene, int object,
-                             const Pose& robot, std::span<const int> other_objects, bool far) {
-  return Describer(present_objects(world, scene, robot), object)
+                             const Pose& robot, std::span<const int> other_objects, bool far,
+                             bool clauses) {
+  return Describer(present_objects(world, scene, robot), object, clauses ? " that is " : " ")
       .describe(world, scene, robot, other_objects, far);
 }
 

@@ -24,10 +24,11 @@ namespace mjsense::scenes {
 using References = std::array<std::vector<std::string>, 4>;
 
 // `robot`: the pose of its base. `other_objects`: objects that the phrases do not mention. `far`:
-// the robot is not near the objects, so that phrases do not use its directions.
+// the robot is not near the objects, so that phrases do not use its directions. `clauses`: places are
+// clauses, "the mug that is behind the plate", which cannot be read as the goal of a motion.
 References object_references(const World& world, const EpisodeScene& scene, int object,
                              const Pose& robot, std::span<const int> other_objects = {},
-                             bool far = false);
+                             bool far = false, bool clauses = false);
 
 // Draws one of them, or returns "" if there is none: the kind first, with fixed weights.
 std::string draw_reference(const References& references, Rng& rng);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense::scenes {
@@ -15,10 +16,6 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-
 // From above, with the robot at the origin, which looks along x:
 //
 //   x = 0.7           plate
@@ -27,7 +24,7 @@ struct DataDelete {
 struct Table {
   std::unique_ptr<EpisodeScene> scene;
   std::unique_ptr<scene::Scene> compiled;
-  std::unique_ptr<mjData, DataDelete> data;
+  DataPtr data;
 
   explicit Table(const char* small_rgba = "0.8 0.1 0.1 1") {
     SceneFileCfg cfg;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
@@ -29,35 +30,27 @@ std::vector<double> ObjectSizes::steps(const std::array<double, 2>& range) {
   return all;
 }
 
-template <class T>
-ObjectSizes::Own<T> ObjectSizes::own(mjBatch* batch, const char* field, const T* model) {
-  Own<T> all;
-  all.rows = static_cast<T*>(mjb_expand(batch, field, &all.size, nullptr));
-  all.model = model;
-  return all;
-}
-
 ObjectSizes::ObjectSizes(sim::Simulation& simulation, std::span<const int> bodies,
                          std::vector<std::vector<double>> sizes, std::string_view context)
     : m_(simulation.scene().model()), sizes_(std::move(sizes)) {
   mjBatch* batch = simulation.worlds().batch();
-  geom_size_ = own(batch, "geom_size", m_->geom_size);
-  geom_pos_ = own(batch, "geom_pos", m_->geom_pos);
-  geom_quat_ = own(batch, "geom_quat", m_->geom_quat);
-  geom_rbound_ = own(batch, "geom_rbound", m_->geom_rbound);
-  geom_aabb_ = own(batch, "geom_aabb", m_->geom_aabb);
-  geom_dataid_ = own(batch, "geom_dataid", m_->geom_dataid);
-  body_mass_ = own(batch, "body_mass", m_->body_mass);
-  body_inertia_ = own(batch, "body_inertia", m_->body_inertia);
-  body_ipos_ = own(batch, "body_ipos", m_->body_ipos);
-  body_pos_ = own(batch, "body_pos", m_->body_pos);
-  subtree_mass_ = own(batch, "body_subtreemass", m_->body_subtreemass);
-  body_invweight_ = own(batch, "body_invweight0", m_->body_invweight0);
-  dof_invweight_ = own(batch, "dof_invweight0", m_->dof_invweight0);
-  dof_m0_ = own(batch, "dof_M0", m_->dof_M0);
+  geom_size_.expand(batch, "geom_size", m_->geom_size);
+  geom_pos_.expand(batch, "geom_pos", m_->geom_pos);
+  geom_quat_.expand(batch, "geom_quat", m_->geom_quat);
+  geom_rbound_.expand(batch, "geom_rbound", m_->geom_rbound);
+  geom_aabb_.expand(batch, "geom_aabb", m_->geom_aabb);
+  geom_dataid_.expand(batch, "geom_dataid", m_->geom_dataid);
+  body_mass_.expand(batch, "body_mass", m_->body_mass);
+  body_inertia_.expand(batch, "body_inertia", m_->body_inertia);
+  body_ipos_.expand(batch, "body_ipos", m_->body_ipos);
+  body_pos_.expand(batch, "body_pos", m_->body_pos);
+  subtree_mass_.expand(batch, "body_subtreemass", m_->body_subtreemass);
+  body_invweight_.expand(batch, "body_invweight0", m_->body_invweight0);
+  dof_invweight_.expand(batch, "dof_invweight0", m_->dof_invweight0);
+  dof_m0_.expand(batch, "dof_M0", m_->dof_M0);
   if (m_->nsite > 0) {
-    site_pos_ = own(batch, "site_pos", m_->site_pos);
-    site_size_ = own(batch, "site_size", m_->site_size);
+    site_pos_.expand(batch, "site_pos", m_->site_pos);
+    site_size_.expand(batch, "site_size", m_->site_size);
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     Object& object = objects_.emplace_back();
@@ -112,7 +105,7 @@ void ObjectSizes::widen(mjBatch* batch, int body, const std::vector<double>& siz
 ObjectSizes::Shown ObjectSizes::shown(int geom, int mesh, double size) const {
   Shown out{};
   out.mesh = mesh;
-  Pose pose{vec3(m_->geom_pos + 3 * geom), quat(m_->geom_quat + 4 * geom)};
+  Pose pose = geom_frame(m_, geom);
   pose.p = size * pose.p;
   pose = pose * Pose{vec3(m_->mesh_pos + 3 * mesh), quat(m_->mesh_quat + 4 * mesh)};
   write_vec(pose.p, out.pos);

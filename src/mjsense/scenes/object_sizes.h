@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/scenes/world_field.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::scenes {
@@ -47,16 +48,6 @@ class ObjectSizes {
     std::vector<int> bodies, geoms, sites;
     std::vector<MeshGeom> meshes;
   };
-  // A model field of which each world has its own copy.
-  template <class T>
-  struct Own {
-    T* rows = nullptr;
-    const T* model = nullptr;
-    int size = 0;
-    T* of(int world) const { return rows + static_cast<std::ptrdiff_t>(world) * size; }
-  };
-  template <class T>
-  static Own<T> own(mjBatch* batch, const char* field, const T* model);
   Shown shown(int geom, int mesh, double size) const;
   void widen(mjBatch* batch, int body, const std::vector<double>& sizes) const;
   void set_object(int world, const Object& object, int step, double size) const;
@@ -64,10 +55,10 @@ class ObjectSizes {
   const mjModel* m_;
   std::vector<Object> objects_;
   std::vector<std::vector<double>> sizes_;
-  Own<double> geom_size_, geom_pos_, geom_quat_, geom_rbound_, geom_aabb_, body_mass_,
+  WorldField<double> geom_size_, geom_pos_, geom_quat_, geom_rbound_, geom_aabb_, body_mass_,
       body_inertia_, body_ipos_, body_pos_, subtree_mass_, body_invweight_, dof_invweight_, dof_m0_,
       site_pos_, site_size_;
-  Own<int> geom_dataid_;
+  WorldField<int> geom_dataid_;
 };
 
 }  // namespace mjsense::scenes

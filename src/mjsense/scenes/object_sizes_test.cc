@@ -11,6 +11,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scenes/episode_scene.h"
@@ -105,8 +106,8 @@ struct Played {
     return {row.qpos, row.qpos + sim->model()->nq};
   }
   // This world's model, as MuJoCo returns it.
-  scene::ModelPtr model(int world) const {
-    scene::ModelPtr copy(mj_copyModel(nullptr, sim->model()));
+  ModelPtr model(int world) const {
+    ModelPtr copy(mj_copyModel(nullptr, sim->model()));
     mjb_getModel(sim->worlds().batch(), world, copy.get());
     return copy;
   }
@@ -169,7 +170,7 @@ TEST(ObjectSizes, ObjectEqualsTheCompiledOne) {
     if (!seen.insert(size).second) continue;
     const Files other(size);
     Played compiled(other.cfg);
-    const scene::ModelPtr model = played.model(0);
+    const ModelPtr model = played.model(0);
     expect_same(model.get(), compiled.sim->model());
     EXPECT_NEAR(model->body_subtreemass[0], compiled.sim->model()->body_subtreemass[0], 1e-9);
     const episode::ObjectShape &shape = played.scene.shape(0, 0),
@@ -266,7 +267,7 @@ TEST(ObjectSizes, ObjectsMoveWithFurniture) {
   double minimum = 1e9, maximum = -1e9;
   for (std::uint64_t episode = 0; episode < 20; ++episode) {
     played.start(episode);
-    const scene::ModelPtr here = played.model(0);
+    const ModelPtr here = played.model(0);
     const double* at = here->body_pos + 3 * body;
     EXPECT_LE(std::abs(at[0] - 1), .3);
     EXPECT_LE(std::abs(at[2]), .1);
@@ -289,12 +290,7 @@ TEST(ObjectSizes, FaultsNameTheSetting) {
   const auto fault = [](auto change) {
     Files files;
     change(files);
-    try {
-      Played played(files.cfg);
-    } catch (const Error& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return error_of([&] { Played played(files.cfg); });
   };
   EXPECT_THAT(fault([](Files& f) {
                 f.cfg.sizes = {1.2, .8};

@@ -2,6 +2,7 @@
 #pragma once
 // Base of tasks that concern one object of a scene.
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -31,6 +32,8 @@ class ObjectTask : public SceneTask {
   void begin_with(int body, const std::string& name, bool thin = false);
   void set_object(int world, int body, const std::string& name);
   const episode::TaskObject& object(int world) const { return subjects_[world].object; }
+  // Sensors obj_start, grasp_state_<role>, and obj_end, the object's goal pose. `goal`: description.
+  std::vector<std::shared_ptr<Sensor>> object_sensors(std::string goal) const;
   // Pose of the object at the first observation.
   const Pose& start(int world) const { return subjects_[world].start; }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 
 namespace mjsense::scenes {
 namespace {
@@ -14,8 +15,8 @@ constexpr int kRound = 16;  // corners of a circle's polygon
 
 // Points (world frame) whose hull contains a geom.
 std::vector<Vec3> points_of(const mjModel* m, const mjData* d, int g) {
-  const Pose pose = pose_from_mat(d->geom_xpos + 3 * g, d->geom_xmat + 9 * g);
-  const double *size = m->geom_size + 3 * g, *box = m->geom_aabb + 6 * g;
+  const Pose pose = geom_pose(d, g);
+  const double* size = m->geom_size + 3 * g;
   std::vector<Vec3> points;
   const auto rings = [&](double rx, double ry, double half, double cap) {
     // the polygon must contain the circle
@@ -52,16 +53,9 @@ std::vector<Vec3> points_of(const mjModel* m, const mjData* d, int g) {
       break;
     }
     default:
-      for (int corner = 0; corner < 8; ++corner)
-        points.push_back(pose * Vec3{box[0] + (corner & 1 ? box[3] : -box[3]),
-                                     box[1] + (corner & 2 ? box[4] : -box[4]),
-                                     box[2] + (corner & 4 ? box[5] : -box[5])});
+      for (Vec3 corner : geom_corners(m, g)) points.push_back(pose * corner);
   }
   return points;
-}
-
-bool solid(const mjModel* m, int g) {
-  return m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
 }
 
 // Triangles (vertex indices) of a mesh's convex hull, or of the mesh itself if it has no hull.
@@ -159,7 +153,7 @@ OccupancyGrid::OccupancyGrid(const mjModel* m, const mjData* d,
   std::vector<std::vector<Vec3>> outlines;
   double low[2] = {1e10, 1e10}, high[2] = {-1e10, -1e10};
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!solid(m, g) || m->geom_type[g] == mjGEOM_PLANE || !counts(g)) continue;
+    if (!is_solid(m, g) || m->geom_type[g] == mjGEOM_PLANE || !counts(g)) continue;
     const Vec3 at = vec3(d->geom_xpos + 3 * g);
     if (std::abs(at.x) > 0.5 * cfg.max_extent || std::abs(at.y) > 0.5 * cfg.max_extent) continue;
     const std::vector<Vec3> here = points_of(m, d, g);
@@ -198,18 +192,12 @@ OccupancyGrid::OccupancyGrid(const mjModel* m, const mjData* d,
 // Marks the cells whose squares the polygon touches, approximated as a distance from the cell
 // centre below half a cell.
 void OccupancyGrid::fill(std::span<const Vec3> p) {
-  double low[2] = {1e10, 1e10}, high[2] = {-1e10, -1e10};
-  for (Vec3 v : p) {
-    for (int i = 0; i < 2; ++i) {
-      low[i] = std::min(low[i], v[i]);
-      high[i] = std::max(high[i], v[i]);
-    }
-  }
+  const Aabb box = aabb_of(p);
   const double half = 0.5 * cell_;
-  const int c0 = std::max(0, static_cast<int>((low[0] - x0_) / cell_ - 1)),
-            c1 = std::min(columns_ - 1, static_cast<int>((high[0] - x0_) / cell_ + 1));
-  const int r0 = std::max(0, static_cast<int>((low[1] - y0_) / cell_ - 1)),
-            r1 = std::min(rows_ - 1, static_cast<int>((high[1] - y0_) / cell_ + 1));
+  const int c0 = std::max(0, static_cast<int>((box.low.x - x0_) / cell_ - 1)),
+            c1 = std::min(columns_ - 1, static_cast<int>((box.high.x - x0_) / cell_ + 1));
+  const int r0 = std::max(0, static_cast<int>((box.low.y - y0_) / cell_ - 1)),
+            r1 = std::min(rows_ - 1, static_cast<int>((box.high.y - y0_) / cell_ + 1));
   for (int row = r0; row <= r1; ++row) {
     for (int column = c0; column <= c1; ++column) {
       const double px = x(column), py = y(row);
@@ -260,26 +248,15 @@ Footprint::Footprint(const mjModel* m, const mjData* d, const std::function<bool
                      const Pose& base, double high) {
   const Pose to_base = inverse(base);
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!solid(m, g) || !counts(g)) continue;
-    const std::vector<Vec3> points = points_of(m, d, g);
-    Vec3 middle;
-    double low[2] = {1e10, 1e10}, maximum[2] = {-1e10, -1e10}, bottom = 1e10;
-    for (Vec3 p : points) {
-      const Vec3 q = to_base * p;
-      height_ = std::max(height_, q.z);
-      bottom = std::min(bottom, q.z);
-      for (int i = 0; i < 2; ++i) {
-        low[i] = std::min(low[i], q[i]);
-        maximum[i] = std::max(maximum[i], q[i]);
-      }
-    }
-    if (points.empty() || bottom > high) continue;
-    middle = {0.5 * (low[0] + maximum[0]), 0.5 * (low[1] + maximum[1]), 0};
+    if (!is_solid(m, g) || !counts(g)) continue;
+    std::vector<Vec3> points = points_of(m, d, g);
+    for (Vec3& p : points) p = to_base * p;
+    const Aabb box = aabb_of(points);
+    height_ = std::max(height_, box.high.z);
+    if (points.empty() || box.low.z > high) continue;
+    const Vec3 middle = box.center();
     double radius = 0;
-    for (Vec3 p : points) {
-      const Vec3 q = to_base * p;
-      radius = std::max(radius, std::hypot(q.x - middle.x, q.y - middle.y));
-    }
+    for (Vec3 p : points) radius = std::max(radius, std::hypot(p.x - middle.x, p.y - middle.y));
     discs_.push_back({middle.x, middle.y, radius});
   }
   // Discs inside of other discs are redundant.

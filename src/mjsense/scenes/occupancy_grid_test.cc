@@ -6,17 +6,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/scene/mj_spec.h"
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/scenes/base_planner.h"
 
 namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 // A room of 4 x 4 m, divided by a wall with a gap, with a lamp above and a rug below the height
 // range.
@@ -43,20 +39,14 @@ std::string room(double gap) {
 struct Floor {
   explicit Floor(double gap) : Floor(room(gap)) {}
   explicit Floor(const std::string& xml)
-      : model(compile_text(xml)), data(mj_makeData(model.get())) {
+      : model(compile_mjcf(xml)), data(mj_makeData(model.get())) {
     mj_kinematics(model.get(), data.get());
-  }
-  static scene::ModelPtr compile_text(const std::string& xml) {
-    scene::ModelSource source;
-    source.xml = xml;
-    const scene::SpecPtr spec = scene::parse_model(source, "test");
-    return scene::compile(spec.get(), scene::Vfs());
   }
   OccupancyGrid occupancy() const {
     return {model.get(), data.get(), [](int) { return true; }, {}};
   }
-  scene::ModelPtr model;
-  std::unique_ptr<mjData, DataDelete> data;
+  ModelPtr model;
+  DataPtr data;
 };
 
 TEST(OccupancyGrid, MarksObstaclesOnly) {
@@ -86,11 +76,11 @@ TEST(OccupancyGrid, MarksMeshesBetweenTheirVertices) {
       points += std::to_string(0.3 * std::cos(a)) + " " + std::to_string(0.3 * std::sin(a)) + " " +
                 std::to_string(z) + " ";
   }
-  const scene::ModelPtr model =
-      Floor::compile_text("<mujoco><asset><mesh name='pillar' vertex='" + points +
-                          "'/></asset><worldbody><geom type='plane' size='2 2 .1'/>"
-                          "<geom type='mesh' mesh='pillar' pos='0 0 1.25'/></worldbody></mujoco>");
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model.get()));
+  const ModelPtr model =
+      compile_mjcf("<mujoco><asset><mesh name='pillar' vertex='" + points +
+                   "'/></asset><worldbody><geom type='plane' size='2 2 .1'/>"
+                   "<geom type='mesh' mesh='pillar' pos='0 0 1.25'/></worldbody></mujoco>");
+  const DataPtr data = make_data(model.get());
   mj_kinematics(model.get(), data.get());
   const OccupancyGrid o(model.get(), data.get(), [](int) { return true; }, {});
   EXPECT_EQ(o.clearance(0, 0), 0);

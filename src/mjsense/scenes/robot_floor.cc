@@ -4,8 +4,9 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/mujoco_call.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/robots/start_positions.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense::scenes {
@@ -26,23 +27,17 @@ int driving_base(const robots::Robot& robot) {
 
 std::optional<double> ground_height(const mjModel* m) {
   for (int g = 0; g < m->ngeom; ++g) {
-    const bool touches = m->geom_contype[g] || m->geom_conaffinity[g];
     const int body = m->geom_bodyid[g];
-    if (m->geom_type[g] != mjGEOM_PLANE || !touches || m->body_treeid[body] >= 0) continue;
-    Pose plane{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)};
-    for (int b = body; b > 0; b = m->body_parentid[b])
-      plane = Pose{vec3(m->body_pos + 3 * b), quat(m->body_quat + 4 * b)} * plane;
+    if (m->geom_type[g] != mjGEOM_PLANE || !is_solid(m, g) || m->body_treeid[body] >= 0) continue;
+    const Pose plane = in_ancestor(m, geom_frame(m, g), body);
     if (rotate(plane.q, {0, 0, 1}).z > 1 - 1e-9) return plane.p.z;
   }
   return {};
 }
 
 RestingRobot::RestingRobot(const mjModel* model, const robots::Robot& robot)
-    : model_(model), robot_(robot), data_(call_mujoco(mj_makeData, model)) {
-  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const auto& init = robot.cfg().groups[g].init;
-    for (std::size_t i = 0; i < init.size(); ++i) data_->qpos[robot.groups()[g].qpos[i]] = init[i];
-  }
+    : model_(model), robot_(robot), data_(make_data(model)) {
+  robots::write_start_positions(robot, data_->qpos);
   mj_kinematics(model, data_.get());
 }
 
@@ -55,13 +50,11 @@ bool RestingRobot::of_robot(int geom) const {
 }
 
 Footprint RestingRobot::footprint() const {
-  const int base = robot_.base_body();
   return {model_, data_.get(), [this](int g) { return of_robot(g); },
-          pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
+          robot_.base_pose({.model = model_, .data = data_.get()}), 10.0};
 }
 
 Footprint RestingRobot::trunk() const {
-  const int base = robot_.base_body();
   return {
       model_, data_.get(),
       [this](int g) {
@@ -73,7 +66,7 @@ Footprint RestingRobot::trunk() const {
         };
         return of_robot(g) && std::ranges::none_of(robot_.groups(), holds);
       },
-      pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
+      robot_.base_pose({.model = model_, .data = data_.get()}), 10.0};
 }
 
 OccupancyGrid RestingRobot::occupancy(double height,

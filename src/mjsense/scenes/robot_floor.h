@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/occupancy_grid.h"
 
@@ -35,14 +36,11 @@ class RestingRobot {
                           const std::function<bool(int geom)>& without = {}) const;
 
  private:
-  struct Delete {
-    void operator()(mjData* data) const { mj_deleteData(data); }
-  };
   bool of_robot(int geom) const;
 
   const mjModel* model_;
   const robots::Robot& robot_;
-  std::unique_ptr<mjData, Delete> data_;
+  DataPtr data_;
 };
 
 }  // namespace mjsense::scenes

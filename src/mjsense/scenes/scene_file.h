@@ -146,6 +146,7 @@ struct SceneVaryCfg {
   std::array<double, 3> pos{};
   double angle = 0;
   std::vector<std::string> textures;
+  bool optional = false;
 };
 template <class V>
 void visit_fields(V& v, SceneVaryCfg& c) {
@@ -170,6 +171,9 @@ void visit_fields(V& v, SceneVaryCfg& c) {
     "degrees.")
       .within(0, 90);
   v("textures", c.textures, "material: full names of the textures to choose from.");
+  v("optional", c.optional,
+    "Ignore the entry if nothing matches its pattern, which is an error otherwise. Entries that a "
+    "scene inherits are optional.");
 }
 
 // Whether it changes the colour of what it names.
@@ -250,7 +254,8 @@ void visit_fields(V& v, SceneFileCfg& c) {
   v("name", c.name, "Name of the scene.").required();
   v("description", c.description, "Description in one sentence.");
   v("extends", c.extends,
-    "A scene, by name or file, that provides the values that this file does not set.")
+    "A scene, by name or file, that provides the values that this file does not set. Lists replace "
+    "those of the base, except ``vary``.")
       .or_none();
   v("base", c.base,
     "An MJCF file, next to this file, that the scene starts from unchanged: its names get no "
@@ -275,7 +280,9 @@ void visit_fields(V& v, SceneFileCfg& c) {
   v("regions", c.regions,
     "Where objects may be placed; empty: objects stay where their models put them.");
   v("robot", c.robot, "Placement of the robot.");
-  v("vary", c.vary, "What is randomised in every episode.");
+  v("vary", c.vary,
+    "What is randomised in every episode. The entries of a scene with ``extends`` follow those of "
+    "its base; ``vary = []`` removes the base's.");
   v("moods", c.moods,
     "Light moods; every episode uses one of them, all with the same probability.");
   v("sky", c.sky,

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/object_catalogue.h"
 
@@ -15,16 +16,6 @@ namespace mjsense::scenes {
 namespace {
 
 using ::testing::HasSubstr;
-
-template <class Error, class F>
-std::string error_of(F f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
-}
 
 // Kinds of a scene's objects without its receptacles.
 std::set<std::string> kinds(const std::string& scene) {

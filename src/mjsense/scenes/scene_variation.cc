@@ -30,13 +30,6 @@ mjtObj object_type(VaryKind what) {
   return mjOBJ_GEOM;
 }
 
-// Makes the field `field` of the batch's model an array with rows per world. The values are
-// unchanged.
-template <class T>
-T* expand(mjBatch* batch, const char* field, T* before) {
-  return before ? before : static_cast<T*>(mjb_expand(batch, field, nullptr, nullptr));
-}
-
 double around(Rng& rng, double half) { return half > 0 ? rng.uniform(-half, half) : 0.0; }
 
 // Rotates a direction by at most `maximum` rad; uniform within the cone.
@@ -93,86 +86,81 @@ std::vector<SceneVariation::Part> SceneVariation::parts_of(const std::vector<Sce
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (!names[i].empty() && pattern.fullmatch(names[i])) part.ids.push_back(static_cast<int>(i));
     }
+    if (part.ids.empty() && one.optional) continue;
     if (part.ids.empty()) throw_unknown(who, one.what.text(), one.pattern, names);
     for (const std::string& texture : one.textures)
       part.textures.push_back(scene::resolve(model_, mjOBJ_TEXTURE, texture, who));
     const bool colours = changes_colour(one);
     if (colours && one.what == VaryKind::kLight)
-      light_diffuse_ = expand(batch, "light_diffuse", light_diffuse_);
+      light_diffuse_.expand(batch, "light_diffuse", model_->light_diffuse);
     if (one.tint != std::array<double, 3>{1, 1, 1} && one.what == VaryKind::kLight) {
-      light_ambient_ = expand(batch, "light_ambient", light_ambient_);
-      light_specular_ = expand(batch, "light_specular", light_specular_);
+      light_ambient_.expand(batch, "light_ambient", model_->light_ambient);
+      light_specular_.expand(batch, "light_specular", model_->light_specular);
     }
     if (colours && one.what == VaryKind::kMaterial)
-      mat_rgba_ = expand(batch, "mat_rgba", mat_rgba_);
-    if (colours && one.what == VaryKind::kGeom) geom_rgba_ = expand(batch, "geom_rgba", geom_rgba_);
+      mat_rgba_.expand(batch, "mat_rgba", model_->mat_rgba);
+    if (colours && one.what == VaryKind::kGeom)
+      geom_rgba_.expand(batch, "geom_rgba", model_->geom_rgba);
     const bool light = one.what == VaryKind::kLight;
     if (light && one.pos != std::array<double, 3>{})
-      light_pos_ = expand(batch, "light_pos", light_pos_);
-    if (light && one.angle > 0) light_dir_ = expand(batch, "light_dir", light_dir_);
+      light_pos_.expand(batch, "light_pos", model_->light_pos);
+    if (light && one.angle > 0) light_dir_.expand(batch, "light_dir", model_->light_dir);
     if (one.what == VaryKind::kBody) {
       for (int id : part.ids) {
         // The pose of a mocap body is part of the state.
         if (model_->body_treeid[id] >= 0 || model_->body_mocapid[id] >= 0 || id == 0)
           throw ValueError(fmt::format("{}: body '{}' is not a fixed body", who, names[id]));
       }
-      body_pos_ = expand(batch, "body_pos", body_pos_);
-      body_quat_ = expand(batch, "body_quat", body_quat_);
+      body_pos_.expand(batch, "body_pos", model_->body_pos);
+      body_quat_.expand(batch, "body_quat", model_->body_quat);
     }
-    if (!part.textures.empty()) mat_texid_ = expand(batch, "mat_texid", mat_texid_);
+    if (!part.textures.empty()) mat_texid_.expand(batch, "mat_texid", model_->mat_texid);
     parts.push_back(std::move(part));
   }
   return parts;
 }
 
 void SceneVariation::reset(int world) const {
-  const mjModel* m = model_;
-  const auto row = [&](auto* rows, const auto* values, std::size_t size) {
-    if (rows) std::copy_n(values, size, rows + size * world);
-  };
-  row(light_pos_, m->light_pos, 3 * m->nlight);
-  row(light_dir_, m->light_dir, 3 * m->nlight);
-  row(light_ambient_, m->light_ambient, 3 * m->nlight);
-  row(light_diffuse_, m->light_diffuse, 3 * m->nlight);
-  row(light_specular_, m->light_specular, 3 * m->nlight);
-  row(mat_rgba_, m->mat_rgba, 4 * m->nmat);
-  row(mat_texid_, m->mat_texid, mjNTEXROLE * m->nmat);
-  row(geom_rgba_, m->geom_rgba, 4 * m->ngeom);
+  light_pos_.reset(world);
+  light_dir_.reset(world);
+  light_ambient_.reset(world);
+  light_diffuse_.reset(world);
+  light_specular_.reset(world);
+  mat_rgba_.reset(world);
+  mat_texid_.reset(world);
+  geom_rgba_.reset(world);
 }
 
 void SceneVariation::recolour(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const {
   const double brightness = rng.uniform(cfg.brightness[0], cfg.brightness[1]);
   const double hue = around(rng, cfg.hue), saturation = around(rng, cfg.saturation);
-  const auto tint = [&](float* rows, std::size_t count, int size) {
-    if (!rows) return static_cast<float*>(nullptr);
-    float* rgb = rows + (count * world + id) * size;
+  const auto tint = [&](const WorldField<float>& field, int size) -> float* {
+    if (!field) return nullptr;
+    float* rgb = field.of(world) + size * id;
     for (int i = 0; i < 3; ++i) rgb[i] *= static_cast<float>(cfg.tint[i]);
     return rgb;
   };
   float* rgb = nullptr;
   if (cfg.what == VaryKind::kLight) {
-    tint(light_ambient_, model_->nlight, 3);
-    tint(light_specular_, model_->nlight, 3);
-    rgb = tint(light_diffuse_, model_->nlight, 3);
-  } else if (cfg.what == VaryKind::kMaterial) {
-    rgb = tint(mat_rgba_, model_->nmat, 4);
+    tint(light_ambient_, 3);
+    tint(light_specular_, 3);
+    rgb = tint(light_diffuse_, 3);
   } else {
-    rgb = tint(geom_rgba_, model_->ngeom, 4);
+    rgb = tint(cfg.what == VaryKind::kMaterial ? mat_rgba_ : geom_rgba_, 4);
   }
   if (rgb) shift_colour(hue, saturation, brightness, rgb);
 }
 
 const double* SceneVariation::body_pos(int world) const {
-  return body_pos_ ? body_pos_ + 3 * static_cast<std::size_t>(world) * model_->nbody
-                   : model_->body_pos;
+  return body_pos_ ? body_pos_.of(world) : model_->body_pos;
 }
 
 void SceneVariation::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const {
-  const std::size_t at = static_cast<std::size_t>(world) * model_->nbody + id;
-  for (int i = 0; i < 3; ++i)
-    body_pos_[3 * at + i] = model_->body_pos[3 * id + i] + around(rng, cfg.pos[i]);
+  double* pos = body_pos_.of(world) + 3 * id;
+  for (int i = 0; i < 3; ++i) pos[i] = model_->body_pos[3 * id + i] + around(rng, cfg.pos[i]);
   const double turn = around(rng, cfg.angle) * std::numbers::pi / 180;
-  write_quat(axis_angle({0, 0, 1}, turn) * quat(model_->body_quat + 4 * id), body_quat_ + 4 * at);
+  write_quat(axis_angle({0, 0, 1}, turn) * quat(model_->body_quat + 4 * id),
+             body_quat_.of(world) + 4 * id);
 }
 
 void SceneVariation::apply(const Part& part, int world, Rng& rng) const {
@@ -184,16 +172,16 @@ void SceneVariation::apply(const Part& part, int world, Rng& rng) const {
     }
     recolour(c, world, id, rng);
     if (c.what == VaryKind::kLight) {
-      const std::size_t at = 3 * (static_cast<std::size_t>(world) * model_->nlight + id);
-      for (int i = 0; i < 3 && light_pos_; ++i) light_pos_[at + i] += around(rng, c.pos[i]);
-      if (light_dir_ && c.angle > 0)
-        write_vec(turned(vec3(light_dir_ + at), c.angle * std::numbers::pi / 180, rng),
-                  light_dir_ + at);
+      for (int i = 0; i < 3 && light_pos_; ++i)
+        light_pos_.of(world)[3 * id + i] += around(rng, c.pos[i]);
+      if (light_dir_ && c.angle > 0) {
+        double* direction = light_dir_.of(world) + 3 * id;
+        write_vec(turned(vec3(direction), c.angle * std::numbers::pi / 180, rng), direction);
+      }
     }
     if (!part.textures.empty()) {
-      const std::size_t at =
-          mjNTEXROLE * (static_cast<std::size_t>(world) * model_->nmat + id) + mjTEXROLE_RGB;
-      mat_texid_[at] = part.textures[rng.below(static_cast<std::uint32_t>(part.textures.size()))];
+      mat_texid_.of(world)[mjNTEXROLE * id + mjTEXROLE_RGB] =
+          part.textures[rng.below(static_cast<std::uint32_t>(part.textures.size()))];
     }
   }
 }

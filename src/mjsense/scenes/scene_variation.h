@@ -8,6 +8,7 @@
 
 #include "mjsense/core/rng.h"
 #include "mjsense/scenes/scene_file.h"
+#include "mjsense/scenes/world_field.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::scenes {
@@ -39,11 +40,10 @@ class SceneVariation {
   std::vector<Part> parts_;
   std::vector<std::vector<Part>> moods_;
   const mjModel* model_;
-  // [B, n, ...] fields of MuJoCo's batch; null if the field does not vary.
-  double *light_pos_ = nullptr, *light_dir_ = nullptr, *body_pos_ = nullptr, *body_quat_ = nullptr;
-  float *light_ambient_ = nullptr, *light_diffuse_ = nullptr, *light_specular_ = nullptr;
-  float *mat_rgba_ = nullptr, *geom_rgba_ = nullptr;
-  int* mat_texid_ = nullptr;
+  // Fields that do not vary are empty.
+  WorldField<double> light_pos_, light_dir_, body_pos_, body_quat_;
+  WorldField<float> light_ambient_, light_diffuse_, light_specular_, mat_rgba_, geom_rgba_;
+  WorldField<int> mat_texid_;
 };
 
 // Rotates the hue (degrees), shifts the saturation and scales the value (brightness) of a colour;

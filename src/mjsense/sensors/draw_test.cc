@@ -9,6 +9,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
@@ -224,13 +225,9 @@ TEST(Draw, BuiltinSensorIsDrawnAsItsFrame) {
     expect_at(shapes.list()[2].vector, 0, -0.5, 0);
     EXPECT_EQ(shapes.list()[2].label, std::string(name) + "_z");
   }
-  try {
-    lab.draw("w/turn");
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("sensor 'w/turn': nothing to draw: this jointpos sensor is "
-                                    "attached to a joint, which has no frame"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] { lab.draw("w/turn"); }),
+              HasSubstr("sensor 'w/turn': nothing to draw: this jointpos sensor is "
+                        "attached to a joint, which has no frame"));
 }
 
 TEST(Draw, DrawingComputesOneWorldAndIsNotARead) {

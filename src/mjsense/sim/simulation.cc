@@ -191,6 +191,14 @@ void Simulation::forward(worlds::WorldIds ids) {
   collect(due->slots, [](Slot& s) { return s.sensor->needs_every_step(); });
   mark_stale(sorted);
   compute(due->slots, sorted, Change::kForward);
+  // Sensors that cast rays from earlier poses store the written one, even if they are not read now.
+  Borrowed timed(*this);
+  for (const auto& slot : slots_) {
+    if (slot->casts && slot->sensor->wants_substep()) timed->slots.push_back(slot.get());
+  }
+  if (timed->slots.empty()) return;
+  Hooks hooks(*this, timed->slots, 0);
+  worlds_->visit(sorted, hooks);
 }
 
 void Simulation::step_raw(int substeps) {

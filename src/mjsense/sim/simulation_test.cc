@@ -15,6 +15,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/row_error.h"
 #include "mjsense/core/testing/allocations.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense::sim {
@@ -288,12 +289,7 @@ TEST(Simulation, OnlyFailedRowsAreRecomputed) {
   sim.refresh(*second);
   first->fail = {{1, "sensor 'first', world 1: no"}, {3, "sensor 'first', world 3: no"}};
   first->fail_step = {{2, "sensor 'first', world 2: no"}};
-  try {
-    sim.step();
-    FAIL();
-  } catch (const RowError& e) {
-    EXPECT_STREQ(e.what(), "sensor 'first', world 2: no");
-  }
+  EXPECT_EQ(error_of<RowError>([&] { sim.step(); }), "sensor 'first', world 2: no");
   EXPECT_THAT(first->steps, Each(1));
   EXPECT_THAT(second->steps, Each(1));  // is notified nevertheless
   try {
@@ -366,12 +362,7 @@ TEST(Simulation, FailingSensorIsNamedAndOthersContinue) {
   auto bad = add(sim, "bad");
   auto good = add(sim, "good");
   bad->fail_in = 1;
-  try {
-    sim.refresh(*bad);
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "sensor 'bad': no value");
-  }
+  EXPECT_EQ(error_of<ValueError>([&] { sim.refresh(*bad); }), "sensor 'bad': no value");
   sim.step();
   sim.refresh(*good);
   bad->fail_in = -1;
@@ -467,12 +458,7 @@ TEST(Simulation, ErrorNamesItsSensor) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto bad = add(sim, "a");
   bad->fail_in = 0;
-  try {
-    sim.refresh(*bad);
-    FAIL() << "no error";
-  } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "sensor 'a': no value");
-  }
+  EXPECT_EQ(error_of<ValueError>([&] { sim.refresh(*bad); }), "sensor 'a': no value");
 }
 
 TEST(Simulation, StepLastsAsLongAsItsSubsteps) {
@@ -617,12 +603,8 @@ TEST(Simulation, SceneIsUsedByOneSimulationAtATime) {
   const auto shared = scene();
   {
     Simulation first(shared, {.num_worlds = 4});
-    try {
-      Simulation second(shared, {});
-      FAIL() << "two simulations of one scene";
-    } catch (const RuntimeError& e) {
-      EXPECT_THAT(e.what(), HasSubstr("belongs to a simulation already"));
-    }
+    EXPECT_THAT(error_of<RuntimeError>([&] { Simulation second(shared, {}); }),
+                HasSubstr("belongs to a simulation already"));
     first.step();
   }
   EXPECT_THROW(Simulation(shared, {.num_worlds = 0}), ValueError);

@@ -36,4 +36,11 @@ class ScratchData {
   std::vector<mjData*> unused_;
 };
 
+// Copies qpos and the poses of mocap bodies, from which MuJoCo computes all positions.
+inline void copy_positions(const mjModel* model, const mjData* from, mjData* to) {
+  mju_copy(to->qpos, from->qpos, model->nq);
+  mju_copy(to->mocap_pos, from->mocap_pos, 3 * model->nmocap);
+  mju_copy(to->mocap_quat, from->mocap_quat, 4 * model->nmocap);
+}
+
 }  // namespace mjsense::worlds

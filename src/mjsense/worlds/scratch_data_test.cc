@@ -7,17 +7,15 @@
 #include <set>
 
 #include "mjsense/core/system/thread_pool.h"
+#include "mjsense/core/testing/test_model.h"
 
 namespace mjsense::worlds {
 namespace {
 
-std::unique_ptr<mjModel, decltype(&mj_deleteModel)> slide() {
-  mjSpec* spec = mj_parseXMLString(
-      "<mujoco><worldbody><body><joint type='slide'/><geom size='.1'/></body></worldbody></mujoco>",
-      nullptr, nullptr, 0);
-  mjModel* model = mj_compile(spec, nullptr);
-  mj_deleteSpec(spec);
-  return {model, mj_deleteModel};
+ModelPtr slide() {
+  return compile_mjcf(
+      "<mujoco><worldbody><body><joint type='slide'/><geom "
+      "size='.1'/></body></worldbody></mujoco>");
 }
 
 TEST(ScratchData, LendsToOneCallerAtATimeAndReuses) {

@@ -38,4 +38,15 @@ void step_from(mjtStage stage, const mjModel* m, mjData* d) {
   }
 }
 
+void whole_step(const mjModel* m, mjData* d) {
+  if (m->nhistory > 0 && (m->opt.enableflags & mjENBL_ENERGY)) position_and_velocity(m, d, false);
+  mj_step(m, d);
+}
+
+void all_poses(const mjModel* m, mjData* d) {
+  mjModel awake = *m;
+  awake.opt.enableflags &= ~mjENBL_SLEEP;
+  mj_fwdKinematics(&awake, d);
+}
+
 }  // namespace mjsense::worlds

@@ -21,4 +21,12 @@ void position_and_velocity(const mjModel* m, mjData* d, bool sensors);
 // cannot be read between the stages before the integration and those after it.
 void step_from(mjtStage stage, const mjModel* m, mjData* d);
 
+// mj_step as a whole. In the histories of MuJoCo's sensors, e_kinetic is the energy of the state at
+// which it was measured, as in position_and_velocity().
+void whole_step(const mjModel* m, mjData* d);
+
+// The poses of all bodies, also of static and sleeping ones. With sleep, MuJoCo does not compute
+// those again, so that they must follow a change of the model in this way.
+void all_poses(const mjModel* m, mjData* d);
+
 }  // namespace mjsense::worlds

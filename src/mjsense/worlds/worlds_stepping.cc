@@ -148,7 +148,7 @@ bool Worlds::step_in_place(const mjModel* m, mjData* d, int w, const Call& call)
     if (split) {
       step_from(from, m, d);
     } else {
-      mj_step(m, d);
+      whole_step(m, d);
     }
     keep_held(d, w);
     mj_checkPos(m, d);
@@ -242,6 +242,8 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   Derived& derived = derived_[w];
   if (broken_[w] && (call.op == Op::kStep || call.op == Op::kForward))
     restart(m, d, w, reset_key_[w], *call.hooks);
+  if ((m->opt.enableflags & mjENBL_SLEEP) && derived.model_version != model_version_)
+    all_poses(m, d);
   switch (call.op) {
     case Op::kStep:
       if (!step_world(m, d, w, call)) return;  // apply() resets the world

@@ -23,7 +23,7 @@ suite.use()
 def expect(message, function, *args, **kwargs):
     try:
         function(*args, **kwargs)
-    except (ValueError, RuntimeError, AttributeError, mujoco.FatalError, control.wrapper.Error) as error:
+    except (ValueError, TypeError, RuntimeError, AttributeError, mujoco.FatalError, control.wrapper.Error) as error:
         assert re.search(message, str(error)), error
     else:
         raise AssertionError(f"no error with {message!r}")
@@ -35,7 +35,7 @@ def cheetah(**camera):
     return env
 
 
-NOT_FINITE = r"geom 2 of the scene \(geom '\w+', id 2\) has a pose or size that is not finite"
+NOT_FINITE = r"geom 2 of the scene \(geom '\w+', id 2\) has a pose, size or colour that is not finite"
 
 expect('The camera "trakc" does not exist. Nearest: track', cheetah, camera_name="trakc")
 expect("fixed camera id is outside", cheetah(camera_id=7).render)
@@ -46,9 +46,17 @@ expect(NOT_FINITE, env.render)
 env.close()
 expect(r"used after close\(\)", env.render)
 
+expect("with a mujoco_renderer", gym.use, "HalfCheetah-v5")
+expect("call use in the function that makes each environment", gym.use, gymnasium.make_vec("HalfCheetah-v5", 2, "sync"))
+
 physics = dm_control.suite.load("cheetah", "run").physics
 expect("'camera' with name 'sied' does not exist", physics.render, 32, 32, "sied")
 expect("camera_id=9 is invalid", physics.render, 32, 32, 9)
+limits = physics.model.vis.global_
+expect(f"Image width {limits.offwidth + 1} > framebuffer width {limits.offwidth}", physics.render, 32, limits.offwidth + 1)
+expect(f"Image height {limits.offheight + 1} > framebuffer height {limits.offheight}", physics.render, limits.offheight + 1, 32)
+limits.offwidth, limits.offheight = 1000, 900
+assert physics.render(900, 1000, camera_id=0).shape == (900, 1000, 3)
 physics.render(32, 32)
 physics.data.geom_xpos[2] = np.nan
 expect(NOT_FINITE, physics.render, 32, 32)

@@ -7,7 +7,7 @@ require_opengl()
 
 import mujoco
 import numpy as np
-from dm_control import suite
+from dm_control import manipulation, suite
 from dm_control.mujoco import Camera, engine
 from dm_control.suite.wrappers import pixels
 from mjsense.compat.dm_control import Context, use
@@ -123,6 +123,13 @@ for image, old in zip([camera.render(), physics.render(128, 128, "above")], befo
     assert (image != old).any()
 physics.reload_from_xml_string(texture.format(1))
 np.testing.assert_array_equal(camera.render(), physics.render(128, 128, "above"))
+
+# A copy, and the physics that composer's environments make for each episode.
+assert isinstance(physics.copy().contexts.gl, Context)
+env = use(use(manipulation.load("stack_2_bricks_features", seed=0)))
+for _ in range(2):
+    env.reset()
+    assert isinstance(env.physics.contexts.gl, Context)
 
 # All later physics.
 use()

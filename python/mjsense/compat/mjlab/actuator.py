@@ -134,10 +134,6 @@ class XmlActuatorCfg(ActuatorCfg):
 
 
 __all__ = [
-    "ActuatorCfg",
-    "BuiltinMotorActuatorCfg",
-    "BuiltinPositionActuatorCfg",
-    "BuiltinVelocityActuatorCfg",
-    "TransmissionType",
+    "ActuatorCfg", "BuiltinMotorActuatorCfg", "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg", "TransmissionType",
     "XmlActuatorCfg",
-]
+]  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 
 import mjsense
-from mjsense import _mujoco, configs
+from mjsense import _core, _mujoco, configs
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.compat.mjlab.entity import Entity, EntityCfg
 from mjsense.compat.mjlab.sensor import BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorCfg, SensorContext
@@ -99,7 +99,7 @@ class Scene:
             return self.sensors[key]
         if key in self._entities:
             return self._entities[key]
-        raise UnknownNameError(f"Scene element '{key}' not found. Available: {', '.join([*self._entities, *self.sensors])}")
+        raise UnknownNameError(_core.unknown_name("scene", "sensor or entity", str(key), [*self._entities, *self.sensors]))
 
     @property
     def sensors(self) -> dict[str, Any]:

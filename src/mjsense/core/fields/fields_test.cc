@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 
 namespace mjsense {
 
@@ -75,12 +76,7 @@ template <class Change>
 std::string fault(Change&& change) {
   Cfg cfg;
   change(cfg);
-  try {
-    check_fields(cfg, "sensor 'x'");
-  } catch (const ValueError& e) {
-    return e.what();
-  }
-  return "";
+  return error_of<ValueError>([&] { check_fields(cfg, "sensor 'x'"); });
 }
 
 TEST(Fields, EveryValueIsChecked) {

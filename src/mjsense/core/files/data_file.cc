@@ -38,6 +38,8 @@ DataFile DataFolder::find(std::string_view name) const {
     return {fmt::format("{}{}", kEmbedded, file), std::string(embedded_file(file))};
   }
   if (!name.ends_with(".toml")) throw_unknown(fmt::format("{}s", kind), kind, name, known);
+  if (name.starts_with(kEmbedded))
+    return {std::string(name), std::string(embedded_file(name.substr(kEmbedded.size())))};
   const std::string path(name);
   std::string text = read_text_file(path);
   return {fs::absolute(path).lexically_normal().string(), std::move(text)};

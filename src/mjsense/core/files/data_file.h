@@ -22,8 +22,9 @@ struct DataFolder {
   bool nested = false;      // names may contain folders: "libero/kitchen"
 
   std::vector<std::string> names() const;
-  // Finds a built-in file by its name, or any file by its path, which must end in .toml. Throws
-  // KeyError with the nearest names, or ValueError if the file does not exist.
+  // Finds a built-in file by its name, or any file by its path, which must end in .toml and may
+  // start with "embedded:". Throws KeyError with the nearest names, or ValueError if the file does
+  // not exist.
   DataFile find(std::string_view name_or_path) const;
 };
 

@@ -14,6 +14,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/thread_pool.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {
@@ -99,12 +100,8 @@ TEST(PlainFile, WritesAtomically) {
   EXPECT_EQ(std::filesystem::file_size(out), 8u);
   EXPECT_EQ(std::filesystem::file_size(mine), 4u);
   EXPECT_FALSE(std::filesystem::is_symlink(out));
-  try {
-    write_file(dir.path / "no" / "folder", {});
-    FAIL();
-  } catch (const RuntimeError& e) {
-    EXPECT_THAT(e.what(), StartsWith("cannot write '"));
-  }
+  EXPECT_THAT(error_of<RuntimeError>([&] { write_file(dir.path / "no" / "folder", {}); }),
+              StartsWith("cannot write '"));
 }
 
 TEST(PlainFile, ConcurrentWritersDoNotInterfere) {

@@ -96,12 +96,16 @@ std::vector<int> match_names(std::span<const std::string> patterns,
   return found;
 }
 
+bool is_regex(std::string_view text) {
+  return text.find_first_of(".*+?[]{}()\\|^$") != std::string_view::npos;
+}
+
 Exclude::Exclude(std::span<const std::string> entries, std::string_view context) {
   for (const std::string& entry : entries) {
-    if (entry.find_first_of(".*+?[]{}()\\|^$") == std::string::npos) {
-      exact_.push_back(entry);
-    } else {
+    if (is_regex(entry)) {
       search_.emplace_back(entry, context);
+    } else {
+      exact_.push_back(entry);
     }
   }
 }

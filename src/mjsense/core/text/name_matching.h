@@ -38,8 +38,11 @@ class Regex {
 std::vector<int> match_names(std::span<const std::string> patterns,
                              std::span<const std::string> names, std::string_view context);
 
-// Whether an `exclude` entry drops a name. An entry that contains one of . * + ? [ ] { } ( ) \ | ^
-// $ is a regular expression searched anywhere in the name; any other entry is an exact name.
+// Whether the text contains one of . * + ? [ ] { } ( ) \ | ^ $
+bool is_regex(std::string_view text);
+
+// Whether an `exclude` entry drops a name. An entry for which is_regex() is true is searched
+// anywhere in the name; any other entry is an exact name.
 class Exclude {
  public:
   Exclude(std::span<const std::string> entries, std::string_view context);

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {
@@ -30,12 +31,7 @@ TEST(Match, MatchesFullNamesInModelOrder) {
 }
 
 std::string fault(const std::vector<std::string>& patterns) {
-  try {
-    match_names(patterns, kNames, "sensor 'feet'");
-  } catch (const ValueError& error) {
-    return error.what();
-  }
-  return "";
+  return error_of<ValueError>([&] { match_names(patterns, kNames, "sensor 'feet'"); });
 }
 
 TEST(Match, ErrorsNameThePattern) {
@@ -64,12 +60,7 @@ TEST(Match, ExcludeSearchesOrCompares) {
 }
 
 std::string refusal(const std::string& pattern) {
-  try {
-    Regex regex(pattern, "x");
-  } catch (const ValueError& error) {
-    return error.what();
-  }
-  return "";
+  return error_of<ValueError>([&] { Regex regex(pattern, "x"); });
 }
 
 // Syntax that PCRE2 interprets differently from Python must be rejected.

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/episode/task.h"
 #include "mjsense/robots/load_robot.h"
 
@@ -37,13 +38,10 @@ struct PlayedTask {
     task.begin(world);
   }
 
-  struct Delete {
-    void operator()(mjData* d) const { mj_deleteData(d); }
-  };
   SomeTask task;
   scene::Scene scene;
   const mjModel* model = scene.model();
-  std::unique_ptr<mjData, Delete> data{mj_makeData(model)};
+  DataPtr data = make_data(model);
   World world;
 };
 

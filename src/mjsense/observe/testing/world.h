@@ -8,35 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/testing/test_model.h"
 
 namespace mjsense::observe {
 
-class TestWorld {
+class TestWorld : public TestModel {
  public:
-  explicit TestWorld(const std::string& xml) {
-    char error[500] = "";
-    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
-    model = spec ? mj_compile(spec, nullptr) : nullptr;
-    if (!model) throw std::runtime_error(spec ? mjs_getError(spec) : error);
-    mj_deleteSpec(spec);
-    data = mj_makeData(model);
-    mj_forward(model, data);
-  }
-  ~TestWorld() {
-    mj_deleteData(data);
-    mj_deleteModel(model);
-  }
-  SensorInit init(int num_worlds = 1) const { return {.model = model, .num_worlds = num_worlds}; }
-  World world(int id = 0) const { return {.id = id, .model = model, .data = data}; }
-
+  using TestModel::TestModel;
   void compute(Sensor& sensor) {
     sensor.initialize(init());
     sensor.compute(world());
   }
-
-  mjModel* model = nullptr;
-  mjData* data = nullptr;
 };
 
 // The text of a JSON row, without its padding.

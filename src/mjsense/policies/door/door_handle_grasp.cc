@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 
 namespace mjsense::policies {
@@ -26,7 +27,7 @@ struct Bar {
 };
 
 Bar bar_of(const mjModel* m, const mjData* d, int g) {
-  const Pose pose = pose_from_mat(d->geom_xpos + 3 * g, d->geom_xmat + 9 * g);
+  const Pose pose = geom_pose(d, g);
   const double* box = m->geom_aabb + 6 * g;
   int longest = 0;
   for (int i = 1; i < 3; ++i) {
@@ -75,8 +76,7 @@ std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d,
   Bar best;
   double longest = 0.02;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], door.handle) ||
-        (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0))
+    if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], door.handle) || !is_solid(m, g))
       continue;
     if (door.handle == door.body && m->geom_rbound[g] > 0.3) continue;  // this geom is the leaf
     const Bar bar = bar_of(m, d, g);
@@ -110,8 +110,7 @@ std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d,
 Vec3 closing_direction(const mjData* d, const robots::MoveGroup& gripper) {
   const Vec3 a = vec3(d->site_xpos + 3 * gripper.pad_sites[0]),
              b = vec3(d->site_xpos + 3 * gripper.pad_sites[1]);
-  const Pose tool =
-      pose_from_mat(d->site_xpos + 3 * gripper.leaf_site, d->site_xmat + 9 * gripper.leaf_site);
+  const Pose tool = site_pose(d, gripper.leaf_site);
   return rotate(conjugate(tool.q), normalized(a - b));
 }
 

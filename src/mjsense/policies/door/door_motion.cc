@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/observe/touches.h"
 #include "mjsense/robots/allowed_contact.h"
 #include "mjsense/scenes/robot_floor.h"
 
@@ -23,10 +24,6 @@ constexpr double kNearLimit = 0.25, kComfort = 0.12;  // rad, m
 constexpr double kReachCost = 0.15;                   // joint motion on the path to the handle
 constexpr double kGood = 6;                        // the search stops at a motion with a lower cost
 constexpr double kSwivel = 0.8, kMaxSwivel = 0.9;  // cost per rad^2; limit, rad
-
-Pose pose_of(const scenes::BasePose& base, double z) {
-  return {{base.x, base.y, z}, axis_angle({0, 0, 1}, base.yaw)};
-}
 
 double distance_to_segment(double px, double py, Vec3 a, Vec3 b) {
   const double ex = b.x - a.x, ey = b.y - a.y, length = ex * ex + ey * ey;
@@ -49,7 +46,7 @@ void collide(const mjModel* m, mjData* d) {
 class DoorMotions::Attempt {
  public:
   Attempt(const DoorMotions& motions, const World& world, const scenes::Door& door,
-          const DoorGeometry& geometry, Hand hand, double margin, mjData* scratch)
+          const DoorGeometry& geometry, robots::Hand hand, double margin, mjData* scratch)
       : motions_(motions),
         world_(world),
         door_(door),
@@ -119,7 +116,7 @@ class DoorMotions::Attempt {
 
   bool solve(const Pose& tool, const scenes::BasePose& base, robots::RobotValues& values,
              int iterations) const {
-    return motions_.robot_.ik(hand_.tool, inverse(pose_of(base, z_)) * tool, values, iterations);
+    return motions_.robot_.ik(hand_.tool, inverse(base.at_height(z_)) * tool, values, iterations);
   }
 
   double limit_cost(const robots::RobotValues& values) const {
@@ -250,7 +247,7 @@ class DoorMotions::Attempt {
     for (int i = 0; i < 3; ++i) d->qpos[carrier.qpos[i]] = place[i];
     for (std::size_t i = 0; i < arm_.qpos.size(); ++i)
       d->qpos[arm_.qpos[i]] = values[hand_.tool].values[i];
-    for (const Hand& other : motions_.hands_) {
+    for (const robots::Hand& other : motions_.hands_) {
       if (other.tool == hand_.tool) continue;
       const robots::MoveGroup& arm = motions_.robot_.groups()[other.tool];
       const std::vector<double> q = motions_.tucked(other);
@@ -259,26 +256,22 @@ class DoorMotions::Attempt {
     d->qpos[m->jnt_qposadr[door_.joint]] += leaf;
     if (door_.handle_joint >= 0) d->qpos[m->jnt_qposadr[door_.handle_joint]] += lever;
     collide(m, d);
-    const int root = m->body_rootid[motions_.robot_.base_body()];
     const robots::AllowedContact grasp{motions_.robot_.groups()[hand_.gripper].root_body,
                                        door_.handle};
-    for (int c = 0; c < d->ncon; ++c) {
-      const mjContact& contact = d->contact[c];
-      if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > -motions_.cfg_.depth)
-        continue;
-      const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-      const bool first = m->body_rootid[a] == root;
-      if (first == (m->body_rootid[b] == root)) continue;
-      if (!grasp.permits(m, first ? a : b, first ? b : a)) return true;
-    }
-    return false;
+    bool collides = false;
+    observe::each_touch(m, d, m->body_rootid[motions_.robot_.base_body()],
+                        [&](const observe::Touch& touch) {
+                          collides = collides || (touch.contact->dist <= -motions_.cfg_.depth &&
+                                                  !grasp.permits(m, touch.own, touch.other));
+                        });
+    return collides;
   }
 
   const DoorMotions& motions_;
   const World& world_;
   const scenes::Door& door_;
   const DoorGeometry& geometry_;
-  Hand hand_;
+  robots::Hand hand_;
   double margin_;
   mjData* scratch_;
   const robots::MoveGroup& arm_;
@@ -296,14 +289,14 @@ DoorMotions::DoorMotions(const mjModel* model, const robots::Robot& robot, DoorF
       floor_(floor),
       cfg_(cfg),
       scratch_(model) {
-  for (const Hand& hand : hands_of(robot, model)) {
+  for (const robots::Hand& hand : robots::hands_of(robot, model)) {
     if (robot.groups()[hand.tool].kind == robots::GroupKind::kArm &&
         robot.groups()[hand.gripper].pad_sites[0] >= 0)
       hands_.push_back(hand);
   }
 }
 
-std::vector<double> DoorMotions::tucked(const Hand& hand) const {
+std::vector<double> DoorMotions::tucked(const robots::Hand& hand) const {
   std::vector<double> q;
   for (int joint : robot_.groups()[hand.tool].joints) {
     const double low = model_->jnt_range[2 * joint], high = model_->jnt_range[2 * joint + 1];
@@ -362,11 +355,10 @@ std::optional<DoorMotion> DoorMotions::plan(const World& world, const scenes::Do
                                             const scenes::BasePose& base, double leaf,
                                             double margin, int tool) const {
   const worlds::ScratchData::Loan scratch = scratch_.borrow();
-  mju_copy(scratch->mocap_pos, world.data->mocap_pos, 3 * model_->nmocap);
-  mju_copy(scratch->mocap_quat, world.data->mocap_quat, 4 * model_->nmocap);
+  worlds::copy_positions(model_, world.data, scratch.get());
   const DoorGeometry geometry(model_, world.data, door, robot_.base_pose(world).p);
   std::optional<DoorMotion> best;
-  for (const Hand& hand : hands_) {
+  for (const robots::Hand& hand : hands_) {
     if (tool >= 0 && hand.tool != tool) continue;
     const Vec3 closing = closing_direction(world.data, robot_.groups()[hand.gripper]);
     const std::optional<HandleGrasps> grasps =

@@ -31,7 +31,7 @@ struct DoorWaypoint {
 };
 
 struct DoorMotion {
-  Hand hand;
+  robots::Hand hand;
   Pose grasp;                          // X_WT
   std::vector<DoorWaypoint> approach;  // pregrasp .. grasp
   std::vector<DoorWaypoint> press, open;
@@ -50,7 +50,7 @@ class DoorMotions {
   DoorMotions(const mjModel* model, const robots::Robot& robot, DoorFloor floor,
               DoorMotionCfg cfg = {});
 
-  std::span<const Hand> hands() const { return hands_; }
+  std::span<const robots::Hand> hands() const { return hands_; }
   // The motion that opens the door by `leaf` rad from its current angle, with the base at `base`
   // for the grasp and at least `margin` m away from walls and leaf afterwards. It is the cheapest
   // over the hands (`tool` >= 0: only this arm) and both grasps of the handle; the other arms are
@@ -59,7 +59,7 @@ class DoorMotions {
                                  const scenes::BasePose& base, double leaf, double margin,
                                  int tool = -1) const;
   // Joint positions of an arm that is not used: all at 0, clipped to their ranges.
-  std::vector<double> tucked(const Hand& hand) const;
+  std::vector<double> tucked(const robots::Hand& hand) const;
   // Base poses in front of the door from which to grasp the handle, the most promising first.
   std::vector<scenes::BasePose> places(const World& world, const scenes::Door& door) const;
   // Clearance (m) of a base at this pose from walls and from the leaf, with the leaf rotated by
@@ -73,7 +73,7 @@ class DoorMotions {
   const robots::Robot& robot_;
   DoorFloor floor_;
   DoorMotionCfg cfg_;
-  std::vector<Hand> hands_;
+  std::vector<robots::Hand> hands_;
   mutable worlds::ScratchData scratch_;
 };
 

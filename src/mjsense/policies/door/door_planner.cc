@@ -54,12 +54,6 @@ void DoorPlanner::initialize_planner() {
   margin_.assign(task().num_worlds(), cfg_.margin);
 }
 
-scenes::BasePose DoorPlanner::base(const World& world) const {
-  const Pose pose = robot().base_pose(world);
-  const Vec3 ahead = rotate(pose.q, {1, 0, 0});
-  return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
-}
-
 double DoorPlanner::remaining_leaf_angle(const World& world, double goal) const {
   const scenes::Door& door = door_->door(world.id);
   return door.shut + goal * (door.open - door.shut) -
@@ -77,8 +71,8 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
   const int first = request.attempt > 0 ? 1 : 0;  // stage that drives to the door
   if (request.stage > first) {
     const std::optional<DoorMotion> motion = motions_->plan(
-        world, door_->door(world.id), base(world), remaining_leaf_angle(world, goal_[world.id]),
-        margin_[world.id], tool_[world.id]);
+        world, door_->door(world.id), base_pose(world),
+        remaining_leaf_angle(world, goal_[world.id]), margin_[world.id], tool_[world.id]);
     if (motion) return open_door(world, *motion, plan);
     // The base has missed the planned pose, and no plan works from here: try another pose.
     if (request.stage > first + kPlaces) {
@@ -98,21 +92,16 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
 // Releases the handle, drives back, and returns the arms to their start positions.
 void DoorPlanner::recover(const World& world, Plan& plan) const {
   plan.more = true;
-  const scenes::BasePose here = base(world);
+  const scenes::BasePose here = base_pose(world);
   const DoorGeometry geometry(world.model, world.data, door_->door(world.id),
                               robot().base_pose(world).p);
   Segment& open = plan.wait(kRecovery, 0.5);
   std::vector<CommandPath> paths;
-  for (const Hand& hand : motions_->hands()) {
+  for (const robots::Hand& hand : motions_->hands()) {
     open.grip(hand.gripper, robot().groups()[hand.gripper].open_command);
-    const robots::MoveGroup& arm = robot().groups()[hand.tool];
-    CommandPath path;
-    path.group = hand.tool;
-    path.times = {0, 2.5};
-    for (int address : arm.qpos) path.points.push_back(world.data->qpos[address]);
     const auto& init = robot().cfg().groups[hand.tool].init;
-    path.points.insert(path.points.end(), init.begin(), init.end());
-    if (path.points.size() == 2 * arm.qpos.size()) paths.push_back(std::move(path));
+    if (init.size() == robot().groups()[hand.tool].qpos.size())
+      paths.push_back(arm_path(world, hand.tool, init, 2.5));
   }
   for (const double back : {0.25, 0.12}) {
     const scenes::BasePose off{here.x + back * geometry.away.x, here.y + back * geometry.away.y,
@@ -127,7 +116,7 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
 
 // Plans the drive to the first base pose from which the door can be opened.
 bool DoorPlanner::approach(const World& world, double goal, double margin, Plan& plan) {
-  const scenes::BasePose here = base(world);
+  const scenes::BasePose here = base_pose(world);
   const scenes::Door& door = door_->door(world.id);
   int tried = 0;
   for (const scenes::BasePose& place : motions_->places(world, door)) {
@@ -154,7 +143,7 @@ bool DoorPlanner::approach(const World& world, double goal, double margin, Plan&
     goal_[world.id] = goal;
     margin_[world.id] = margin;
     tool_[world.id] = motion->hand.tool;
-    for (const Hand& hand : motions_->hands()) {
+    for (const robots::Hand& hand : motions_->hands()) {
       plan.segments.back().grip(hand.gripper, robot().groups()[hand.gripper].open_command);
       if (hand.tool != motion->hand.tool) tuck(world, hand, plan.segments.back());
     }
@@ -163,16 +152,23 @@ bool DoorPlanner::approach(const World& world, double goal, double margin, Plan&
   return false;
 }
 
-void DoorPlanner::tuck(const World& world, const Hand& hand, Segment& segment) const {
-  CommandPath path;
-  path.group = hand.tool;
-  path.times = {0, 2.0};
-  for (int address : robot().groups()[hand.tool].qpos)
-    path.points.push_back(world.data->qpos[address]);
-  const std::vector<double> q = motions_->tucked(hand);
-  path.points.insert(path.points.end(), q.begin(), q.end());
-  segment.paths.push_back(std::move(path));
+void DoorPlanner::tuck(const World& world, const robots::Hand& hand, Segment& segment) const {
+  segment.paths.push_back(arm_path(world, hand.tool, motions_->tucked(hand), 2.0));
   segment.duration = std::max(segment.duration, 2.2);
+}
+
+// A straight path in joint space from the measured positions.
+CommandPath DoorPlanner::arm_path(const World& world, int arm, std::span<const double> to,
+                                  double seconds) const {
+  CommandPath path{.group = arm, .times = {0, seconds}, .points = measured(world, arm)};
+  path.points.insert(path.points.end(), to.begin(), to.end());
+  return path;
+}
+
+std::vector<double> DoorPlanner::measured(const World& world, int arm) const {
+  std::vector<double> q;
+  for (int address : robot().groups()[arm].qpos) q.push_back(world.data->qpos[address]);
+  return q;
 }
 
 // Duration (s) of the motion to each waypoint from the previous one.
@@ -224,10 +220,8 @@ void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
 void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& plan) {
   const robots::MoveGroup& gripper = robot().groups()[motion.hand.gripper];
   plan.grasp = motion.grasp;
-  std::vector<double> q;
-  for (int address : robot().groups()[motion.hand.tool].qpos)
-    q.push_back(world.data->qpos[address]);
-  scenes::BasePose at = base(world);
+  std::vector<double> q = measured(world, motion.hand.tool);
+  scenes::BasePose at = base_pose(world);
   const auto add = [&](int phase, std::span<const DoorWaypoint> waypoints,
                        double speed) -> Segment& {
     std::vector<double> times = seconds(waypoints, q, at, speed);

@@ -48,11 +48,16 @@ class DoorPlanner final : public TaskPlanner {
     int segment;
     double fraction;
   };
-  scenes::BasePose base(const World& world) const;
+  scenes::BasePose base_pose(const World& world) const {
+    return scenes::BasePose::of(robot().base_pose(world));
+  }
   double remaining_leaf_angle(const World& world, double goal) const;
   void recover(const World& world, Plan& plan) const;
   bool approach(const World& world, double goal, double margin, Plan& plan);
-  void tuck(const World& world, const Hand& hand, Segment& segment) const;
+  void tuck(const World& world, const robots::Hand& hand, Segment& segment) const;
+  CommandPath arm_path(const World& world, int arm, std::span<const double> to,
+                       double seconds) const;
+  std::vector<double> measured(const World& world, int arm) const;  // joint positions
   void open_door(const World& world, const DoorMotion& motion, Plan& plan);
   std::vector<double> seconds(std::span<const DoorWaypoint> waypoints, std::span<const double> from,
                               const scenes::BasePose& at, double joint_speed) const;

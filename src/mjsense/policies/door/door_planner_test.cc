@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
@@ -27,7 +28,7 @@ TEST_F(DoorPlan, HandleMotionAgreesWithMuJoCosKinematics) {
   start(0);
   const scenes::Door& door = task.door(0);
   const DoorGeometry geometry(model, data.get(), door, task.robot().base_pose(world).p);
-  const Pose handle{vec3(data->xpos + 3 * door.handle), quat(data->xquat + 4 * door.handle)};
+  const Pose handle = body_pose(data.get(), door.handle);
   const double leaf = 0.6 * (door.open - door.shut);
   const Pose expected = geometry.carried(handle, geometry.press, leaf);
   data->qpos[model->jnt_qposadr[door.joint]] += leaf;

@@ -48,12 +48,6 @@ void NavPlanner::initialize_planner() {
   tried_.assign(task().num_worlds(), {});
 }
 
-scenes::BasePose NavPlanner::base(const World& world) const {
-  const Pose pose = robot().base_pose(world);
-  const Vec3 ahead = rotate(pose.q, {1, 0, 0});
-  return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
-}
-
 bool NavPlanner::is_goal_pose(const World& world, const scenes::BasePose& there,
                               const Pose& camera_in_base, double arrive, double facing) const {
   if (nav_->distance(world, there.x, there.y) > arrive) return false;
@@ -63,14 +57,13 @@ bool NavPlanner::is_goal_pose(const World& world, const scenes::BasePose& there,
   for (const scenes::BasePose& tried : tried_[world.id]) {
     if (std::hypot(tried.x - there.x, tried.y - there.y) < kElsewhere) return false;
   }
-  const Pose base{{there.x, there.y, 0}, axis_angle({0, 0, 1}, there.yaw)};
-  return nav_->sees(world, base * camera_in_base);
+  return nav_->sees(world, there.at_height(0) * camera_in_base);
 }
 
 void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   auto& tried = tried_[world.id];
   if (request.stage == 0 && request.attempt == 0) tried.clear();
-  const scenes::BasePose here = base(world);
+  const scenes::BasePose here = base_pose(world);
   const Pose camera_in_base = inverse(robot().base_pose(world)) * nav_->camera_pose(world);
   if (nav_->distance(world, here.x, here.y) < cfg_.arrive + 0.2 &&
       nav_->sees(world, nav_->camera_pose(world))) {
@@ -117,7 +110,7 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
 bool NavPlanner::gone_wrong(const World& world) const {
   const robots::GroupValues& target = robot().targets(world.id)[group_];
   if (!target.given || target.size < 2) return false;
-  const scenes::BasePose here = base(world);
+  const scenes::BasePose here = base_pose(world);
   return std::hypot(target.values[0] - here.x, target.values[1] - here.y) > cfg_.astray;
 }
 

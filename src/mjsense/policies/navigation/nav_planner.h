@@ -37,7 +37,9 @@ class NavPlanner final : public TaskPlanner {
   bool gone_wrong(const World& world) const override;
 
  private:
-  scenes::BasePose base(const World& world) const;
+  scenes::BasePose base_pose(const World& world) const {
+    return scenes::BasePose::of(robot().base_pose(world));
+  }
   bool is_goal_pose(const World& world, const scenes::BasePose& there, const Pose& camera_in_base,
                     double arrive, double facing) const;
 

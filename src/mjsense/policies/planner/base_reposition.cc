@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/navigation/nav_planner.h"
 
@@ -63,8 +64,7 @@ bool BaseReposition::plan(const World& world, int phase, const std::optional<Hel
   World there = world;
   there.data = scratch.get();
   scratch->time = world.data->time;
-  mju_copy(scratch->mocap_pos, world.data->mocap_pos, 3 * model_->nmocap);
-  mju_copy(scratch->mocap_quat, world.data->mocap_quat, 4 * model_->nmocap);
+  worlds::copy_positions(model_, world.data, scratch.get());
   int tried = 0;
   for (const Shift& shift : nearest_first()) {
     const double c = std::cos(from[2]), s = std::sin(from[2]);
@@ -76,7 +76,7 @@ bool BaseReposition::plan(const World& world, int phase, const std::optional<Hel
     mj_kinematics(world.model, scratch.get());
     if (held) {
       const Pose object = robot_.leaf_pose(there, held->hand.tool) * held->tool_object;
-      write_pose(object, scratch->qpos + model_->jnt_qposadr[model_->body_jntadr[held->body]]);
+      write_pose(object, scratch->qpos + free_qpos(model_, held->body));
       mj_kinematics(world.model, scratch.get());
     }
     if (works(there)) {

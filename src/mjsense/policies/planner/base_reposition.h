@@ -15,7 +15,7 @@ namespace mjsense::policies {
 class BaseReposition {
  public:
   struct Held {
-    Hand hand;
+    robots::Hand hand;
     int body = -1;     // has a free joint
     Pose tool_object;  // X_TO
   };

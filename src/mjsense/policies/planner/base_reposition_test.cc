@@ -48,7 +48,7 @@ TEST_F(Shifted, RejectsPosesInsideTheTable) {
 TEST_F(Shifted, HeldObjectsMoveWithTheBase) {
   const mjModel* m = stage.world.model;
   const int block = observe::object_id(m, mjOBJ_BODY, "test", "red_block/red_block");
-  const Hand hand = hands_of(stage.robot(), m).at(0);
+  const robots::Hand hand = robots::hands_of(stage.robot(), m).at(0);
   const Pose tool_object{{0, 0, 0.02}, {}};
   Plan plan;
   ASSERT_TRUE(shift.plan(

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/robots/start_positions.h"
 
 namespace mjsense::policies {
 namespace {
@@ -12,10 +14,8 @@ namespace {
 constexpr double kTurnStep = 0.04;    // rad between two configurations that are checked
 constexpr double kSlideStep = 0.015;  // m
 
-bool is_solid(const mjModel* m, int g) {
-  const int type = m->geom_type[g];
-  return (m->geom_contype[g] || m->geom_conaffinity[g]) && type != mjGEOM_HFIELD &&
-         type != mjGEOM_SDF;
+bool is_checked(const mjModel* m, int g) {
+  return is_solid(m, g) && m->geom_type[g] != mjGEOM_HFIELD && m->geom_type[g] != mjGEOM_SDF;
 }
 
 bool may_touch(const mjModel* m, int a, int b) {
@@ -49,7 +49,7 @@ CollisionModel::CollisionModel(const mjModel* model, const robots::Robot& robot,
   }
   std::vector<int> own;
   for (int g = 0; g < model->ngeom; ++g) {
-    if (!is_solid(model, g)) continue;
+    if (!is_checked(model, g)) continue;
     const int body = model->geom_bodyid[g];
     const bool of_robot = body > 0 && model->body_rootid[body] == root;
     if (of_robot) own.push_back(g);
@@ -59,10 +59,7 @@ CollisionModel::CollisionModel(const mjModel* model, const robots::Robot& robot,
   // Pairs of links in contact at the start configuration are exempt from collision checks.
   const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* d = loan.get();
-  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const auto& init = robot.cfg().groups[g].init;
-    for (std::size_t i = 0; i < init.size(); ++i) d->qpos[robot.groups()[g].qpos[i]] = init[i];
-  }
+  robots::write_start_positions(robot, d->qpos);
   mj_kinematics(model, d);
   for (std::size_t i = 0; i < own.size(); ++i) {
     for (std::size_t k = i + 1; k < own.size(); ++k) {
@@ -80,9 +77,7 @@ CollisionQuery::CollisionQuery(CollisionModel& model, const World& world)
       loan_(model.scratch_.borrow()),
       d_(loan_.get()),
       scene_(model.scene_) {
-  mju_copy(d_->qpos, world.data->qpos, m_->nq);
-  mju_copy(d_->mocap_pos, world.data->mocap_pos, 3 * m_->nmocap);
-  mju_copy(d_->mocap_quat, world.data->mocap_quat, 4 * m_->nmocap);
+  worlds::copy_positions(m_, world.data, d_);
   between_.resize(cm_.joints_.size());
 }
 
@@ -113,12 +108,12 @@ void CollisionQuery::hold(int tool, int gripper, int body, const Pose& tool_obje
   held.site = cm_.robot_->groups()[tool].leaf_site;
   held.contact = {cm_.robot_->groups()[gripper].root_body, body};
   held.tool_object = tool_object;
-  const Pose object{vec3(d_->xpos + 3 * body), quat(d_->xquat + 4 * body)};
+  const Pose object = body_pose(d_, body);
   for (int g = 0; g < m_->ngeom; ++g) {
-    if (!is_solid(m_, g) || !observe::is_descendant_or_self(m_, m_->geom_bodyid[g], body)) continue;
+    if (!is_checked(m_, g) || !observe::is_descendant_or_self(m_, m_->geom_bodyid[g], body))
+      continue;
     held.geoms.push_back(g);
-    held.object_geom.push_back(inverse(object) *
-                               pose_from_mat(d_->geom_xpos + 3 * g, d_->geom_xmat + 9 * g));
+    held.object_geom.push_back(inverse(object) * geom_pose(d_, g));
   }
 }
 
@@ -139,14 +134,14 @@ void CollisionQuery::open(int gripper) {
 void CollisionQuery::place(int body, const Pose& pose) {
   const int joint = m_->body_jntadr[body];
   if (joint < 0 || m_->jnt_type[joint] != mjJNT_FREE) return;
-  write_pose(pose, d_->qpos + m_->jnt_qposadr[joint]);
+  write_pose(pose, d_->qpos + free_qpos(m_, body));
 }
 
 void CollisionQuery::place_base(const Pose& base) { place(cm_.robot_->base_body(), base); }
 
 void CollisionQuery::move_held() {
   for (const Held& held : held_) {
-    const Pose tool = pose_from_mat(d_->site_xpos + 3 * held.site, d_->site_xmat + 9 * held.site);
+    const Pose tool = site_pose(d_, held.site);
     const Pose object = tool * held.tool_object;
     for (std::size_t i = 0; i < held.geoms.size(); ++i) {
       const Pose geom = object * held.object_geom[i];

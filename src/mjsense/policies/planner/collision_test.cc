@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/planner/testing/table_scene.h"
 #include "mjsense/scene/resolve.h"
@@ -43,8 +44,7 @@ TEST(Collision, AgreesWithMuJoCo) {
   const robots::Chain& chain = robot.chain(robot.arm());
   CollisionModel model(stage.world.model, robot, {chain.joints().begin(), chain.joints().end()});
   CollisionQuery query(model, stage.world);
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> d(mj_makeData(stage.world.model),
-                                                            mj_deleteData);
+  const DataPtr d = make_data(stage.world.model);
   Rng rng(1, 0, 0, 0);
   int touching = 0, self = 0;
   std::vector<double> q(chain.joints().size());

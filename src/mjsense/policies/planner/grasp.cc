@@ -8,9 +8,11 @@
 #include <memory>
 #include <numbers>
 
-#include "mjsense/core/mujoco_call.h"
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/planner/finger_contact.h"
+#include "mjsense/robots/hands.h"
 
 namespace mjsense::policies {
 namespace {
@@ -25,57 +27,43 @@ constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
 
 constexpr double kSameEnd = 0.0005;  // m
 
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-
 }  // namespace
 
 GripperShape::GripperShape(const mjModel* model, const robots::Robot& robot, int gripper) {
   const robots::MoveGroup& group = robot.groups()[gripper];
   const robots::MoveGroupCfg& cfg = robot.cfg().groups[gripper];
-  const std::unique_ptr<mjData, DataDelete> data(call_mujoco(mj_makeData, model));
+  const DataPtr data = make_data(model);
   for (std::size_t i = 0; i < cfg.init.size(); ++i) data->qpos[group.qpos[i]] = cfg.init[i];
   mj_kinematics(model, data.get());
-  const int site = group.leaf_site;
-  Pose world_tool = pose_from_mat(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
+  Pose world_tool = site_pose(data.get(), group.leaf_site);
   if (group.pad_sites[0] >= 0 && group.pad_sites[1] >= 0) {
-    const Vec3 closing =
-        rotate(conjugate(world_tool.q), vec3(data->site_xpos + 3 * group.pad_sites[1]) -
-                                            vec3(data->site_xpos + 3 * group.pad_sites[0]));
+    const Vec3 closing = robots::between_pads(data.get(), group);
     if (std::abs(closing.x) > std::abs(closing.y)) {
       turn = axis_angle({0, 0, 1}, 0.5 * pi);
       world_tool.q = world_tool.q * turn;
     }
   }
   max_opening = group.max_opening;
-  Vec3 low{1, 1, 1}, high{-1, -1, -1};
+  Aabb bounds;
   for (int g = 0; g < model->ngeom; ++g) {
-    if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    if (!observe::is_descendant_or_self(model, model->geom_bodyid[g], group.root_body)) continue;
+    if (!is_solid(model, g) ||
+        !observe::is_descendant_or_self(model, model->geom_bodyid[g], group.root_body))
+      continue;
     const double* aabb = model->geom_aabb + 6 * g;
-    const Pose pose = inverse(world_tool) *
-                      pose_from_mat(data->geom_xpos + 3 * g, data->geom_xmat + 9 * g) *
-                      Pose{vec3(aabb), {}};
+    const Pose pose = inverse(world_tool) * geom_pose(data.get(), g) * Pose{vec3(aabb), {}};
     const Box box{pose, vec3(aabb + 3)};
     boxes.push_back(box);
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 p =
-          pose * Vec3{corner & 1 ? box.half.x : -box.half.x, corner & 2 ? box.half.y : -box.half.y,
-                      corner & 4 ? box.half.z : -box.half.z};
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
+    for (Vec3 corner : box_corners({}, box.half)) bounds.add(pose * corner);
   }
-  center = 0.5 * (low + high);
-  radius = 0.5 * norm(high - low);
+  center = bounds.center();
+  radius = 0.5 * norm(bounds.size());
   // The fingers swing on arcs: half closed they reach slightly further than open.
   constexpr double kSwing = 0.005;
-  tip = high.z + kSwing;
+  tip = bounds.high.z + kSwing;
   pad_half_width = cfg.pad_half_width;
   pad_half_length = cfg.pad_half_length;
   // The pads end at the finger tips.
-  if (high.z < pad_half_length - kSameEnd) pad_middle = high.z - pad_half_length;
+  if (bounds.high.z < pad_half_length - kSameEnd) pad_middle = bounds.high.z - pad_half_length;
 }
 
 bool GripperShape::hits(const Pose& tool, const Pose& object, const episode::ObjectShape& shape,
@@ -151,8 +139,7 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const episode::Ob
       }
     }
   }
-  std::stable_sort(grasps.begin(), grasps.end(),
-                   [](const Grasp& a, const Grasp& b) { return a.cost < b.cost; });
+  std::ranges::stable_sort(grasps, {}, &Grasp::cost);
   return grasps;
 }
 

@@ -42,6 +42,13 @@ struct GripperShape {
             double margin) const;
 };
 
+// A tool pose moved up by `height`, and one moved back against the approach by `distance`, m.
+inline Pose raised(Pose pose, double height) {
+  pose.p.z += height;
+  return pose;
+}
+inline Pose backed(const Pose& pose, double distance) { return pose * Pose{{0, 0, -distance}, {}}; }
+
 struct Grasp {
   Pose pose;         // X_WT
   double width = 0;  // m, between the pads

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "mjsense/core/aabb.h"
 #include "mjsense/policies/planner/finger_contact.h"
 #include "mjsense/policies/planner/grasp.h"
 
@@ -65,12 +66,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper,
   const std::size_t stride = shape.points.size() / kPoints + 1;
   for (std::size_t i = 0; i < shape.points.size(); i += stride) points.push_back(shape.points[i]);
   // The middle of the bounding box, since a body's origin may be anywhere.
-  Vec3 low = points[0], high = points[0];
-  for (Vec3 p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const Vec3 middle = 0.5 * (low + high);
+  const Vec3 middle = aabb_of(points).center();
   const double half_length = 0.9 * gripper.pad_half_length,
                half_width = 0.9 * gripper.pad_half_width;
   std::vector<Grasp> grasps;

@@ -13,8 +13,8 @@ constexpr int kParts = 10;        // steps of reach_along()
 constexpr double kDetour = 0.25;  // m upwards, of a floating hand whose straight line is blocked
 
 // The joints of the hand's arm; for a floating hand the joints of the base.
-std::vector<int> planned_joints(const robots::Robot& robot, const Hand& hand) {
-  if (hand.tool != hand.gripper) return robot.groups()[hand.tool].joints;
+std::vector<int> planned_joints(const robots::Robot& robot, const robots::Hand& hand) {
+  if (!hand.floats()) return robot.groups()[hand.tool].joints;
   for (const robots::MoveGroup& group : robot.groups()) {
     if (group.kind == robots::GroupKind::kBase) return group.joints;
   }
@@ -23,7 +23,7 @@ std::vector<int> planned_joints(const robots::Robot& robot, const Hand& hand) {
 
 }  // namespace
 
-HandPlanner::HandPlanner(const mjModel* model, const robots::Robot& robot, Hand hand,
+HandPlanner::HandPlanner(const mjModel* model, const robots::Robot& robot, robots::Hand hand,
                          HandPlannerCfg cfg)
     : robot_(&robot), hand_(hand), cfg_(cfg) {
   collisions_ = std::make_unique<CollisionModel>(model, robot, planned_joints(robot, hand));

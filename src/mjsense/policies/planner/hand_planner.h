@@ -28,10 +28,11 @@ struct HandPose {
 
 class HandPlanner {
  public:
-  HandPlanner(const mjModel* model, const robots::Robot& robot, Hand hand, HandPlannerCfg cfg = {});
+  HandPlanner(const mjModel* model, const robots::Robot& robot, robots::Hand hand,
+              HandPlannerCfg cfg = {});
 
-  const Hand& hand() const { return hand_; }
-  bool floats() const { return hand_.tool == hand_.gripper; }
+  const robots::Hand& hand() const { return hand_; }
+  bool floats() const { return hand_.floats(); }
   CollisionModel& collisions() { return *collisions_; }
 
   // The start of a plan: the commanded pose or, without a command, the measured one.
@@ -62,7 +63,7 @@ class HandPlanner {
   Pose base_of(const Pose& tool) const { return tool * tool_base_; }
 
   const robots::Robot* robot_;
-  Hand hand_;
+  robots::Hand hand_;
   HandPlannerCfg cfg_;
   JointSpace space_;
   Pose tool_base_;  // X_TB of a floating hand

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/policies/planner/hand_planner.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
@@ -29,7 +30,7 @@ struct Problem {
 struct Clutter {
   std::unique_ptr<episode::Task> task;
   std::unique_ptr<scene::Scene> scene;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  DataPtr data;
   std::unique_ptr<HandPlanner> hand;
   std::vector<Problem> problems;
   JointSpace joints;
@@ -46,7 +47,8 @@ struct Clutter {
     task->sample(0, 0, robots::state_row(data.get()));
     mj_forward(scene->model(), data.get());
     const robots::Robot& robot = task->robot();
-    hand = std::make_unique<HandPlanner>(scene->model(), robot, hands_of(robot, scene->model())[0]);
+    hand = std::make_unique<HandPlanner>(scene->model(), robot,
+                                         robots::hands_of(robot, scene->model())[0]);
     for (const int j : robot.groups()[hand->hand().tool].joints) {
       joints.low.push_back(scene->model()->jnt_range[2 * j]);
       joints.high.push_back(scene->model()->jnt_range[2 * j + 1]);

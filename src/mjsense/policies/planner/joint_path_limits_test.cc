@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/policies/planner/testing/motion_quality.h"
@@ -85,7 +86,7 @@ struct Stage {
   std::unique_ptr<episode::Task> task;
   std::unique_ptr<scene::Scene> scene;
   std::unique_ptr<episode::Policy> policy;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  DataPtr data;
 };
 
 std::string said(const Case& c, std::int64_t episode, const MotionQuality::Greatest& g) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 
 namespace mjsense::policies {
 namespace {
@@ -18,7 +19,7 @@ const episode::GraspScene& grasp_scene_of(const episode::Task& task) {
 
 Manipulation::Manipulation(const episode::Task& task, const ManipulationPlannerCfg& cfg)
     : task_(task), cfg_(cfg), scene_(grasp_scene_of(task)) {
-  for (const Hand& hand : hands_of(robot(), task.model())) {
+  for (const robots::Hand& hand : robots::hands_of(robot(), task.model())) {
     hands_.push_back(std::make_unique<HandPlanner>(task.model(), robot(), hand, cfg.hand));
     grippers_.emplace_back(task.model(), robot(), hand.gripper);
   }
@@ -29,8 +30,7 @@ Manipulation::Manipulation(const episode::Task& task, const ManipulationPlannerC
 }
 
 Pose Manipulation::object_pose(const World& world) const {
-  const int body = target_body(world.id);
-  return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+  return body_pose(world.data, target_body(world.id));
 }
 
 Rng Manipulation::rng(const World& world, const PlanRequest& request, std::string_view what) const {

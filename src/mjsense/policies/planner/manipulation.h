@@ -37,12 +37,6 @@ struct ManipulationPlannerCfg {
 inline constexpr double kMargin = 0.004;       // m, clearance along paths
 inline constexpr double kGraspMargin = 0.001;  // m, clearance of the open gripper at the grasp
 
-inline Pose raised(Pose pose, double height) {
-  pose.p.z += height;
-  return pose;
-}
-inline Pose backed(const Pose& pose, double distance) { return pose * Pose{{0, 0, -distance}, {}}; }
-
 class Manipulation {
  public:
   // Throws ValueError for a task without a GraspScene and for a robot without a hand.

@@ -34,7 +34,7 @@ bool ManipulationPlanner::gone_wrong(const World& world) const {
   const auto& segments = follower().plan(world.id).segments;
   const auto segment = static_cast<std::size_t>(follower().segment(world.id));
   if (segment >= segments.size() || segments[segment].holding.empty()) return false;
-  const Hand& hand = shared_->hand(state.grip->hand).hand();
+  const robots::Hand& hand = shared_->hand(state.grip->hand).hand();
   const Pose object = inverse(robot().leaf_pose(world, hand.tool)) * shared_->object_pose(world);
   return norm(object.p - state.grip->tool_object.p) > kSlipped;
 }

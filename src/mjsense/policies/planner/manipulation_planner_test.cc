@@ -9,6 +9,7 @@
 #include <cstring>
 #include <set>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/opening_planner.h"
@@ -19,8 +20,6 @@
 
 namespace mjsense::policies {
 namespace {
-
-using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
 
 // A task with its planner, in worlds of plain MuJoCo.
 struct Play {
@@ -37,8 +36,7 @@ struct Play {
     else
       planner = std::make_unique<ManipulationPlanner>();
     task->register_policy(*planner);
-    for (int w = 0; w < num_worlds; ++w)
-      data.emplace_back(mj_makeData(scene->model()), mj_deleteData);
+    for (int w = 0; w < num_worlds; ++w) data.push_back(make_data(scene->model()));
   }
   EpisodeResult run(int world, std::int64_t episode,
                     const std::function<void(const World&)>& each_step = {}) {

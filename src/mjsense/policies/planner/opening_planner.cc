@@ -30,33 +30,33 @@ void OpeningPlanner::initialize_planner() {
 
 // Opens the grippers and retracts the hands before the next attempt.
 void OpeningPlanner::back_off(const World& world, Plan& plan) const {
-  for (const tasks::ArmAndHand& hand : opening_->reach().hands())
+  for (const tasks::OrientedHand& hand : opening_->reach().hands())
     plan.wait(kOpenGripper, cfg_.close_time)
         .grip(hand.gripper, robot().groups()[hand.gripper].open_command);
-  for (const tasks::ArmAndHand& hand : opening_->reach().hands()) {
-    const Pose from = robot().tcp_pose(world, hand.arm);
+  for (const tasks::OrientedHand& hand : opening_->reach().hands()) {
+    const Pose from = robot().tcp_pose(world, hand.tool);
     const Pose to = from * Pose{{0, 0, -cfg_.back}, {}};
     if (hand.floats()) {
       const Pose base = robot().base_pose(world);
       add_move(plan, kRetreat, hand, base * from, base * to, cfg_.fast);
     } else {
-      plan.move_tool(kRetreat, hand.arm, from, to, cfg_.fast, cfg_.settle);
+      plan.move_tool(kRetreat, hand.tool, from, to, cfg_.fast, cfg_.settle);
     }
   }
   plan.more = true;
 }
 
-Segment& OpeningPlanner::add_move(Plan& plan, int phase, const tasks::ArmAndHand& hand,
+Segment& OpeningPlanner::add_move(Plan& plan, int phase, const tasks::OrientedHand& hand,
                                   const Pose& from, const Pose& to, double speed,
                                   double settle) const {
-  return plan.ease_tool(phase, hand.arm, from, to, speed, std::max(settle, cfg_.settle), cfg_.turn,
+  return plan.ease_tool(phase, hand.tool, from, to, speed, std::max(settle, cfg_.settle), cfg_.turn,
                         true);
 }
 
 void OpeningPlanner::plan_floating(const World& world, const tasks::HandlePath& path,
                                    bool with_approach, Plan& plan) const {
   const robots::MoveGroup& gripper = robot().groups()[path.hand.gripper];
-  Pose at = robot().base_pose(world) * tool_target(world, path.hand.arm);
+  Pose at = robot().base_pose(world) * tool_target(world, path.hand.tool);
   if (with_approach) {
     plan.wait(kOpenGripper, 0).grip(path.hand.gripper, gripper.open_command);
     for (const Pose& next : std::span(path.approach).subspan(1)) {
@@ -79,7 +79,7 @@ std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const robots::
   const int base = opening_->reach().base();
   const auto pose = [&](const robots::RobotValues& q) {
     const auto& at = q[base].values;
-    return Pose{{at[0], at[1], 0}, axis_angle({0, 0, 1}, at[2])};
+    return scenes::BasePose{at[0], at[1], at[2]}.at_height(0);
   };
   std::vector<double> seconds{0};
   for (std::size_t k = 1; k < points.size(); ++k) {
@@ -146,7 +146,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
     plan.more = true;
     return;
   }
-  const int arm = path.hand.arm, hand = path.hand.gripper;
+  const int arm = path.hand.tool, hand = path.hand.gripper;
   const robots::MoveGroup& gripper = robot().groups()[hand];
   if (request.stage == first) {
     plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);

@@ -35,7 +35,7 @@ class OpeningPlanner final : public TaskPlanner {
   std::vector<CommandPath> paths(int arm, std::span<const robots::RobotValues> points, double speed,
                                  bool driving) const;
   // Adds a screw of a floating hand, X_WT.
-  Segment& add_move(Plan& plan, int phase, const tasks::ArmAndHand& hand, const Pose& from,
+  Segment& add_move(Plan& plan, int phase, const tasks::OrientedHand& hand, const Pose& from,
                     const Pose& to, double speed, double settle = 0) const;
   void plan_floating(const World& world, const tasks::HandlePath& path, bool with_approach,
                      Plan& plan) const;

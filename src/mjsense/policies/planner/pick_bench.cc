@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/policies/planner/pick_planner.h"
 #include "mjsense/robots/load_robot.h"
@@ -30,7 +31,7 @@ struct Stage {
   std::unique_ptr<episode::Task> task;
   std::unique_ptr<scene::Scene> scene;
   std::unique_ptr<episode::Policy> policy;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  DataPtr data;
 };
 
 // One episode per iteration: episodes 0, 1, 2 ... of seed 0.

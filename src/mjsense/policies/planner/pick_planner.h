@@ -23,20 +23,19 @@ struct PickPlannerCfg {
 class PickPlanner final : public TaskPlanner {
  public:
   explicit PickPlanner(PickPlannerCfg cfg = {}) : TaskPlanner(cfg.planner), cfg_(cfg) {}
-  // True if the robot has a gripper on an arm and the arm's joints alone move the tool.
-  static bool can_use(const robots::Robot& robot);
   std::span<const episode::Phase> phases() const override;
 
  protected:
-  void initialize_planner() override;  // throws ValueError for a task without a GraspScene
+  // Throws ValueError for a task without a GraspScene, and unless the joints of the robot's arm
+  // alone move its gripper.
+  void initialize_planner() override;
   void make_plan(const World& world, const PlanRequest& request, Plan& plan) override;
   int first_phase() const override;
 
  private:
   bool choose_grasp(const World& world, Grasp& chosen) const;
-  bool reachable(const Pose& base, const Pose& grasp, std::span<const double> q) const;
+  bool reachable(const Pose& base, const Pose& grasp, robots::RobotValues joints) const;
   bool path_is_free(const World& world, const Pose& tool, const Pose& pregrasp) const;
-  void read_arm(const World& world, std::span<double> q) const;
 
   PickPlannerCfg cfg_;
   const episode::GraspScene* scene_ = nullptr;

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <vector>
 
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/robots/load_robot.h"
@@ -15,11 +17,6 @@
 
 namespace mjsense::policies {
 namespace {
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-using DataPtr = std::unique_ptr<mjData, DataDelete>;
 
 struct Stage {
   explicit Stage(int num_worlds, bool noise = false) {
@@ -132,8 +129,7 @@ TEST(PickPlanner, ChoosesAGraspWithClearanceToNeighbours) {
       ++planned;
       const Pose grasp = static_cast<episode::PlannerPolicy&>(*stage.policy).grasp_pose(0);
       for (std::size_t i = 0; i < objects.size(); ++i) {
-        const Pose object{vec3(data->xpos + 3 * objects[i].body),
-                          quat(data->xquat + 4 * objects[i].body)};
+        const Pose object = body_pose(data, objects[i].body);
         EXPECT_FALSE(gripper.hits(grasp, object, objects[i].shape, 0.0))
             << objects[i].kind << " at " << objects[target].kind << ", side " << side;
       }

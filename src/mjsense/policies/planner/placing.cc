@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "mjsense/core/aabb.h"
 #include "mjsense/policies/planner/phases.h"
 
 namespace mjsense::policies {
@@ -65,13 +66,9 @@ double Placing::underside(const episode::ObjectShape& shape, const Quat& object)
 Pose Placing::placed(const Pose& object, const episode::ObjectShape& shape, Vec3 place,
                      int k) const {
   // Middle of the underside relative to the origin, at its current orientation.
-  Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
-  for (Vec3 point : shape.points) {
-    const Vec3 p = rotate(object.q, point);
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const Vec3 underside{0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z};
+  Aabb box;
+  for (Vec3 point : shape.points) box.add(rotate(object.q, point));
+  const Vec3 underside{box.center().x, box.center().y, box.low.z};
   const Quat turn = turned(k);
   return {place + Vec3{0, 0, m_.cfg().clearance} - rotate(turn, underside), turn * object.q};
 }

@@ -17,38 +17,7 @@ namespace {
 constexpr double kFade = 1.0;       // s, minimum duration of the fade of an offset
 constexpr double kFadeSpeed = 0.5;  // rad/s or m/s, maximum average speed of that fade
 
-int floating_base(const robots::Robot& robot) {
-  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const robots::MoveGroup& group = robot.groups()[g];
-    if (group.kind == robots::GroupKind::kBase && group.command_size == 7)
-      return static_cast<int>(g);
-  }
-  return -1;
-}
-
 }  // namespace
-
-std::vector<Hand> hands_of(const robots::Robot& robot, const mjModel* model) {
-  const auto groups = robot.groups();
-  std::vector<Hand> hands;
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const robots::MoveGroup& gripper = groups[g];
-    if (gripper.kind != robots::GroupKind::kGripper || gripper.leaf_site < 0) continue;
-    int arm = -1;
-    for (std::size_t a = 0; a < groups.size() && arm < 0; ++a) {
-      if (groups[a].kind == robots::GroupKind::kArm && groups[a].leaf_site == gripper.leaf_site)
-        arm = static_cast<int>(a);
-    }
-    for (std::size_t a = 0; a < groups.size() && arm < 0; ++a) {
-      if (groups[a].kind == robots::GroupKind::kArm && groups[a].leaf_site >= 0 &&
-          observe::is_descendant_or_self(model, gripper.root_body, groups[a].root_body))
-        arm = static_cast<int>(a);
-    }
-    if (arm < 0 && floating_base(robot) >= 0) arm = static_cast<int>(g);
-    if (arm >= 0) hands.push_back({static_cast<int>(g), arm});
-  }
-  return hands;
-}
 
 void Follower::initialize(const robots::Robot& robot, const mjModel* model, int num_worlds,
                           double dt) {
@@ -59,15 +28,18 @@ void Follower::initialize(const robots::Robot& robot, const mjModel* model, int 
     slides_.emplace_back();
     for (int joint : group.joints) slides_.back().push_back(model->jnt_type[joint] == mjJNT_SLIDE);
   }
-  floating_base_ = floating_base(robot);
-  for (const Hand& hand : hands_of(robot, model)) {
-    if (hand.tool == hand.gripper || joints_are_commanded(hand.tool)) continue;
+  floating_base_ = robots::floating_base(robot);
+  states_.assign(num_worlds, {});
+}
+
+void Follower::check_commands(const mjModel* model) const {
+  for (const robots::Hand& hand : robots::hands_of(*robot_, model)) {
+    if (hand.floats() || joints_are_commanded(hand.tool)) continue;
     throw ValueError(fmt::format(
         "policy 'planner' commands joint positions; the controller of move group '{}' of robot "
         "'{}' takes other commands",
-        robot.groups()[hand.tool].name, robot.name()));
+        robot_->groups()[hand.tool].name, robot_->name()));
   }
-  states_.assign(num_worlds, {});
 }
 
 bool Follower::joints_are_commanded(int group) const {

@@ -10,7 +10,7 @@
 
 #include "mjsense/core/fields/named_enum.h"
 #include "mjsense/policies/planner/plan.h"
-#include "mjsense/robots/robot.h"
+#include "mjsense/robots/hands.h"
 
 namespace mjsense::policies {
 
@@ -43,24 +43,15 @@ struct FollowerCfg {
   double max_base_acceleration = 3.0, max_base_turn_acceleration = 10;  // m/s^2, rad/s^2
 };
 
-// A gripper and the group that moves it.
-struct Hand {
-  int gripper = -1;  // group index
-  // group index used by ToolMove: the gripper's arm, or the gripper itself on a floating base
-  int tool = -1;
-};
-// The hands of a robot, in the order of its grippers. A gripper belongs to the arm with the same
-// leaf site, else to the arm whose root body is above it. A gripper that nothing moves is omitted.
-std::vector<Hand> hands_of(const robots::Robot& robot, const mjModel* model);
-
 // A function that takes a world accesses the state of that world only and may run in parallel with
 // calls for other worlds.
 class Follower {
  public:
   explicit Follower(FollowerCfg cfg = {}) : cfg_(cfg) {}
-  // Throws ValueError for an arm whose commands are not joint positions. `dt`: period of the
-  // commands, s; 0: accelerations are not limited.
+  // `dt`: period of the commands, s; 0: accelerations are not limited.
   void initialize(const robots::Robot& robot, const mjModel* model, int num_worlds, double dt = 0);
+  // Throws ValueError for an arm whose commands are not joint positions, which cannot follow a plan.
+  void check_commands(const mjModel* model) const;
 
   Plan& plan(int world) { return states_[world].plan; }
   const Plan& plan(int world) const { return states_[world].plan; }

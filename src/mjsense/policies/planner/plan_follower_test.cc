@@ -21,7 +21,7 @@ Pose moved(Pose pose, Vec3 by) {
 TEST(Follower, TwoToolsMoveAtTheSameTimeAndGrippersKeepTheirCommand) {
   TableStage stage("bimanual_yam");
   const robots::Robot& robot = stage.robot();
-  const auto hands = hands_of(robot, stage.world.model);
+  const auto hands = robots::hands_of(robot, stage.world.model);
   ASSERT_EQ(hands.size(), 2u);
   Follower follower;
   follower.initialize(robot, stage.world.model, 1);
@@ -225,7 +225,7 @@ TEST(Follower, AFloatingHandMovesItsToolToTheTarget) {
   Rng rng(0, 0, 0, 0);
   robot.write_start(robots::state_row(stage.world.data), Pose{{0.3, 0, 1.2}, {0, 1, 0, 0}}, rng);
   mj_forward(stage.world.model, stage.world.data);
-  const auto hands = hands_of(robot, stage.world.model);
+  const auto hands = robots::hands_of(robot, stage.world.model);
   ASSERT_EQ(hands.size(), 1u);
   EXPECT_EQ(hands[0].tool, hands[0].gripper);
   Follower follower;

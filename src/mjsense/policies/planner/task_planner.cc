@@ -30,6 +30,7 @@ void TaskPlanner::initialize(episode::Task& task) {
   task_ = &task;
   follower_.initialize(task.robot(), task.model(), task.num_worlds(),
                        0.001 * task.cfg().policy_dt_ms);
+  follower_.check_commands(task.model());
   states_.assign(task.num_worlds(), {});
   initialize_planner();
 }

@@ -9,38 +9,9 @@
 #include <string>
 
 #include "mjsense/core/rng.h"
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/testing/test_model.h"
 
 namespace mjsense::testing {
-
-struct TestModel {
-  mjModel* model = nullptr;
-  mjData* data = nullptr;
-
-  explicit TestModel(const std::string& xml) {
-    char error[1000] = "";
-    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
-    if (spec != nullptr) model = mj_compile(spec, nullptr);
-    if (model == nullptr) ADD_FAILURE() << error << (spec ? mjs_getError(spec) : "");
-    if (spec != nullptr) mj_deleteSpec(spec);
-    data = mj_makeData(model);
-    mj_forward(model, data);
-  }
-  ~TestModel() {
-    mj_deleteData(data);
-    mj_deleteModel(model);
-  }
-  TestModel(const TestModel&) = delete;
-  TestModel& operator=(const TestModel&) = delete;
-
-  World world(int id = 0) const {
-    World w;
-    w.id = id;
-    w.model = model;
-    w.data = data;
-    return w;
-  }
-};
 
 inline std::string vec(std::initializer_list<double> xs) {
   std::string s;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/record/testing/fake_suite.h"
@@ -100,6 +101,8 @@ inline void record_all(record::Recorder& recorder, record::FakeSuite& suite, con
   recorder.complete();
 }
 
+inline record::FakeSuiteCfg without_video(int worlds) { return {worlds, 16, 12, false, false}; }
+
 inline record::RecordingCfg fake_recording(const fs::path& out, const record::FakeSuite& suite,
                                            int worlds, int episodes) {
   record::RecordingCfg cfg;
@@ -126,17 +129,6 @@ inline std::string write_recording(const fs::path& out, int episodes, const Atte
   std::string bytes;
   for (const std::string& name : tree(out)) bytes += read_file(out / name);
   return bytes;
-}
-
-// Message of the exception that `run` throws; "" if it throws none.
-template <class Run>
-std::string error_of(Run&& run) {
-  try {
-    run();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
 }
 
 }  // namespace mjsense::testing

@@ -98,9 +98,17 @@ ShapeTriangles arrow_triangles(int type, const float size[3]) {
   return out;
 }
 
-ShapeTriangles triangle_triangles(const float size[3]) {
+ShapeTriangles triangle_triangles(const float size[3], const float mat[9]) {
   ShapeTriangles out;
-  const float x[3] = {size[0], 0, 0}, y[3] = {0, size[1], 0}, up[3] = {0, 0, 1};
+  float x[3], y[3], up[3];
+  for (int k = 0; k < 3; ++k) {
+    x[k] = size[0] * mat[3 * k];
+    y[k] = size[1] * mat[3 * k + 1];
+  }
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    up[k] = mat[3 * i] * mat[3 * j + 1] - mat[3 * j] * mat[3 * i + 1];
+  }
   out.add({kZero, up}, {x, up}, {y, up});
   out.add({kZero, up}, {y, up}, {x, up});  // MuJoCo draws both sides with the same normal
   return out;

@@ -25,8 +25,9 @@ struct ShapeTriangles {
 // both ends), with the geom's size.
 ShapeTriangles arrow_triangles(int type, const float size[3]);
 
-// Both sides of mjGEOM_TRIANGLE.
-ShapeTriangles triangle_triangles(const float size[3]);
+// Both sides of mjGEOM_TRIANGLE, relative to the geom's position, along the axes of the world. In
+// the frustums of cameras, the columns of `mat` are unit vectors that are not perpendicular.
+ShapeTriangles triangle_triangles(const float size[3], const float mat[9]);
 
 // A line from `from` to `to` as a strip that faces the camera at `eye` (m, geom frame) and is
 // `width` pixels wide. `pixel`: size of a pixel at distance 1 m from the eye, or of every pixel if

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
-#include <span>
 #include <utility>
 
 namespace mjsense::render {
@@ -27,7 +25,7 @@ SceneAssets::SceneAssets(const mjModel* model)
       texture_stamps_(model->ntex),
       height_field_stamps_(model->nhfield) {
   reload();
-  reload_changed();
+  begin_image();
 }
 
 bool SceneAssets::Stamp::changed(const void* data, std::size_t bytes) {
@@ -44,106 +42,86 @@ bool SceneAssets::Stamp::changed(const void* data, std::size_t bytes) {
   return std::exchange(value, hash) != hash;
 }
 
-void SceneAssets::reload_changed() {
+bool SceneAssets::begin_image() {
   improved_ = false;
+  for (const std::unique_ptr<DrawnMesh>& mesh : meshes_)
+    if (mesh) mesh->begin_image();
+  bool changed = false;
   const mjModel* m = model_;
   for (int i = 0; i < m->nmesh; ++i) {
     if (!mesh_stamps_[i].changed(m->mesh_vert + 3 * m->mesh_vertadr[i],
                                  3 * sizeof(float) * m->mesh_vertnum[i]))
       continue;
+    changed = true;
     meshes_[2 * i].reset();
     meshes_[2 * i + 1].reset();
   }
   for (int i = 0; i < m->ntex; ++i) {
     const std::size_t bytes =
         static_cast<std::size_t>(m->tex_width[i]) * m->tex_height[i] * m->tex_nchannel[i];
-    if (texture_stamps_[i].changed(m->tex_data + m->tex_adr[i], bytes)) textures_[i].reset();
+    if (!texture_stamps_[i].changed(m->tex_data + m->tex_adr[i], bytes)) continue;
+    changed = true;
+    textures_[i].reset();
   }
+  bool fields = height_field_sizes_.changed(m->hfield_size, 4 * sizeof(mjtNum) * m->nhfield);
   for (int i = 0; i < m->nhfield; ++i) {
     const std::size_t values = static_cast<std::size_t>(m->hfield_nrow[i]) * m->hfield_ncol[i];
-    if (height_field_stamps_[i].changed(m->hfield_data + m->hfield_adr[i], values * sizeof(float)))
-      height_fields_.reset();
+    fields |=
+        height_field_stamps_[i].changed(m->hfield_data + m->hfield_adr[i], values * sizeof(float));
   }
+  if (fields) height_fields_.reset();
+  return changed || fields;
 }
 
 void SceneAssets::reload() {
   meshes_.clear();
   meshes_.resize(2 * model_->nmesh);
-  textures_.assign(model_->ntex, nullptr);
+  textures_.clear();
+  textures_.resize(model_->ntex);
   height_fields_.reset();
   skins_.reset();
 }
 
-const DrawnMesh* SceneAssets::mesh(int id) {
+DrawnMesh* SceneAssets::mesh(int id) {
   std::unique_ptr<DrawnMesh>& place = meshes_[id];
-  if (!place) {
-    const mjModel* m = model_;
-    const int mesh = id / 2;
-    DrawnMesh made;
-    if (id % 2) {
-      made = hull(mesh);
-    } else if (m->mesh_facenum[mesh] > 0) {
-      made.geometry = geometry(mesh, true, rays::BuildQuality::kFast);
-      made.tables = mesh_tables(m, mesh);
-    }
-    if (made.tables) made.surface = made.tables->surface();
-    place = std::make_unique<DrawnMesh>(std::move(made));
-  }
-  if (!place->geometry || !place->geometry->scene) return nullptr;
-  if (id % 2 == 0 && !place->shadows && !improved_ && ++place->uses > kManyUses) {
-    place->shadows = geometry(id / 2, false, rays::BuildQuality::kHigh);
-    improved_ = true;
-  }
-  return place.get();
-}
-
-std::shared_ptr<const rays::MeshGeometry> SceneAssets::geometry(int mesh, bool clusters,
-                                                                rays::BuildQuality quality) const {
-  const mjModel* m = model_;
-  return rays::mesh_geometry({m->mesh_vert + 3 * m->mesh_vertadr[mesh],
-                              3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
-                             {m->mesh_face + 3 * m->mesh_faceadr[mesh],
-                              3 * static_cast<std::size_t>(m->mesh_facenum[mesh])},
-                             clusters, quality);
-}
-
-// The faces of MuJoCo's convex hull, shaded flat.
-DrawnMesh SceneAssets::hull(int mesh) const {
-  const mjModel* m = model_;
-  if (m->mesh_graphadr[mesh] < 0) return {};
-  const int* graph = m->mesh_graph + m->mesh_graphadr[mesh];
-  const int num_vertices = graph[0], num_faces = graph[1];
-  const std::span<const int> faces(graph + 2 + 3 * num_vertices + 3 * num_faces,
-                                   3 * static_cast<std::size_t>(num_faces));
-  const float* vert = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
-  DrawnMesh made;
-  made.geometry = rays::mesh_geometry({vert, 3 * static_cast<std::size_t>(m->mesh_vertnum[mesh])},
-                                      faces, true, rays::BuildQuality::kFast);
-  auto tables = std::make_shared<MeshTables>();
-  for (int f = 0; f < num_faces; ++f) {
-    const float *a = vert + 3 * faces[3 * f], *b = vert + 3 * faces[3 * f + 1],
-                *c = vert + 3 * faces[3 * f + 2];
-    float n[3], length = 0;
-    for (int k = 0; k < 3; ++k) {
-      const int i = (k + 1) % 3, j = (k + 2) % 3;
-      n[k] = (b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i]);
-      length += n[k] * n[k];
-    }
-    for (int corner = 0; corner < 3; ++corner)
-      for (float x : n) tables->normals.push_back(length > 0 ? x / std::sqrt(length) : 0);
-  }
-  if (m->mesh_texcoordadr[mesh] >= 0) {
-    const float* texcoord = m->mesh_texcoord + 2 * m->mesh_texcoordadr[mesh];
-    add_coordinates(*tables, num_faces, vert, faces.data(), texcoord, faces.data());
-  }
-  made.tables = std::move(tables);
-  return made;
+  if (!place) place = std::make_unique<DrawnMesh>(model_, id, improved_);
+  return place->empty() ? nullptr : place.get();
 }
 
 const Texture* SceneAssets::texture(int id) {
   if (id < 0 || id >= model_->ntex) return nullptr;
-  if (!textures_[id]) textures_[id] = stored_texture(model_, id);
-  return textures_[id]->texture.levels > 0 ? &textures_[id]->texture : nullptr;
+  std::unique_ptr<DrawnTexture>& place = textures_[id];
+  if (!place) place = std::make_unique<DrawnTexture>(model_, id);
+  return place->texture().levels > 0 ? &place->texture() : nullptr;
+}
+
+DrawnTexture::DrawnTexture(const mjModel* model, int id)
+    : model_(model), id_(id), texture_(texture_levels(model, id)) {
+  texture_.on_demand = this;
+}
+
+// One level more than needed, because the texture is read anew each time.
+void DrawnTexture::add_level(int level) {
+  stored_ = stored_texture(model_, id_, std::max(0, level - 1));
+  texture_ = stored_->texture;
+  if (texture_.finest > 0) texture_.on_demand = this;
+}
+
+PreparedAssets SceneAssets::prepared() const {
+  PreparedAssets out;
+  for (const std::unique_ptr<DrawnMesh>& mesh : meshes_) {
+    if (!mesh) continue;
+    ++out.meshes;
+    out.clusters += mesh->has_clusters();
+    out.trees += mesh->has_tree();
+    out.surfaces += mesh->has_surface();
+  }
+  for (const std::unique_ptr<DrawnTexture>& texture : textures_) {
+    if (!texture || !texture->texture().texels) continue;
+    ++out.textures;
+    out.levels += texture->texture().levels - texture->texture().finest;
+  }
+  return out;
 }
 
 const Texture* SceneAssets::skybox() {

@@ -43,6 +43,10 @@ void set_box(const std::array<float, 6>& box, rays::RayGeom& shape) {
   std::copy_n(box.data() + 3, 3, shape.half);
 }
 
+void set_unrotated(rays::RayGeom& shape) {
+  for (int k = 0; k < 9; ++k) shape.mat[k] = shape.rot[k] = k % 4 == 0;
+}
+
 }  // namespace
 
 // A flex or skin: triangles that move.
@@ -79,7 +83,7 @@ SceneRenderer::~SceneRenderer() = default;
 
 void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                            const ImageTargets& targets) {
-  assets_.reload_changed();
+  if (assets_.begin_image()) kept_.clear();
   read_camera(scene, width, height);
   read_lights(scene);
   const bool color = targets.rgb != nullptr;
@@ -104,7 +108,7 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                     .fog = scene.fog ? settings_.fog : Fog{},
                     .projected_textures = settings_.projected_textures};
     const View& built = builder_->build(view, position_, rotation_, grid_);
-    tiles_(built, images, 0, (height + kTileSize - 1) / kTileSize, memory_->scratch());
+    kept_.render(built, images, tiles_, memory_->scratch());
   };
   if (color) {
     ImageTargets images = targets;
@@ -135,11 +139,11 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
     geom_reader_.read(scene.geoms + i * scene.geom_stride, geom);
     if (geom.segid >= 0 && geom.segid <= scene.num_geoms)
       segments_[geom.segid] = {geom.objid, geom.objtype};
-    if (!finite(geom.pos) || !finite(geom.mat) || !finite(geom.size))
-      throw ValueError(
-          fmt::format("geom {} of the scene (object type {}, id {}) has a pose or size that is not "
-                      "finite",
-                      i, geom.objtype, geom.objid));
+    if (!finite(geom.pos) || !finite(geom.mat) || !finite(geom.size) || !finite(geom.rgba))
+      throw ValueError(fmt::format(
+          "geom {} of the scene (object type {}, id {}) has a pose, size or colour that is not "
+          "finite",
+          i, geom.objtype, geom.objid));
     if (!all && geom.segid < 0) continue;
     if (all && geom.label)
       throw ValueError(fmt::format(
@@ -217,14 +221,11 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
     case mjGEOM_MESH:
     case mjGEOM_SDF: {
       if (geom.dataid < 0 || geom.dataid >= 2 * model_->nmesh) return;
-      const DrawnMesh* mesh = assets_.mesh(geom.dataid);
+      DrawnMesh* mesh = assets_.mesh(geom.dataid);
       if (!mesh) return;
-      out.bvh = mesh->geometry->scene.get();
-      out.shadow_bvh = mesh->shadows ? mesh->shadows->scene.get() : nullptr;
-      out.mesh = &mesh->surface;
-      out.clusters = mesh->geometry->clusters.nodes.empty() ? nullptr : &mesh->geometry->clusters;
-      out.horizons = out.clusters ? mesh->geometry->horizons.get() : nullptr;
-      set_box(mesh->geometry->box, shape);
+      out.on_demand = mesh;
+      out.mesh = mesh->surface();
+      set_box(mesh->box(), shape);
       break;
     }
     case mjGEOM_HFIELD: {
@@ -249,7 +250,8 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       add_triangles(out, arrow_triangles(geom.type, size));
       return;
     case mjGEOM_TRIANGLE:
-      add_triangles(out, triangle_triangles(size));
+      set_unrotated(shape);
+      add_triangles(out, triangle_triangles(size, geom.mat));
       return;
     case mjGEOM_LINE:
     case mjGEOM_LINEBOX:
@@ -320,6 +322,7 @@ void SceneRenderer::add_lines(const AbstractGeom& geom, DrawnGeom drawn) {
 
 void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const SceneMemory& scene) {
   const int id = geom.objid;
+  if (id < 0 || id >= soft_.num_flexes) return;
   const int used = soft_.flexfaceused[id];
   const float radius = geom.size[0];
   rays::RayGeom& shape = drawn.shape;
@@ -409,7 +412,7 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
   drawn.bvh = soft.mesh.scene();
   drawn.mesh = &soft.surface;
   std::fill_n(shape.pos, 3, 0.0);
-  for (int k = 0; k < 9; ++k) shape.mat[k] = shape.rot[k] = k % 4 == 0;
+  set_unrotated(shape);
   drawn_.push_back(drawn);
 }
 
@@ -443,7 +446,7 @@ void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
   std::copy_n(soft.box, 3, shape.center);
   std::copy_n(soft.box + 3, 3, shape.half);
   std::fill_n(shape.pos, 3, 0.0);
-  for (int k = 0; k < 9; ++k) shape.mat[k] = shape.rot[k] = k % 4 == 0;
+  set_unrotated(shape);
   drawn.bvh = soft.mesh.scene();
   drawn.mesh = &soft.surface;
   drawn_.push_back(drawn);
@@ -482,8 +485,10 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
     light_reader_.read(scene.lights + i * scene.light_stride, light);
     const bool directional = light.type < 0 ? light.directional != 0 : light.type == kDirectional;
     if (!directional && light.type > kSpot) continue;
-    if (!finite(light.pos) || !finite(light.dir))
-      throw ValueError(fmt::format("light {} of the scene has a pose that is not finite", i));
+    if (!finite(light.pos) || !finite(light.dir) || !finite(light.ambient) ||
+        !finite(light.diffuse) || !finite(light.specular) || !finite(light.attenuation))
+      throw ValueError(
+          fmt::format("light {} of the scene has a pose or colour that is not finite", i));
     ViewLight& out = lights_.emplace_back();
     out = {};
     out.kind = directional ? LightKind::kDirectional : LightKind::kSpot;
@@ -528,10 +533,14 @@ void SceneRenderer::read_camera(const SceneMemory& scene, int width, int height)
               bottom = mean(&AbstractCamera::frustum_bottom),
               top = mean(&AbstractCamera::frustum_top);
   float half = mean(&AbstractCamera::frustum_width);
-  if (!(forward_length > 0) || !(up_length > 0) || !(near > 0) || !std::isfinite(position_[0]) ||
-      !std::isfinite(position_[1]) || !std::isfinite(position_[2]))
+  const float frustum[] = {near, center, bottom, top, half};
+  for (const AbstractCamera& camera : {left, right})
+    if (!finite(camera.pos) || !finite(camera.forward) || !finite(camera.up) || !finite(frustum))
+      throw ValueError("the scene's camera has a pose or field of view that is not finite");
+  if (!(forward_length > 0) || !(up_length > 0) || !(near > 0))
     throw ValueError(
-        "the scene's camera is not set or not finite; call update_scene() before render()");
+        "the scene's camera is not set: call update_scene() before render(), and "
+        "mujoco.mj_forward(model, data) before update_scene()");
   if (half == 0)
     half = 0.5f * static_cast<float>(width) / static_cast<float>(height) * (top - bottom);
   for (int k = 0; k < 3; ++k) {

@@ -9,6 +9,7 @@
 #include "mjsense/rays/deformable_mesh.h"
 #include "mjsense/render/abstract/abstract_scene.h"
 #include "mjsense/render/abstract/decoration_shapes.h"
+#include "mjsense/render/abstract/kept_images.h"
 #include "mjsense/render/abstract/model_arrays.h"
 #include "mjsense/render/abstract/scene_assets.h"
 #include "mjsense/render/kernels/tile_memory.h"
@@ -30,6 +31,7 @@ struct SceneSettings {
 
 // Arrays of an mjvScene that hold flexes and skins; null if there are none.
 struct SoftArrays {
+  int num_flexes = 0;
   const int *flexedgeadr = nullptr, *flexedgenum = nullptr, *flexedge = nullptr;
   const int *flexvertadr = nullptr, *flexvertnum = nullptr;
   const int *flexfaceadr = nullptr, *flexfaceused = nullptr;
@@ -64,7 +66,11 @@ class SceneRenderer {
   void render(const SceneMemory& scene, int width, int height, const ImageTargets& targets);
 
   // Makes the next image show the current contents of meshes, height fields and textures.
-  void reload() { assets_.reload(); }
+  void reload() {
+    assets_.reload();
+    kept_.clear();
+  }
+  PreparedAssets prepared() const { return assets_.prepared(); }
 
  private:
   struct Soft;
@@ -100,6 +106,7 @@ class SceneRenderer {
   std::unique_ptr<ViewBuilder> builder_;
   std::unique_ptr<TileMemory> memory_;
   RenderTiles tiles_ = best_render_tiles();
+  KeptImages kept_;
 };
 
 }  // namespace mjsense::render

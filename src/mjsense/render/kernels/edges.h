@@ -4,6 +4,7 @@
 // are the samples of such pixels. Part of the tile kernels.
 
 #include "mjsense/render/kernels/trace.h"
+#include "mjsense/render/view/image_window.h"
 
 namespace mjsense::render {
 namespace {
@@ -30,9 +31,12 @@ inline void multisample_shift(int index, int samples, float& x, float& y) {
   y = -kFour[index][1] / 8;  // OpenGL counts rows from the bottom
 }
 
-// If 1/t deviates from a linear function of the image by more than this times the size of a pixel,
-// relative to 1/t, there is an edge within one geom.
-constexpr float kBend = 0.06f;
+// Within one geom, there is an edge where 1/t is not a linear function of the image. Two tests find
+// it, with limits relative to 1/t and to the size of a pixel. Before a pixel is sampled, the second
+// difference of 1/t between it and its neighbours must exceed kBendToNeighbors. The samples are used
+// if their mean differs from the centre by more than kBend. A crease in the pixel makes that
+// difference an eighth of the second difference at most, so the first limit is the larger one.
+constexpr float kBend = 0.06f, kBendToNeighbors = 5 * kBend;
 
 // A value of each pixel of a tile, row by row, with one pixel more at each side.
 struct alignas(64) PaddedTile {
@@ -79,7 +83,7 @@ inline void find_edges(const PixelGrid& grid, const Hits* hits, int across, int 
   const int columns = 4 * across, rows = 4 * down;
   geoms.pad(columns, rows, 0);
   nearness.pad(columns, rows, 1);
-  const Float maximum = splat(2 * kBend * grid.dx);
+  const Float maximum = splat(kBendToNeighbors * grid.dx);
   for (int y = 0; y < rows; ++y) {
     std::uint32_t found = 0;
     for (int k = 0; k < kTileSize; k += kWidth) {
@@ -99,11 +103,10 @@ inline void find_edges(const PixelGrid& grid, const Hits* hits, int across, int 
   }
 }
 
-// If the geom is so thin that it may be between the centres of pixels, adds all lanes of the packets
-// that may see it.
+// If the geom is thin (kThin), adds all lanes of the packets near its window.
 inline void add_thin(const PixelGrid& grid, const ViewGeom& g, const Tile& tile,
                      std::uint32_t* edges) {
-  const float thin = 2.5f * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
+  const float thin = kThin * grid.dx, x = 0.5f * grid.dx, y = -0.5f * grid.dy;
   const float* w = g.window;
   if (w[1] - w[0] > thin && w[3] - w[2] > thin) return;
   const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
@@ -111,9 +114,23 @@ inline void add_thin(const PixelGrid& grid, const ViewGeom& g, const Tile& tile,
     edges[__builtin_ctz(near)] = 0xffffu;
 }
 
+// Both functions work on lanes of one pixel, whose number is a power of two.
 template <typename T>
 void fill(T* p, int count, T value) {
-  for (int i = 0; i < count; ++i) p[i] = value;
+  if (count < 4) {
+    for (int i = 0; i < count; ++i) p[i] = value;
+    return;
+  }
+  const T four[4] = {value, value, value, value};
+  for (int i = 0; i < count; i += 4) __builtin_memcpy(p + i, four, sizeof four);
+}
+template <typename T>
+void copy(const T* from, int count, T* to) {
+  if (count < 4) {
+    for (int i = 0; i < count; ++i) to[i] = from[i];
+    return;
+  }
+  for (int i = 0; i < count; i += 4) __builtin_memcpy(to + i, from + i, 4 * sizeof(T));
 }
 
 // Pixels of a tile, each of which has `samples` lanes in a tile of samples.
@@ -155,6 +172,7 @@ inline void start_samples(const View& view, const Tile& centers, const SampledPi
   for (int k = 0; k < kLanes; ++k) multisample_shift(k % samples, samples, shift_x[k], shift_y[k]);
   out.shaded = true;
   out.regular = false;
+  out.keep = nullptr;
   out.around[0] = out.around[2] = kInfinity;
   out.around[1] = out.around[3] = -kInfinity;
   for (int q = 0; q < packets; ++q) {
@@ -184,18 +202,18 @@ inline void start_samples(const View& view, const Tile& centers, const SampledPi
   out.depth = far;
 }
 
-// Copies lane `k` of a packet to lane `to_k` of another.
-inline void copy_lane(const Pixels& pixels, const Hits& hits, int k, Pixels& to, Hits& to_hits,
-                      int to_k) {
-  to.x[to_k] = pixels.x[k];
-  to.y[to_k] = pixels.y[k];
-  to_hits.t[to_k] = hits.t[k];
-  to_hits.id[to_k] = hits.id[k];
-  to_hits.geom[to_k] = hits.geom[k];
-  to_hits.prim[to_k] = hits.prim[k];
-  to_hits.u[to_k] = hits.u[k];
-  to_hits.v[to_k] = hits.v[k];
-  for (int c = 0; c < 3; ++c) to_hits.n[c][to_k] = hits.n[c][k];
+// Copies `count` lanes of a packet from lane `k` on to lane `to_k` of another.
+inline void copy_lanes(const Pixels& pixels, const Hits& hits, int k, int count, Pixels& to,
+                       Hits& to_hits, int to_k) {
+  copy(pixels.x + k, count, to.x + to_k);
+  copy(pixels.y + k, count, to.y + to_k);
+  copy(hits.t + k, count, to_hits.t + to_k);
+  copy(hits.id + k, count, to_hits.id + to_k);
+  copy(hits.geom + k, count, to_hits.geom + to_k);
+  copy(hits.prim + k, count, to_hits.prim + to_k);
+  copy(hits.u + k, count, to_hits.u + to_k);
+  copy(hits.v + k, count, to_hits.v + to_k);
+  for (int c = 0; c < 3; ++c) copy(hits.n[c] + k, count, to_hits.n[c] + to_k);
 }
 
 // Removes the pixels all of whose samples see the surface of the centre, unless they are among the
@@ -223,11 +241,9 @@ inline void keep_differing(const View& view, const Tile& centers, const std::uin
       }
       const float bend = mean / samples - center;
       if (!differs && (bend < 0 ? -bend : bend) <= maximum * center) continue;
-      for (int j = 0; j < samples; ++j) {
-        const int to = kept * samples + j;
-        copy_lane(tile.pixels[q], hits, k + j, tile.pixels[to / kLanes], tile.hits[to / kLanes],
-                  to % kLanes);
-      }
+      if (const int to = kept * samples; kept < i)
+        copy_lanes(tile.pixels[q], hits, k, samples, tile.pixels[to / kLanes],
+                   tile.hits[to / kLanes], to % kLanes);
       pixels.packet[kept] = packet;
       pixels.lane[kept++] = lane;
     }

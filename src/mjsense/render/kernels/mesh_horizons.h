@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "mjsense/rays/horizons.h"
+#include "mjsense/render/kernels/mesh_parts.h"
 #include "mjsense/render/kernels/rays.h"
 
 namespace mjsense::render {
@@ -242,13 +243,14 @@ inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f n
   // The sines also go through columns(): loading a vector right after storing its elements would
   // stall on store forwarding.
   Float4 planes[kWidth], sines[kWidth];
+  const rays::Horizons& horizons = horizons_of(g);
   for (int i = 0; i < kWidth; ++i) {
     planes[i] = Float4{};
     sines[i] = Float4{rays::Horizons::kNever};
     if (!(asked >> i & 1u) || faces[i] < 0) continue;  // or a wall of a height field
-    planes[i] = load4(g.horizons->plane(faces[i]));
-    sines[i] = Float4{g.horizons->ask(faces[i], octants[i], [&] {
-      return find_horizon(*g.clusters, g.horizons->slot(faces[i]), octants[i], g.radius);
+    planes[i] = load4(horizons.plane(faces[i]));
+    sines[i] = Float4{horizons.ask(faces[i], octants[i], [&] {
+      return find_horizon(clusters_of(g), horizons.slot(faces[i]), octants[i], g.radius);
     })};
   }
   const Vec4f plane = columns(planes);

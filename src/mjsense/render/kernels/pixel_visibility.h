@@ -26,7 +26,8 @@ inline void update_farthest(Tile& tile, PacketMask packets) {
 inline PacketMask draw_or_trace(const View& view, int index, PacketMask packets, Tile& tile) {
   const ViewGeom& g = view.geoms[index];
   PacketMask changed = 0;
-  if (g.clusters && !view.grid.orthographic && rasterize(view, index, packets, tile, changed)) {
+  if (has_clusters(g) && !view.grid.orthographic &&
+      rasterize(view, index, packets, tile, changed)) {
     if (g.height_field)
       changed |= trace_walls(Tracing(view, index), tile.pixels, tile.hits, packets);
     return changed;

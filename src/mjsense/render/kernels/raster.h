@@ -3,108 +3,12 @@
 // Rasterises triangles into a tile. Used if the tile has more pixels than the geom has triangles:
 // each triangle is set up once per tile instead of being intersected by every packet of rays. Part
 // of the tile kernels.
-//
-// Let c0 c1 c2 be the corners in the camera's frame. The ray d = (x, y, -1) of a pixel passes
-// inside the edge from c1 to c2 if d . (c2 - c1) x (c2 + c1) >= 0 (Pluecker's test). This is a
-// linear function of x and y and exactly the negative of that of the neighbour across the edge, so
-// there are no gaps between triangles. 1 / t is linear too: d . N / (c0 . N) with N = (c1 - c0) x
-// (c2 - c0).
 
+#include "mjsense/render/kernels/drawn_triangles.h"
 #include "mjsense/render/kernels/trace.h"
 
 namespace mjsense::render {
 namespace {
-
-// A block of triangles as linear functions of x and y: f(x, y) = f[0] x + f[1] y - f[2].
-struct alignas(64) Drawn {
-  float edges[3][3][rays::kClusterSize];
-  float inverse_t[3][rays::kClusterSize];
-  float window[4][rays::kClusterSize];
-  float nearest[rays::kClusterSize], farthest[rays::kClusterSize];  // planar depth of the corners
-};
-
-inline void store(float (*p)[rays::kClusterSize], int k, Vec3f v) {
-  store(p[0] + k, v.x);
-  store(p[1] + k, v.y);
-  store(p[2] + k, v.z);
-}
-
-inline Vec3f scaled(Vec3f v, float by) {
-  return {v.x * splat(by), v.y * splat(by), v.z * splat(by)};
-}
-
-// Lanes where the interval [low, high] contains a pixel centre first + i * step.
-inline Mask holds_center(Float low, Float high, float first, float step) {
-  constexpr float kSlack = 1e-3f;  // pixels
-  const Float inverse = splat(1.0f / step);
-  const Float a = (low - splat(first)) * inverse, b = (high - splat(first)) * inverse;
-  return -floor(-(min(a, b) - splat(kSlack))) <= floor(max(a, b) + splat(kSlack));
-}
-
-// 1, or -1 if the camera's frame is left-handed, as that of a mirrored camera.
-inline float handedness(const ViewGeom& g) {
-  const float* r = g.rot;
-  const float determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
-                            r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]);
-  return determinant < 0 ? -1.0f : 1.0f;
-}
-
-// Sets up the triangles that may be visible in the tile: they face the camera and cover a pixel
-// centre. `side`: see handedness().
-inline std::uint32_t set_up(const View& view, const ViewGeom& g, float side,
-                            const rays::TriangleBlock& block, const Tile& tile, Drawn& out) {
-  const PixelGrid& grid = view.grid;
-  std::uint32_t drawn = 0;
-  for (int k = 0; k < rays::kClusterSize; k += kWidth) {
-    Vec3f c[3];
-    for (int i = 0; i < 3; ++i) {
-      const Vec3f v{load(block.corners[i][0] + k), load(block.corners[i][1] + k),
-                    load(block.corners[i][2] + k)};
-      c[i] = splat(g.pos) + from_geom(g.rot, v);
-    }
-    const Vec3f n = scaled(cross(c[1] - c[0], c[2] - c[0]), side);
-    const Float volume = dot(n, c[0]);
-    Mask shown = volume < splat(-1e-30f);
-    if (!any(shown)) continue;
-    const Float nearest = -max(c[0].z, max(c[1].z, c[2].z));
-    const Float farthest = -min(c[0].z, min(c[1].z, c[2].z));
-    const Mask ahead = splat(kTiny) < nearest;
-    Float low[2], high[2], inverse_z[3];
-    for (int i = 0; i < 3; ++i) inverse_z[i] = splat(-1.0f) / c[i].z;
-    for (int axis = 0; axis < 2; ++axis) {
-      Float x[3];
-      for (int i = 0; i < 3; ++i) x[i] = (axis == 0 ? c[i].x : c[i].y) * inverse_z[i];
-      const Float a = min(x[0], min(x[1], x[2])), b = max(x[0], max(x[1], x[2]));
-      const Float slack = splat(1e-6f) * (splat(1.0f) + max(abs(a), abs(b)));
-      low[axis] = select(ahead, a - slack, splat(-kInfinity));
-      high[axis] = select(ahead, b + slack, splat(kInfinity));
-    }
-    shown = shown & (low[0] <= splat(tile.around[1])) & (splat(tile.around[0]) <= high[0]) &
-            (low[1] <= splat(tile.around[3])) & (splat(tile.around[2]) <= high[1]) &
-            (splat(0.0f) < farthest);
-    if (!grid.distorted_rays && tile.regular) {
-      const Mask over = holds_center(low[0], high[0], tile.around[0], grid.dx) &
-                        holds_center(low[1], high[1], tile.around[3], grid.dy);
-      shown = shown & (over | ~ahead);
-    }
-    const std::uint32_t lanes = bits(shown);
-    if (!lanes) continue;
-    drawn |= lanes << k;
-    for (int i = 0; i < 3; ++i) {
-      const Vec3f a = c[(i + 1) % 3], b = c[(i + 2) % 3];
-      store(out.edges[i], k, scaled(cross(b - a, b + a), side));
-    }
-    const Float inverse = splat(1.0f) / volume;
-    store(out.inverse_t, k, {n.x * inverse, n.y * inverse, n.z * inverse});
-    for (int axis = 0; axis < 2; ++axis) {
-      store(out.window[2 * axis] + k, low[axis]);
-      store(out.window[2 * axis + 1] + k, high[axis]);
-    }
-    store(out.nearest + k, nearest);
-    store(out.farthest + k, farthest);
-  }
-  return drawn;
-}
 
 inline Float linear(const float (*f)[rays::kClusterSize], int lane, Float x, Float y) {
   return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
@@ -175,8 +79,8 @@ struct TileFrustum {
   float a[kPlanes][3], size[kPlanes][3], b[kPlanes];
   const float* eye;
 
-  TileFrustum(const ViewGeom& g, const Tile& tile) : eye(g.eye) {
-    const float* w = tile.around;
+  // `w`: window of the tile's pixels. `depth`: the hits, m; nothing behind it is contained.
+  TileFrustum(const ViewGeom& g, const float* w, float depth) : eye(g.eye) {
     const float normals[kPlanes][3] = {
         {1, 0, w[0]}, {-1, 0, -w[1]}, {0, 1, w[2]}, {0, -1, -w[3]}, {0, 0, 1}};
     for (int p = 0; p < kPlanes; ++p) {
@@ -189,7 +93,7 @@ struct TileFrustum {
       const float reach = g.pos[0] * g.pos[0] + g.pos[1] * g.pos[1] + g.pos[2] * g.pos[2];
       b[p] += 1e-6f * (g.radius + __builtin_sqrtf(reach));  // rounding
     }
-    b[4] += tile.depth;  // excludes what is behind the hits so far
+    b[4] += depth;
   }
 
   std::uint32_t children(const rays::ClusterNode& node) const {
@@ -268,32 +172,69 @@ inline int find_covered(const Drawn& drawn, std::uint32_t lanes, PacketMask pack
   return count;
 }
 
+// A geom that is drawn into `packets` of a tile.
+struct Drawing {
+  const ViewGeom& geom;
+  int index;  // of the geom in the view
+  PacketMask packets;
+  Tile& tile;
+  PacketMask changed = 0;
+
+  void draw(const Drawn& drawn, std::uint32_t lanes) {
+    Pair pairs[rays::kClusterSize * kTilePackets + 1];
+    const int covered = find_covered(drawn, lanes, packets, tile, pairs);
+    for (int k = 0; k < covered; ++k) {
+      const auto [lane, q] = pairs[k];
+      if (render::draw(geom, index, drawn, lane, drawn.face[lane], tile.shaded, tile.pixels[q],
+                       tile.hits[q]))
+        changed |= 1u << q;
+    }
+  }
+};
+
 // Rasterises geom `index` into `packets` of the tile if that is cheaper than casting rays. Returns
 // false if it is not.
 inline bool rasterize(const View& view, int index, PacketMask packets, Tile& tile,
                       PacketMask& changed) {
   const ViewGeom& g = view.geoms[index];
-  const rays::Clusters& clusters = *g.clusters;
+  Drawing drawing{g, index, packets, tile};
+  Drawn drawn;
+  if (const auto* part = tile.kept ? tile.kept->find(index) : nullptr) {
+    for (int i = part->first; i < part->last; i += rays::kClusterSize) {
+      tile.kept->load_block(i, drawn);
+      const int left = part->last - i;
+      const std::uint32_t all = left < rays::kClusterSize ? (1u << left) - 1 : 0xffffu;
+      drawing.draw(drawn, all & lanes_over(view, drawn, tile.around, nullptr));
+    }
+    changed = drawing.changed;
+    return true;
+  }
+  const rays::Clusters& clusters = clusters_of(g);
   // A packet of rays costs about as much as kBlocksPerPacket blocks.
   constexpr int kBlocksPerPacket = 40;
   const int maximum = kBlocksPerPacket * __builtin_popcount(packets);
   int blocks[kMaxBlocks];
-  const int count = find_blocks(clusters, TileFrustum(g, tile), maximum, blocks);
+  // Samples may see what is behind the centres' hits.
+  const TileFrustum frustum =
+      tile.keep ? TileFrustum(g, tile.reach, kInfinity) : TileFrustum(g, tile.around, tile.depth);
+  const int count = find_blocks(clusters, frustum, maximum, blocks);
   if (count < 0) return false;
   const float side = handedness(g);
-  Drawn drawn;
-  Pair pairs[rays::kClusterSize * kTilePackets + 1];
+  const Tile* centers = tile.regular && !view.grid.distorted_rays ? &tile : nullptr;
+  KeptTriangles* const keep = tile.keep && tile.keep->begin(count) ? tile.keep : nullptr;
   for (int i = 0; i < count; ++i) {
     const rays::TriangleBlock& block = clusters.blocks[blocks[i]];
     if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
-    const std::uint32_t lanes = set_up(view, g, side, block, tile, drawn);
-    const int covered = find_covered(drawn, lanes, packets, tile, pairs);
-    for (int k = 0; k < covered; ++k) {
-      const auto [lane, q] = pairs[k];
-      if (draw(g, index, drawn, lane, block.face[lane], tile.shaded, tile.pixels[q], tile.hits[q]))
-        changed |= 1u << q;
+    std::uint32_t lanes = set_up(view, g, side, block, keep ? tile.reach : tile.around,
+                                 keep ? nullptr : centers, drawn);
+    if (keep && lanes) {
+      keep->add(drawn, lanes);
+      lanes &= lanes_over(view, drawn, tile.around, centers);
     }
+    drawing.draw(drawn, lanes);
   }
+  if (keep) keep->end(index);
+  changed = drawing.changed;
   return true;
 }
 

@@ -5,6 +5,7 @@
 // conservative: it saves shadow rays and never changes a result. Part of the tile kernels.
 
 #include "mjsense/render/kernels/light_window.h"
+#include "mjsense/render/kernels/mesh_parts.h"
 
 namespace mjsense::render {
 namespace {
@@ -58,22 +59,6 @@ inline std::uint32_t turned_to(const LightSides& sides, int first, Vec3f middle,
   return bits(turned);
 }
 
-// The light's frame that contains the middle of the box.
-inline const LightFrame& frame_towards(const LightFrames& frames, const float* low,
-                                       const float* high) {
-  if (frames.count == 1) return *frames.first;
-  int face = 0;
-  float maximum = -1;
-  for (int i = 0; i < 3; ++i) {
-    const float x = 0.5f * (low[i] + high[i]) - frames.first->origin[i];
-    const float size = x < 0 ? -x : x;
-    if (size <= maximum) continue;
-    maximum = size;
-    face = 2 * i + (x < 0);
-  }
-  return frames.first[face];
-}
-
 // Maximum number of parts of one geom in one tile; a geom with more parts is one caster.
 constexpr int kMaxParts = 48;
 
@@ -83,6 +68,7 @@ constexpr int kMaxParts = 48;
 inline bool add_parts(const View& view, int index, const LitWindow& points, int maximum,
                       Casters& out) {
   const ViewGeom& g = view.geoms[index];
+  const rays::Clusters& clusters = clusters_of(g);
   const SeenByLight seen(*out.frame, g, out.error);
   int waiting[rays::Clusters::kMaxWaiting];
   int left = 1;
@@ -90,7 +76,7 @@ inline bool add_parts(const View& view, int index, const LitWindow& points, int 
   const int before = out.count;
   ChildWindows w;
   while (left) {
-    const rays::ClusterNode& node = g.clusters->nodes[waiting[--left]];
+    const rays::ClusterNode& node = clusters.nodes[waiting[--left]];
     for (std::uint32_t near = seen.children(node, points, w); near; near &= near - 1) {
       const int k = __builtin_ctz(near);
       const bool wide =
@@ -139,12 +125,12 @@ inline void find_casters(const View& view, int light, Part part, const float* lo
       if (g >= view.num_geoms) break;
       const ViewGeom& geom = view.geoms[g];
       if (!belongs(geom, part)) continue;
-      if (g == only && !geom.bvh) continue;  // a convex geom casts no shadow on itself
+      if (g == only && !has_triangles(geom)) continue;  // a convex geom casts no shadow on itself
       if (geom.type == mjGEOM_PLANE && !divides(geom, view.lights[light], low, high, out.error))
         continue;
       // A height field is always one caster: its own shadow rays are tested as a whole
       // (leaves_ground()).
-      if (geom.clusters && !geom.height_field) {
+      if (has_clusters(geom) && !geom.height_field) {
         const int before = out.count;
         if (add_parts(view, g, points, spare < kMaxParts ? spare : kMaxParts, out)) {
           spare -= out.count - before;

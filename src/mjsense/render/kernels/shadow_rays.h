@@ -27,7 +27,7 @@ inline Mask leaves_ground(const rays::HeightField& field, Vec3f o, Vec3f d, Mask
 inline std::uint32_t shadow_of_triangles(const View& view, int index, const LightRays& rays,
                                          std::uint32_t active) {
   const ViewGeom& g = view.geoms[index];
-  const bool has_horizons = g.horizons && !view.grid.orthographic;
+  const bool horizons = has_horizons(g) && !view.grid.orthographic;
   rays::EmbreeRays ray;
   alignas(64) int valid[kWidth];
   std::uint32_t dark = 0;
@@ -46,7 +46,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
     Mask hit =
         mask_of(active >> k & kAllLanes) & (inside.enter < end) & (inside.exit > splat(0.0f));
     if (g.height_field) hit = hit & ~leaves_ground(*g.height_field, o, d, ~other);
-    if (has_horizons && any(hit & ~other))
+    if (horizons && any(hit & ~other))
       hit = hit & ~leaves_mesh(g, rays.face + k, foot, n, d, lift, hit & ~other);
     if (!any(hit)) continue;
     store(valid, select(hit, int_of(-1), int_of(0)));
@@ -63,8 +63,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
     store(ray.time, zero);
     store(reinterpret_cast<int*>(ray.mask), int_of(-1));
     store(reinterpret_cast<int*>(ray.flags), int_of(0));
-    rays::embree_occluded(valid, static_cast<RTCScene>(g.shadow_bvh ? g.shadow_bvh : g.bvh), &ray,
-                          false, true);
+    rays::embree_occluded(valid, static_cast<RTCScene>(shadow_bvh_of(g)), &ray, false, true);
     dark |= bits(hit & (load(ray.tfar) < zero)) << k;
   }
   return dark;
@@ -73,7 +72,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
 inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRays& rays,
                                     std::uint32_t active) {
   const ViewGeom& g = view.geoms[caster];
-  if (g.bvh) return shadow_of_triangles(view, caster, rays, active);
+  if (has_triangles(g)) return shadow_of_triangles(view, caster, rays, active);
   std::uint32_t dark = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const std::uint32_t lanes = active >> k & kAllLanes;

@@ -3,6 +3,7 @@
 // Gathers the surfaces that a packet's pixels show: points, normals, materials, texture colours.
 // Part of the tile kernels.
 
+#include "mjsense/render/kernels/mesh_parts.h"
 #include "mjsense/render/kernels/texture.h"
 
 namespace mjsense::render {
@@ -177,6 +178,7 @@ template <bool first>
 void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const ViewGeom& g,
                  std::uint32_t mine, bool color, Surfaces& out) {
   const Surface& s = g.surface;
+  if (g.on_demand) g.on_demand->prepare_surface(color && s.mapped);
   alignas(64) float local[3][kLanes], normal[3][kLanes];
   for (int k = 0; k < kLanes; k += kWidth) {
     const Mask m = mask_of(mine >> k & kAllLanes);
@@ -186,7 +188,7 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     };
     const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
     const Vec3f q = to_geom(g.rot, p - splat(g.pos));
-    Vec3f n = g.bvh ? triangle_normals(g, hits, mine, k) : primitive_normal(g, q);
+    Vec3f n = has_triangles(g) ? triangle_normals(g, hits, mine, k) : primitive_normal(g, q);
     if (g.type != mjGEOM_PLANE) {  // a plane's normal already has length 1
       const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
       n = {n.x * inverse, n.y * inverse, n.z * inverse};

@@ -107,6 +107,10 @@ inline Rgb sample(const Texture& texture, Mask wanted, Int face, Float s, Float 
   if (any(~wanted)) lod = select(wanted, lod, splat(lane_min(select(wanted, lod, last))));
   // Two levels are blended only near the middle between them, as in Mesa and on GPUs.
   const Float moved = lod + splat(0.25f), level = floor(moved);
+  if (texture.on_demand) {
+    const int finest = static_cast<int>(lane_min(min(level, last)));
+    if (finest < texture.finest) texture.on_demand->add_level(finest);
+  }
   const Float between = max(fma(splat(2.0f), moved - level, splat(-1.0f)), zero);
   const Rgb near = bilinear(texture, Level(texture, min(level, last)), face, s, t);
   if (!any(between > splat(0.01f))) return near;

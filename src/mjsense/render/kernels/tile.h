@@ -110,11 +110,17 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Reflect
   if (view.sky_distance > 0) add_haze(view, pixels, hits, colors);
 }
 
+// Number of the tile at pixel (x0, y0).
+inline int tile_index(const PixelGrid& grid, int x0, int y0) {
+  return y0 / kTileSize * ((grid.width + kTileSize - 1) / kTileSize) + x0 / kTileSize;
+}
+
 // Work space of a thread; TileScratch::tile points to it.
 struct TileSpace {
   Tile tile;
   Reflection reflection;
   Tile sampled;
+  KeptTriangles triangles;
 };
 
 // Sets the pixels of a tile at (x0, y0), `across` packets wide, and clears its hits.
@@ -122,6 +128,8 @@ inline void start_tile(const View& view, int x0, int y0, int across, int packets
                        float shift_y, Tile& tile) {
   const float far = view.far > 0 ? view.far : kInfinity;
   tile.regular = true;
+  tile.keep = nullptr;
+  tile.kept = nullptr;
   float* window = tile.around;
   window[0] = window[2] = kInfinity;
   window[1] = window[3] = -kInfinity;
@@ -153,16 +161,19 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
 
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
 // the surface of its centre keeps its colour, unless it is among the lanes `always` of its packet.
-inline void shade_samples(const View& view, const TileLists& lists, const Tile& centers,
-                          const std::uint32_t* always, SampledPixels& pixels, TileScratch& scratch,
-                          Tile& tile, Reflection& reflection, Colors* colors) {
+inline void shade_samples(const View& view, const TileLists& lists, const std::uint32_t* always,
+                          SampledPixels& pixels, TileScratch& scratch, TileBox* lit,
+                          Colors* colors) {
+  auto& [centers, reflection, tile, triangles] = *static_cast<TileSpace*>(scratch.tile);
   start_samples(view, centers, pixels, tile);
+  tile.kept = &triangles;
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  tile.kept = nullptr;
   keep_differing(view, centers, always, pixels, tile);
   if (!pixels.count) return;
   const int packets = pixels.packets(), samples = pixels.samples;
   Shadows shadows;
-  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, lit);
   if (view.reflection) trace_reflection(view, packets, tile, reflection);
   for (int q = 0; q < packets; ++q) {
     Colors sampled;
@@ -187,11 +198,32 @@ inline void find_reflected_edges(const View& beyond, const Reflection& reflectio
   for (int q = 0; q < across * down; ++q) edges[q] &= reflection.lanes[q];
 }
 
+// Adds the lanes of each packet that show an edge of transparent geom `index`. `layer`: working
+// memory for the hits of the tile.
+inline void find_transparent_edges(const View& view, int index, const Tile& tile, int across,
+                                   int down, Hits* layer, std::uint32_t* edges) {
+  const ViewGeom& g = view.geoms[index];
+  const PacketMask near = packets_in_reach(g.window, g.nearest, tile);
+  if (!near) return;
+  for (int q = 0; q < across * down; ++q) {
+    clear(layer[q], kInfinity);
+    if (near >> q & 1u) copy_lanes(tile.hits[q].t, layer[q].t);
+  }
+  if (trace_geom(view, index, tile.pixels, layer, near)) {
+    for (int q = 0; q < across * down; ++q)
+      for (int k = 0; k < kLanes; k += kWidth)
+        store(layer[q].t + k, select(less(int_of(-1), load(layer[q].geom + k)),
+                                     load(layer[q].t + k), splat(kInfinity)));
+    find_edges(view.grid, layer, across, down, edges);
+  }
+  add_thin(view.grid, g, tile, edges);
+}
+
 // Renders the tile as OpenGL does with multisampling: each pixel is shaded once, except where its
 // samples see different surfaces.
 inline void render_multisampled(const View& view, const ImageTargets& targets, int x0, int y0,
                                 TileScratch& scratch) {
-  auto& [tile, reflection, sampled] = *static_cast<TileSpace*>(scratch.tile);
+  auto& [tile, reflection, sampled, triangles] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
@@ -199,26 +231,27 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   tile.shaded = true;
   start_tile(view, x0, y0, across, packets, 0, 0, tile);
   // Samples are up to half a pixel outside tile.around.
-  float around[4];
   for (int c = 0; c < 4; ++c)
-    around[c] = tile.around[c] + (c % 2 ? 0.5f : -0.5f) * (c < 2 ? grid.dx : -grid.dy);
-  const TileLists lists = find_geoms(view, around, scratch);
+    tile.reach[c] = tile.around[c] + (c % 2 ? 0.5f : -0.5f) * (c < 2 ? grid.dx : -grid.dy);
+  const TileLists lists = find_geoms(view, tile.reach, scratch);
+  triangles.clear();
+  tile.keep = &triangles;
   trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  tile.keep = nullptr;
   Shadows shadows;
-  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows);
+  TileBox* const lit = targets.lit ? targets.lit + tile_index(grid, x0, y0) : nullptr;
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, lit);
   std::uint32_t edges[kTilePackets] = {};
   find_edges(grid, tile.hits, across, down, edges);
   for (int i = 0; i < lists.opaque; ++i) add_thin(grid, view.geoms[scratch.opaque[i]], tile, edges);
   std::uint32_t always[kTilePackets] = {};
   if (view.reflection && trace_reflection(view, packets, tile, reflection))
     find_reflected_edges(*view.reflection, reflection, across, down, always);
-  PacketMask veiled = 0;
   for (int i = 0; i < lists.transparent; ++i)
-    veiled |= packets_in_reach(view.geoms[scratch.transparent[i]].window, 0, tile);
+    find_transparent_edges(view, scratch.transparent[i], tile, across, down, sampled.hits, always);
   Colors colors[kTilePackets];
   for (int q = 0; q < packets; ++q) {
     shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, colors[q]);
-    if (veiled >> q & 1u) always[q] = 0xffffu;
     edges[q] |= always[q];
   }
   SampledPixels pixels{.samples = targets.samples};
@@ -227,19 +260,18 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
       pixels.packet[pixels.count] = q;
       pixels.lane[pixels.count++] = __builtin_ctz(lanes);
       if (pixels.count < pixels.maximum()) continue;
-      shade_samples(view, lists, tile, always, pixels, scratch, sampled, reflection, colors);
+      shade_samples(view, lists, always, pixels, scratch, lit, colors);
       pixels.count = 0;
     }
   }
-  if (pixels.count)
-    shade_samples(view, lists, tile, always, pixels, scratch, sampled, reflection, colors);
+  if (pixels.count) shade_samples(view, lists, always, pixels, scratch, lit, colors);
   for (int q = 0; q < packets; ++q)
     write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
 }
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  auto& [tile, reflection, sampled] = *static_cast<TileSpace*>(scratch.tile);
+  auto& [tile, reflection, sampled, triangles] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
@@ -248,6 +280,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
   tile.shaded = targets.rgb || targets.normals || targets.fixed;
   const int samples = targets.rgb ? targets.samples : 1;
+  TileBox* const lit = targets.lit ? targets.lit + tile_index(grid, x0, y0) : nullptr;
   alignas(64) float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
        ++sample) {
@@ -262,7 +295,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     if (!view.layered || samples > 1) {
       trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
     } else {
-      const int at = ty * ((grid.width + kTileSize - 1) / kTileSize) + tx;
+      const int at = tile_index(grid, x0, y0);
       if (targets.fixed) {
         make_fixed(view, lists.opaque, packets, tile, scratch, targets.fixed[at]);
         return;
@@ -279,7 +312,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     }
     if (targets.rgb && sample < samples) {
       Shadows shadows;
-      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);
+      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows, lit);
       if (view.reflection) trace_reflection(view, packets, tile, reflection);
       for (int q = 0; q < packets; ++q) {
         Colors colors;
@@ -310,6 +343,7 @@ inline void render_tiles(const View& view, const ImageTargets& targets, int firs
   for (int ty = first; ty < last; ++ty) {
     find_row(view, ty, scratch);
     for (int tx = 0; tx < across; ++tx) {
+      if (targets.changed && !targets.changed[ty * across + tx]) continue;
       if (targets.multisampled) {
         render_multisampled(view, targets, tx * kTileSize, ty * kTileSize, scratch);
       } else {

@@ -65,6 +65,13 @@ inline TileBounds bounds_of_tile(const View& view, const FixedTile* fixed, const
   return out;
 }
 
+inline void include(const TileBounds& bounds, TileBox& box) {
+  for (int c = 0; c < 3; ++c) {
+    box.low[c] = bounds.low[c] < box.low[c] ? bounds.low[c] : box.low[c];
+    box.high[c] = bounds.high[c] > box.high[c] ? bounds.high[c] : box.high[c];
+  }
+}
+
 // Finds the casters among `part` for every light. The lists start at index `used` of the scratch
 // arrays.
 inline void find_casters(const View& view, Part part, const TileBounds& bounds,
@@ -84,18 +91,19 @@ inline void find_casters(const View& view, Part part, const TileBounds& bounds,
 }
 
 // `fixed`: the tile's layer, which stores the shadows that fixed geoms cast on fixed geoms; null if
-// the view is not layered.
+// the view is not layered. `lit`: if not null, grows to contain everything that the tile shows.
 inline void find_all_casters(const View& view, const FixedTile* fixed, const Tile& tile,
-                             int packets, TileScratch& scratch, Shadows& out) {
+                             int packets, TileScratch& scratch, Shadows& out, TileBox* lit) {
   int used = 0, spare = scratch.spare_casters;
   out.known = fixed;
   for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
+  const TileBounds all = bounds_of_tile(view, nullptr, tile, packets);
+  if (lit) include(all, *lit);
   if (fixed) {
     find_casters(view, Part::kFixed, bounds_of_tile(view, fixed, tile, packets), scratch, used,
                  spare, out.fixed);
   }
-  find_casters(view, fixed ? Part::kMoving : Part::kAll,
-               bounds_of_tile(view, nullptr, tile, packets), scratch, used, spare, out.moving);
+  find_casters(view, fixed ? Part::kMoving : Part::kAll, all, scratch, used, spare, out.moving);
 }
 
 // Visits the arrays that a layer stores for packet `packet`, except depth and ids: visit(array of

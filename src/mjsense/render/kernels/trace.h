@@ -2,6 +2,7 @@
 #pragma once
 // Finds the nearest geom for the pixels of packets by casting rays. Part of the tile kernels.
 
+#include "mjsense/render/kernels/mesh_parts.h"
 #include "mjsense/render/kernels/rays.h"
 
 namespace mjsense::render {
@@ -29,6 +30,8 @@ constexpr int kPackets = kTileSize / 4;  // along one side of a tile
 constexpr int kTilePackets = kPackets * kPackets;
 static_assert(kTilePackets == kLanes, "a vector has a lane for each packet");
 
+class KeptTriangles;
+
 struct alignas(64) Tile {
   Pixels pixels[kTilePackets];
   Hits hits[kTilePackets];
@@ -39,6 +42,10 @@ struct alignas(64) Tile {
   float depth;      // maximum of `farthest`
   bool regular;     // the pixels are on the view's grid
   bool shaded;      // outputs other than depth and ids are requested
+  // If `keep` is not null, the triangles that are set up are kept there, with those within `reach`.
+  KeptTriangles* keep;
+  float reach[4];
+  const KeptTriangles* kept;  // null, or triangles that need not be set up again
 };
 
 // Packets that may see something in `window`, at `nearest` or farther, in front of their hits.
@@ -112,7 +119,7 @@ inline void trace_past_back_faces(const ViewGeom& g, Float limit, rays::EmbreeRa
   store(valid, select(back, int_of(-1), int_of(0)));
   store(ids, select(back, int_of(-1), load(ids)));
   store(rays.ray.tfar, select(back, limit, load(rays.ray.tfar)));
-  rays::embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
+  rays::embree_intersect(valid, static_cast<RTCScene>(bvh_of(g)), &rays, true, true);
 }
 
 inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits* hits,
@@ -132,7 +139,7 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
     for (int k = 0; k < kLanes; k += kWidth) {
       const Float before = load(h.t + k), limit = before * splat(1.0f + kSame);
       if (!fill_rays(at, pixels[q], k, limit, rays, valid)) continue;
-      rays::embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
+      rays::embree_intersect(valid, static_cast<RTCScene>(bvh_of(g)), &rays, false, true);
       trace_past_back_faces(g, limit, rays, valid);
       const Float t = load(rays.ray.tfar);
       const Int found = load(reinterpret_cast<int*>(rays.hit.geomID));
@@ -260,7 +267,7 @@ inline PacketMask trace_geom(const View& view, int index, const Pixels* pixels, 
     default:
       break;
   }
-  PacketMask changed = g.bvh ? trace_triangles(at, pixels, hits, packets) : 0;
+  PacketMask changed = has_triangles(g) ? trace_triangles(at, pixels, hits, packets) : 0;
   if (g.height_field) changed |= trace_walls(at, pixels, hits, packets);
   return changed;
 }

@@ -36,8 +36,9 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
   int used = 0;
   for (int i = 0; i < count && used < kMaxLayers; ++i) {
     if (!overlap(view.geoms[list[i]].window, pixels.window)) continue;
-    Hits hits = opaque;
-    for (int i = 0; i < kLanes; ++i) hits.geom[i] = hits.id[i] = -1;
+    Hits hits;
+    clear(hits, kInfinity);
+    for (int k = 0; k < kLanes; k += kWidth) store(hits.t + k, load(opaque.t + k));
     trace_geom(view, list[i], &pixels, &hits, 1u);
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
@@ -94,6 +95,8 @@ inline PacketMask trace_reflection(const View& view, int packets, const Tile& ti
   if (!through) return 0;
   for (int q = packets; q < kTilePackets; ++q) out.tile.farthest[q] = -kInfinity;
   out.tile.regular = tile.regular;
+  out.tile.keep = nullptr;
+  out.tile.kept = nullptr;
   out.tile.shaded = true;
   out.tile.depth = kInfinity;
   __builtin_memcpy(out.tile.window, tile.window, sizeof tile.window);

@@ -2,7 +2,7 @@
 #include "mjsense/render/view/fixed_layer.h"
 
 #include <algorithm>
-#include <cstring>
+#include <span>
 #include <utility>
 
 #include "mjsense/render/view/view_builder.h"
@@ -10,21 +10,9 @@
 namespace mjsense::render {
 namespace {
 
-bool equal(const PixelGrid& a, const PixelGrid& b) {
-  return a.width == b.width && a.height == b.height && a.left == b.left && a.top == b.top &&
-         a.dx == b.dx && a.dy == b.dy && a.orthographic == b.orthographic &&
-         a.distorted_rays == b.distorted_rays;
-}
-
 std::size_t count_tiles(int width, int height) {
   return static_cast<std::size_t>((width + kTileSize - 1) / kTileSize) *
          ((height + kTileSize - 1) / kTileSize);
-}
-
-// Compares bytes. A difference in padding only causes a redundant update.
-template <typename T>
-bool equal_bytes(const T& a, const T& b) {
-  return std::memcmp(&a, &b, sizeof(T)) == 0;
 }
 
 }  // namespace
@@ -68,14 +56,13 @@ bool FixedLayer::settles(const View& view) {
 }
 
 bool FixedLayer::same(const View& view) const {
-  if (!equal(grid_, view.grid) || static_cast<int>(lights_.size()) != view.num_lights) return false;
-  for (int i = 0; i < view.num_lights; ++i)
-    if (!equal_bytes(lights_[i], view.lights[i])) return false;
+  if (grid_ != view.grid) return false;
+  if (!std::ranges::equal(lights_, std::span(view.lights, view.num_lights))) return false;
   std::size_t next = 0;
   for (int i = 0; i < view.num_geoms; ++i) {
     const ViewGeom& g = view.geoms[i];
     if (!g.fixed) continue;
-    if (next == geoms_.size() || !equal_bytes(geoms_[next], g)) return false;
+    if (next == geoms_.size() || geoms_[next] != g) return false;
     ++next;
   }
   return next == geoms_.size();

@@ -6,6 +6,11 @@
 
 namespace mjsense::render {
 
+// With multisampling, pixels near the window of a geom are sampled more than once if the window is
+// not larger than this, relative to the width of a pixel, in one direction: the geom may be between
+// the centres of pixels.
+inline constexpr float kThin = 2.5f;
+
 // Sets center, radius, window and nearest of `g` from its pose and box. Returns false if no point
 // of it can be in the image of view.grid between view.near and view.far.
 bool find_window(const View& view, ViewGeom& g);

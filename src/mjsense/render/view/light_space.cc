@@ -35,48 +35,87 @@ void complete(LightFrame& f) {
 
 // A shadow ray from a surface of triangles starts slightly above it; see shadow_of_triangles().
 float lift(const ViewGeom& g) {
-  return g.bvh ? 1e-4f * std::max(g.radius, std::abs(g.center[2]) + g.radius) : 0;
+  return g.bvh || g.on_demand ? 1e-4f * std::max(g.radius, std::abs(g.center[2]) + g.radius) : 0;
 }
 
-struct Window {
-  float low[2] = {-kEndless, -kEndless}, high[2] = {kEndless, kEndless};
-  float w = -kEndless;
+constexpr int kCorners = 8;
+// Corners of a box. Two corners whose indices differ in one bit share an edge.
+using Corners = float[kCorners][3];
+
+constexpr LightWindow kNowhere{{kEndless, kEndless}, {-kEndless, -kEndless}, -kEndless};
+constexpr LightWindow kEverywhere{{-kEndless, -kEndless}, {kEndless, kEndless}, -kEndless};
+
+// Position of a box in a light's image. Corners may be wrong by `error`, m.
+class Seen {
+ public:
+  Seen(const LightFrame& frame, const Corners& corners, float error)
+      : perspective_(frame.perspective), error_(error) {
+    for (int k = 0; k < kCorners; ++k) {
+      for (int i = 0; i < 3; ++i)
+        at_[i][k] = frame.axes[i][0] * (corners[k][0] - frame.origin[0]) +
+                    frame.axes[i][1] * (corners[k][1] - frame.origin[1]) +
+                    frame.axes[i][2] * (corners[k][2] - frame.origin[2]);
+    }
+    nearest_ = farthest_ = at_[2][0];
+    for (float w : at_[2]) {
+      nearest_ = std::min(nearest_, w);
+      farthest_ = std::max(farthest_, w);
+    }
+  }
+  float nearest() const { return nearest_ - error_; }
+  float farthest() const { return farthest_ + error_; }
+
+  // Contains the part of the box that is in front of the light.
+  LightWindow window() const {
+    LightWindow out = kNowhere;
+    out.w = nearest();
+    if (!perspective_) {
+      for (int k = 0; k < kCorners; ++k)
+        for (int i = 0; i < 2; ++i) add(i, at_[i][k], error_, out);
+    } else if (nearest() > error_) {
+      for (int k = 0; k < kCorners; ++k)
+        for (int i = 0; i < 2; ++i) add_ahead(i, k, nearest(), out);
+    } else {
+      add_edges(out);
+    }
+    return out;
+  }
+
+ private:
+  static void add(int axis, float at, float slack, LightWindow& out) {
+    out.low[axis] = std::min(out.low[axis], at - slack);
+    out.high[axis] = std::max(out.high[axis], at + slack);
+  }
+  // `nearest`: lower bound of the corner's w.
+  void add_ahead(int axis, int corner, float nearest, LightWindow& out) const {
+    const float at = at_[axis][corner] / at_[2][corner];
+    add(axis, at, error_ * (1 + std::abs(at)) / nearest, out);
+  }
+  // Adds the corners ahead of the light, and for edges to other corners the direction in which they
+  // leave the image.
+  void add_edges(LightWindow& out) const {
+    for (int k = 0; k < kCorners; ++k) {
+      const float w = at_[2][k];
+      if (w <= 2 * error_) continue;
+      for (int i = 0; i < 2; ++i) add_ahead(i, k, w - error_, out);
+      for (int bit = 1; bit < kCorners; bit *= 2) {
+        const int other = k ^ bit;
+        const float behind = at_[2][other];
+        if (behind > 2 * error_) continue;
+        const float s = std::min(w / (w - behind), 1.0f);
+        for (int i = 0; i < 2; ++i) {
+          const float beside = at_[i][k] + s * (at_[i][other] - at_[i][k]);
+          if (beside < 4 * error_) out.low[i] = -kEndless;
+          if (beside > -4 * error_) out.high[i] = kEndless;
+        }
+      }
+    }
+  }
+
+  bool perspective_;
+  float error_, nearest_, farthest_;
+  float at_[3][kCorners];
 };
-
-Window window_of(const LightFrame& f, const ViewGeom& g) {
-  Window out;
-  if (!g.casts) return {{kEndless, kEndless}, {-kEndless, -kEndless}, kEndless};
-  if (g.type == mjGEOM_PLANE) return out;
-  const float error = kLightError * (length(f.origin) + length(g.center) + g.radius) + lift(g);
-  float corners[8][3], seen[3][8];
-  box_corners(g, corners);
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 8; ++k) {
-      seen[i][k] = f.axes[i][0] * (corners[k][0] - f.origin[0]) +
-                   f.axes[i][1] * (corners[k][1] - f.origin[1]) +
-                   f.axes[i][2] * (corners[k][2] - f.origin[2]);
-    }
-  }
-  float nearest = seen[2][0];
-  for (float w : seen[2]) nearest = std::min(nearest, w);
-  nearest -= error;
-  if (f.perspective && nearest <= error) return out;  // around the light, or behind it
-  out.w = nearest;
-  for (int i = 0; i < 2; ++i) {
-    if (f.perspective)
-      for (int k = 0; k < 8; ++k) seen[i][k] /= seen[2][k];
-    float low = seen[i][0], high = low;
-    for (float x : seen[i]) {
-      low = std::min(low, x);
-      high = std::max(high, x);
-    }
-    const float maximum = std::max(std::abs(low), std::abs(high));
-    const float slack = f.perspective ? error * (1 + maximum) / nearest : error;
-    out.low[i] = low - slack;
-    out.high[i] = high + slack;
-  }
-  return out;
-}
 
 // Sets the side of the geom's box that faces the light along the box's axis i.
 void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, LightSides& out) {
@@ -95,6 +134,44 @@ void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, LightSid
 }
 
 }  // namespace
+
+const LightFrame& frame_towards(const LightFrames& frames, const float* low, const float* high) {
+  if (frames.count == 1) return *frames.first;
+  int face = 0;
+  float maximum = -1;
+  for (int i = 0; i < 3; ++i) {
+    const float x = 0.5f * (low[i] + high[i]) - frames.first->origin[i];
+    if (std::abs(x) <= maximum) continue;
+    maximum = std::abs(x);
+    face = 2 * i + (x < 0);
+  }
+  return frames.first[face];
+}
+
+LightWindow shadow_window(const LightFrame& frame, const ViewGeom& geom) {
+  if (!geom.casts) return {{kEndless, kEndless}, {-kEndless, -kEndless}, kEndless};
+  if (geom.type == mjGEOM_PLANE) return kEverywhere;
+  Corners corners;
+  box_corners(geom, corners);
+  const float error =
+      kLightError * (length(frame.origin) + length(geom.center) + geom.radius) + lift(geom);
+  return Seen(frame, corners, error).window();
+}
+
+LightWindow lit_window(const LightFrame& frame, const TileBox& box) {
+  Corners corners;
+  float reach = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < kCorners; ++k) corners[k][i] = k >> i & 1 ? box.high[i] : box.low[i];
+    const float farthest = std::max(std::abs(box.low[i]), std::abs(box.high[i]));
+    reach += farthest * farthest;
+  }
+  const Seen seen(frame, corners, kLightError * (length(frame.origin) + std::sqrt(reach)));
+  // Points that are not in front of the light may be in the shadow of anything.
+  LightWindow out = frame.perspective && seen.nearest() <= 0 ? kEverywhere : seen.window();
+  out.w = seen.farthest();
+  return out;
+}
 
 LightSpace::LightSpace(int lights, std::size_t geoms)
     : stride_(geoms + kWindowPadding),
@@ -134,7 +211,7 @@ void LightSpace::fill(View& view) {
       float* at = windows_.data() + kArrays * stride_ * used;
       f.windows = {at, at + stride_, at + 2 * stride_, at + 3 * stride_, at + 4 * stride_};
       for (int g = 0; g < view.num_geoms; ++g) {
-        const Window window = window_of(f, view.geoms[g]);
+        const LightWindow window = shadow_window(f, view.geoms[g]);
         f.windows.u0[g] = window.low[0];
         f.windows.u1[g] = window.high[0];
         f.windows.v0[g] = window.low[1];

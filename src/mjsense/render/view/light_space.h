@@ -10,6 +10,19 @@
 
 namespace mjsense::render {
 
+// Part of a light's image: u in [low[0], high[0]], v in [low[1], high[1]], and w.
+struct LightWindow {
+  float low[2], high[2];
+  float w;
+};
+
+// Where the geom may shadow points: those in the window whose w is larger. The window is empty if
+// the geom casts no shadow.
+LightWindow shadow_window(const LightFrame& frame, const ViewGeom& geom);
+
+// Contains the points in the box; their w is at most that of the window.
+LightWindow lit_window(const LightFrame& frame, const TileBox& box);
+
 // Owns View::light_frames and light_sides of one view. fill() allocates nothing.
 class LightSpace {
  public:

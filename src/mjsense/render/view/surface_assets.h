@@ -6,27 +6,13 @@
 
 #include <mujoco/mujoco.h>
 
-#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
-namespace mjsense::render {
+#include "mjsense/render/view/stored_texture.h"
 
-// Mip pyramid of RGBA8 images in one array: level 0 first, row 0 first. A cube map has its six
-// faces (+x -x +y -y +z -z) one after another in each level. Each row has one extra texel at its
-// end, because kernels read neighbours in pairs: the row's first texel in a 2D texture, which
-// repeats, and its last texel in a cube's face. Sizes and offsets are arrays by level, for gather
-// instructions.
-struct Texture {
-  static constexpr int kMaxLevels = 15;
-  bool cube = false;
-  bool same_faces = false;  // a cube map with one image for all faces, which is stored once
-  int levels = 0;           // 0: the texture cannot be drawn
-  const std::uint32_t* texels = nullptr;
-  float width[kMaxLevels] = {}, height[kMaxLevels] = {};
-  int offset[kMaxLevels] = {};  // index of the level's first texel
-};
+namespace mjsense::render {
 
 // Tables of a mesh, flex or skin by face index. Null if it has none.
 struct MeshSurface {
@@ -49,16 +35,8 @@ void add_coordinates(MeshTables& tables, int count, const float* vert, const int
                      const float* texcoord, const int* texcoords);
 
 // Tables of the model's mesh `id`, shared by all models of the process that have an equal mesh.
-std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id);
-
-// A texture with its memory.
-struct StoredTexture {
-  Texture texture;
-  std::unique_ptr<std::uint32_t[]> texels;
-};
-
-// The model's texture `id`, shared by all models of the process that have an equal texture.
-std::shared_ptr<const StoredTexture> stored_texture(const mjModel* model, int id);
+// `coordinates`: also uvs and density, if the mesh has texture coordinates.
+std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id, bool coordinates);
 
 class SurfaceAssets {
  public:

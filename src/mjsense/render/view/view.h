@@ -26,6 +26,8 @@ struct PixelGrid {
   bool orthographic = false;
   // [H, W, 2]: X and Y of each pixel for a lens with distortion; null: use the formula above.
   const float* distorted_rays = nullptr;
+
+  bool operator==(const PixelGrid&) const = default;
 };
 
 // MuJoCo's classic material of a geom.
@@ -38,6 +40,23 @@ struct Surface {
   float stretch[3];           // for cube maps: multiplies the direction
   bool mapped;                // 2D texture with the mesh's own coordinates
   bool from_above;            // 2D texture projected along z
+
+  bool operator==(const Surface&) const = default;
+};
+
+// A mesh whose parts are built when a kernel first needs them. It belongs to one thread.
+class MeshOnDemand {
+ public:
+  virtual bool has_coordinates() const = 0;  // texture coordinates
+  virtual const rays::Clusters& clusters() = 0;
+  virtual const rays::Horizons& horizons() = 0;
+  virtual void* bvh() = 0;  // RTCScene
+  virtual void* shadow_bvh() = 0;
+  // Fills the geom's MeshSurface. `coordinates`: also uvs and density, if the mesh has them.
+  virtual void prepare_surface(bool coordinates) = 0;
+
+ protected:
+  ~MeshOnDemand() = default;
 };
 
 struct alignas(64) ViewGeom {
@@ -58,13 +77,18 @@ struct alignas(64) ViewGeom {
   bool transparent;       // blended over what is behind it; casts shadows and receives none
   // A plane seen from below: drawn as a faint veil, absent in depth and segmentation.
   bool behind;
-  void* bvh;  // RTCScene of a mesh, a height field's surface, a flex or a skin; else null
-  void* shadow_bvh = nullptr;      // the same triangles, for shadow rays; null: bvh
+  bool deforms;  // its triangles may change while this structure does not
+  void* bvh;     // RTCScene of a mesh, a height field's surface, a flex or a skin; else null
   const rays::Clusters* clusters;  // the same triangles, for rasterising; null: use rays only
   const rays::Horizons* horizons;  // horizons of the mesh's faces; null without clusters
   const MeshSurface* mesh;
+  // Not null: has what `bvh`, `clusters` and `horizons`, which are null, would point to, and fills
+  // `mesh`.
+  MeshOnDemand* on_demand;
   const rays::HeightField* height_field;
   Surface surface;
+
+  bool operator==(const ViewGeom&) const = default;
 };
 
 enum class LightKind : std::uint8_t { kDirectional, kSpot, kPoint };
@@ -82,6 +106,8 @@ struct ViewLight {
   float square[2][3], square_limit;
   // With a limit: geoms cast no shadow where they are nearer to the light, along its axis, m.
   float shadow_near;
+
+  bool operator==(const ViewLight&) const = default;
 };
 
 // Windows of boxes in a light's image: u and v are within [u0, u1] and [v0, v1], and w is at least
@@ -111,6 +137,9 @@ struct LightFrames {
   int count = 0;
 };
 
+// The one of the light's frames that serves the points in a box.
+const LightFrame& frame_towards(const LightFrames& frames, const float* low, const float* high);
+
 // Sides of geoms' bounding boxes that face a light, at most one of each opposite pair. A geom does
 // not shadow points beyond such a side, i.e. with normal . x > offset (m, including a margin for
 // rounding). The offset is infinite for other sides and for planes. Padding as in LightWindows.
@@ -125,6 +154,8 @@ struct FixedTile;
 struct Fog {
   float start = 0, slope = 0;  // slope 0: no fog
   float rgb[3] = {};
+
+  bool operator==(const Fog&) const = default;
 };
 
 struct View {
@@ -153,10 +184,12 @@ struct View {
   float r_wc[9] = {};      // for the skybox
   float sky_distance = 0;  // m; geoms farther away are hidden by it. 0: it hides nothing
   struct Haze {            // over an infinite plane
-    float up[3];           // normal of the plane, camera frame
+    float up[3] = {};      // normal of the plane, camera frame
     float height = 0;      // height of the camera above the plane, m; not positive: no haze
-    float width;           // relative to sky_distance
-    float rgb[3];
+    float width = 0;       // relative to sky_distance
+    float rgb[3] = {};
+
+    bool operator==(const Haze&) const = default;
   } haze;
   float sky_from = 0;    // planar depth, m; nearer points are neither hidden nor hazy
   Fog fog;               // over surfaces, haze and skybox
@@ -165,6 +198,12 @@ struct View {
   // of the camera mirrored in its plane; it is added to the geom's own colour.
   int mirror = -1;  // geom id
   const View* reflection = nullptr;
+};
+
+// Bounding box of points in the camera's frame, m. low > high: no points.
+struct TileBox {
+  float low[3] = {__builtin_inff(), __builtin_inff(), __builtin_inff()};
+  float high[3] = {-__builtin_inff(), -__builtin_inff(), -__builtin_inff()};
 };
 
 // Output images, rows from the top; null: not requested.
@@ -181,6 +220,10 @@ struct ImageTargets {
   // must be a power of two up to kMostMultisamples.
   static constexpr int kMostMultisamples = 16;
   bool multisampled = false;
+  // By tile, row by row; null: not used. Tiles whose `changed` is 0 are not written. The box of `lit`
+  // grows to contain what the tile shows, if the view has shadows.
+  const std::uint8_t* changed = nullptr;
+  TileBox* lit = nullptr;
 };
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels

@@ -37,7 +37,9 @@ void set_primitive(int type, int object, int object_id, ViewGeom& g) {
   g.clusters = nullptr;
   g.horizons = nullptr;
   g.mesh = nullptr;
+  g.on_demand = nullptr;
   g.height_field = nullptr;
+  g.deforms = false;
 }
 
 // The factors by which MuJoCo's visualiser scales a shape along its axes and, with texuniform, its
@@ -254,14 +256,15 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     if (id++ == excluded_geom_) continue;
     add_shape(shape, id - 1, geom.rgba, &geom.material, position, rotation, [&](ViewGeom& g) {
       set_primitive(shape.type, geom.object, geom.object_id, g);
-      if (geom.bvh) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
+      if (geom.bvh || geom.on_demand) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
       g.casts = geom.casts;
       g.bvh = geom.bvh;
-      g.shadow_bvh = geom.shadow_bvh;
       g.clusters = geom.clusters;
       g.horizons = geom.horizons;
       g.mesh = geom.mesh;
+      g.on_demand = geom.on_demand;
       g.height_field = geom.height_field;
+      g.deforms = geom.bvh && !geom.height_field;  // a flex, a skin or a decoration
       return geom.texture;
     });
   }
@@ -378,6 +381,7 @@ void ViewBuilder::set_shape(const rays::RayWorld& world, const rays::SharedGeome
   if (g.object != mjOBJ_GEOM) {
     g.object_id = source.data;
     g.type = mjGEOM_MESH;
+    g.deforms = true;
   }
 }
 
@@ -408,7 +412,8 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   s.texture = texture && texture->levels > 0 ? texture : nullptr;
   if (!s.texture) return;
   const bool uniform = material->uniform;
-  s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
+  const bool coordinates = g.on_demand ? g.on_demand->has_coordinates() : g.mesh && g.mesh->uvs;
+  s.mapped = coordinates && !s.texture->cube;
   // MuJoCo textures flexes by their own coordinates only.
   if (g.object == mjOBJ_FLEX && !s.mapped) {
     s.texture = nullptr;

@@ -44,7 +44,8 @@ struct DrawnGeom {
   int object_id, object;    // for segmentation
   bool casts;               // casts shadows
   const MeshSurface* mesh;  // null unless the shape has triangles
-  void *bvh, *shadow_bvh;   // as in ViewGeom
+  MeshOnDemand* on_demand;  // as in ViewGeom
+  void* bvh;
   const rays::Clusters* clusters;
   const rays::Horizons* horizons;
   const rays::HeightField* height_field;

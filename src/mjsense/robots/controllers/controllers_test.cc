@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/scene/scene.h"
 
@@ -14,10 +16,6 @@ namespace mjsense::robots {
 namespace {
 
 using testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 // A robot with one move group "g"; policy, control and physics periods of 60, 6 and 2 ms.
 struct OneGroup {
@@ -66,7 +64,7 @@ struct OneGroup {
   std::unique_ptr<scene::Scene> scene;
   const mjModel* model = nullptr;
   std::unique_ptr<Robot> robot;
-  std::unique_ptr<mjData, DataDelete> data;
+  DataPtr data;
   World world;
 };
 
@@ -250,12 +248,10 @@ TEST(Controllers, MocapBasesStayBelowTheirSpeedLimit) {
   EXPECT_NEAR(r.robot->base_pose(r.world).p.x, 0.3, 1e-9);
   r.play({1, 0, 0, 1, 0, 0, 0}, 30);
   EXPECT_EQ(r.robot->base_pose(r.world).p.x, 1.0);
-  try {
-    r.play({1, 0, 0, 0, 0, 0, 0});
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("is not a rotation"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] {
+                r.play({1, 0, 0, 0, 0, 0, 0});
+              }),
+              HasSubstr("is not a rotation"));
 }
 
 TEST(Controllers, ErrorsNameTheRequirements) {
@@ -295,7 +291,7 @@ TEST(Bases, FixedBaseCannotBePlacedElsewhere) {
   entity.pos = {1, 2, 3};
   scene_cfg.entities = {{"robot_0", entity}};
   const scene::Scene scene(scene_cfg);
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+  const DataPtr data = make_data(scene.model());
   const Robot robot(cfg, scene.model(), 1);
   Rng rng(1, 0, 0, 0);
   robot.write_start(state_row(data.get()), Pose{{1, 2, 3}, {}}, rng);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/robots/controllers/controller_kinds.h"
 #include "mjsense/robots/controllers/pose_target.h"
 #include "mjsense/scene/resolve.h"
@@ -44,7 +45,7 @@ std::unique_ptr<Controller> make_kind(const FreeBaseCfg& cfg, const MoveGroup& /
   }
   const double* q0 = m->qpos0 + m->jnt_qposadr[joint];
   const Pose X_WB{vec3(q0), quat(q0 + 3)};
-  const Pose X_WM{vec3(m->body_pos + 3 * target), quat(m->body_quat + 4 * target)};
+  const Pose X_WM = body_frame(m, target);
   return std::make_unique<FreeBase>(m->jnt_qposadr[joint], m->body_mocapid[target],
                                     inverse(X_WB) * X_WM, cfg, init);
 }

@@ -2,7 +2,7 @@
 #include "mjsense/scenes/generators/dining.h"
 
 #include "mjsense/scenes/generators/furniture.h"
-#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/room_shell.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense::scenes {
@@ -16,13 +16,13 @@ void chair(RoomWriter& room, const char* name, double x, double y, double back) 
   room.open_body(name, {x, y, 0});
   for (int i = 0; i < 4; ++i) {
     const double dx = i & 1 ? 0.18 : -0.18, dy = i & 2 ? 0.18 : -0.18;
-    room.box("", "chair", {dx, dy, 0.22}, {0.018, 0.018, 0.22});
+    room.box({dx, dy, 0.22}, {0.018, 0.018, 0.22}, "chair");
   }
-  room.box("", "chair", {0, 0, 0.45}, {0.21, 0.21, 0.015});
+  room.box({0, 0, 0.45}, {0.21, 0.21, 0.015}, "chair");
   for (int i = -1; i <= 1; i += 2)
-    room.box("", "chair", {0.19 * back, 0.19 * i, 0.68}, {0.016, 0.016, 0.22});
+    room.box({0.19 * back, 0.19 * i, 0.68}, {0.016, 0.016, 0.22}, "chair");
   for (int i = 0; i < 3; ++i)
-    room.box("", "chair", {0.19 * back, 0, 0.62 + 0.11 * i}, {0.010, 0.18, 0.028});
+    room.box({0.19 * back, 0, 0.62 + 0.11 * i}, {0.010, 0.18, 0.028}, "chair");
   room.close_body();
 }
 
@@ -48,23 +48,21 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
                  .y1 = rng.uniform(1.9, 2.3)};
   shell.window_x = rng.uniform(-0.6, 0.3);
   write_shell(room, shell);
-  room.slab("rug", "rug", Facing::kUp, {x, 0, 0.006}, deep + 1.0, wide + 0.8, 0.006,
-            "contype=\"0\" conaffinity=\"0\"");
-  room.slab("table_top", "table", Facing::kUp, {x, 0, high}, deep, wide, 0.03,
-            "friction=\"0.9 0.005 0.0002\"");
-  room.box("", "table_edge", {x, 0, high - 0.055}, {deep / 2 - 0.05, wide / 2 - 0.05, 0.025});
+  room.slab(Facing::kUp, {x, 0, 0.006}, deep + 1.0, wide + 0.8, 0.006, "rug",
+            {.name = "rug", .attributes = "contype=\"0\" conaffinity=\"0\""});
+  room.slab(Facing::kUp, {x, 0, high}, deep, wide, 0.03, "table",
+            {.name = "table_top", .attributes = "friction=\"0.9 0.005 0.0002\""});
+  room.box({x, 0, high - 0.055}, {deep / 2 - 0.05, wide / 2 - 0.05, 0.025}, "table_edge");
   for (int i = 0; i < 4; ++i) {
     const double dx = (i & 1 ? 0.5 : -0.5) * deep, dy = (i & 2 ? 0.5 : -0.5) * wide;
-    room.box("", "table_edge",
-             {x + dx - (i & 1 ? 0.05 : -0.05), dy - (i & 2 ? 0.05 : -0.05), (high - 0.03) / 2},
-             {0.03, 0.03, (high - 0.03) / 2});
+    room.box({x + dx - (i & 1 ? 0.05 : -0.05), dy - (i & 2 ? 0.05 : -0.05), (high - 0.03) / 2},
+             {0.03, 0.03, (high - 0.03) / 2}, "table_edge");
   }
   chair(room, "chair_0", front + deep + 0.22, rng.uniform(-0.5, -0.25), 1);
   chair(room, "chair_1", front + deep + 0.26, rng.uniform(0.25, 0.5), 1);
   const double py = rng.uniform(-0.6, 0.6);
-  room.box("", "frame", {wall - 0.012, py, 1.55}, {0.012, 0.42, 0.30});
-  room.slab("", "picture", Facing::kMinusX, {wall - 0.0255, py, 1.55}, 0.76, 0.52, 0.002,
-            "contype=\"0\" conaffinity=\"0\"");
+  room.box({wall - 0.012, py, 1.55}, {0.012, 0.42, 0.30}, "frame");
+  room.slab(Facing::kMinusX, {wall - 0.0255, py, 1.55}, 0.76, 0.52, 0.002, "picture", kNoContacts);
 
   SceneRegionCfg region;
   region.name = "table";

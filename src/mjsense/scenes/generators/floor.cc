@@ -11,15 +11,16 @@
 
 #include "mjsense/scenes/generators/floor_plan.h"
 #include "mjsense/scenes/generators/furniture.h"
+#include "mjsense/scenes/generators/room_shell.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
+#include "mjsense/scenes/generators/walls.h"
 
 namespace mjsense::scenes {
 namespace {
 
 using std::numbers::pi;
 
-constexpr double kHeight = 2.6, kWall = 0.12;  // m
-constexpr int kAttempts = 60;                  // positions tried per piece
+constexpr int kAttempts = 60;  // positions tried per piece
 // m, maximum displacement of a piece between episodes in each direction; the first one that fits is
 // used.
 constexpr std::array<double, 4> kMoves{0.20, 0.14, 0.09, 0.05};
@@ -67,7 +68,7 @@ struct Stand {
 };
 
 Stand against_wall(const Rect& room, int side, double along, FloorSpace size) {
-  const double w = 0.5 * kWall + 0.004, half = 0.5 * size.width;
+  const double w = 0.5 * kWallThickness + 0.004, half = 0.5 * size.width;
   switch (side) {
     case 0:
       return {{along, room.y1 - w, 0},
@@ -90,7 +91,7 @@ Stand against_wall(const Rect& room, int side, double along, FloorSpace size) {
 
 class Furnisher {
  public:
-  Furnisher(BuildingWriter& out, FloorPlan& plan, Rng& rng, SceneFileCfg& cfg)
+  Furnisher(RoomWriter& out, FloorPlan& plan, Rng& rng, SceneFileCfg& cfg)
       : out_(out), plan_(plan), rng_(rng), cfg_(cfg) {}
 
   // Lets furniture move between episodes: pieces at walls along the wall, tables in the middle of a
@@ -124,7 +125,7 @@ class Furnisher {
       for (int attempt = 0; attempt < kAttempts; ++attempt) {
         const int side = static_cast<int>(rng_.below(4));
         const double low = side % 2 == 0 ? r.x0 : r.y0, high = side % 2 == 0 ? r.x1 : r.y1;
-        const double half = 0.5 * size.width + 0.5 * kWall + 0.01;
+        const double half = 0.5 * size.width + 0.5 * kWallThickness + 0.01;
         if (high - low < 2 * half) continue;
         const Stand stand = against_wall(r, side, rng_.uniform(low + half, high - half), size);
         if (!plan_.fits(room, stand.space)) continue;
@@ -150,7 +151,7 @@ class Furnisher {
   void place(Furniture piece, int room, const std::string& where, const Stand& stand) {
     const std::string name = unique(fmt::format("{}_{}", where, name_of(piece)));
     pieces_.push_back({name, room, stand.space});
-    BuildingWriter::Local local(out_, name, stand.at, stand.yaw);
+    RoomWriter::Local local(out_, name, stand.at, stand.yaw);
     const std::size_t before = cfg_.regions.size();
     write_furniture(out_, piece, name, rng_, cfg_.regions);
     if (cfg_.regions.size() > before)
@@ -169,7 +170,7 @@ class Furnisher {
       plan_.take(space);
       const std::string name = unique(where + "_table");
       pieces_.push_back({name, room, space, true, true});
-      BuildingWriter::Local local(out_, name, {x, y, 0}, along_x ? 0 : 0.5 * pi);
+      RoomWriter::Local local(out_, name, {x, y, 0}, along_x ? 0 : 0.5 * pi);
       write_dining_table(out_, name, 4, rng_, cfg_.regions);
       label_region("dining table");
       return;
@@ -185,7 +186,7 @@ class Furnisher {
     plan_.take(space);
     const std::string name = unique(where + "_coffee_table");
     pieces_.push_back({name, room, space, true, true});
-    BuildingWriter::Local local(out_, name, middle, sofa.yaw);
+    RoomWriter::Local local(out_, name, middle, sofa.yaw);
     write_rug(out_, "cloth_3", 1.15, 0.70);
     write_coffee_table(out_, name, rng_, cfg_.regions);
     label_region("coffee table");
@@ -198,7 +199,7 @@ class Furnisher {
     bool along_x = false, along_y = false;  // axes along which it can be displaced
   };
 
-  BuildingWriter& out_;
+  RoomWriter& out_;
   FloorPlan& plan_;
   Rng& rng_;
   SceneFileCfg& cfg_;
@@ -207,33 +208,32 @@ class Furnisher {
   std::vector<Piece> pieces_;
 };
 
-void write_walls(BuildingWriter& out, const FloorPlan& plan, Rng& rng) {
-  BuildingWriter::Local walls(out, "walls", {0, 0, 0}, 0);
-  const WallFinish look{.thickness = kWall, .height = kHeight};
+void write_walls(RoomWriter& out, const FloorPlan& plan, Rng& rng) {
+  RoomWriter::Local walls(out, "walls", {0, 0, 0}, 0);
   for (const PlannedWall& w : plan.walls()) {
     std::vector<Opening> openings;
     if (w.opening) openings.push_back({w.from, w.to, 0, 2.12});
     const double length = w.length(), wide = std::min(1.5, 0.45 * length);
     const bool window = w.other < 0 && length > 2.6 && rng.below(4) > 0;
     if (window) openings.push_back({0.5 * (length - wide), 0.5 * (length + wide), 1.0, 2.2});
-    write_wall(out, {w.x0, w.y0, 0}, {w.x1, w.y1, 0}, openings, look);
+    write_wall(out, {w.x0, w.y0, 0}, {w.x1, w.y1, 0}, openings);
     if (window) {
       write_window(out, {0.5 * (w.x0 + w.x1), 0.5 * (w.y0 + w.y1), 0}, w.along_x() ? 0 : 0.5 * pi,
-                   wide, 1.0, 2.2, kWall);
+                   wide, 1.0, 2.2);
     }
   }
 }
 
 // A picture at the centre of a wall without a window or opening.
-void write_pictures(BuildingWriter& out, const FloorPlan& plan, Rng& rng) {
+void write_pictures(RoomWriter& out, const FloorPlan& plan, Rng& rng) {
   for (const PlannedWall& w : plan.walls()) {
     if (w.opening || w.other < 0 || w.length() < 1.2 || rng.below(2) == 0) continue;
-    const double side = rng.below(2) == 0 ? 1 : -1, off = side * 0.5 * kWall;
+    const double side = rng.below(2) == 0 ? 1 : -1, off = side * 0.5 * kWallThickness;
     const Vec3 at{0.5 * (w.x0 + w.x1) + (w.along_x() ? 0 : off),
                   0.5 * (w.y0 + w.y1) + (w.along_x() ? off : 0), 0};
     // The painting faces -y of its frame.
     const double yaw = w.along_x() ? (side > 0 ? pi : 0) : (side > 0 ? 0.5 * pi : -0.5 * pi);
-    BuildingWriter::Local local(out, "", at, yaw);
+    RoomWriter::Local local(out, "", at, yaw);
     write_painting(out, fmt::format("painting_{}", rng.below(3)), 0.7, 0.5, 1.6);
   }
 }
@@ -241,22 +241,21 @@ void write_pictures(BuildingWriter& out, const FloorPlan& plan, Rng& rng) {
 scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   FloorPlan plan(rng);
-  RoomWriter text("floor");
-  write_shell_finishes(text, rng);
-  write_furniture_materials(text, rng);
-  for (int i = 0; i < 3; ++i) write_picture(text, fmt::format("painting_{}", i), rng);
+  RoomWriter out("floor");
+  write_shell_finishes(out, rng);
+  write_furniture_materials(out, rng);
+  for (int i = 0; i < 3; ++i) write_picture(out, fmt::format("painting_{}", i), rng);
   const Gloss polished{0.15, 0.3, 0.02};
   for (int i = 0; i < 3; ++i)
-    text.tiled(fmt::format("floor_{}", i),
-               planks_png(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2, polished);
-  text.tiled("floor_3", tiles_png({0.70, 0.68, 0.64}, {0.52, 0.51, 0.49}, 3, false, rng.next()),
-             1.2, polished);
+    out.tiled(fmt::format("floor_{}", i),
+              planks_png(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2, polished);
+  out.tiled("floor_3", tiles_png({0.70, 0.68, 0.64}, {0.52, 0.51, 0.49}, 3, false, rng.next()), 1.2,
+            polished);
 
-  BuildingWriter out(text);
   const auto& rooms = plan.rooms();
   const Rect& all = plan.whole();
-  text.slab("ceiling", "ceiling_paint", Facing::kDown, {0.5 * all.x1, 0.5 * all.y1, kHeight},
-            all.width(), all.depth(), 0.1);
+  out.slab(Facing::kDown, {0.5 * all.x1, 0.5 * all.y1, kWallHeight}, all.width(), all.depth(), 0.1,
+           "ceiling_paint", {.name = "ceiling"});
   write_walls(out, plan, rng);
   write_pictures(out, plan, rng);
   // The largest room is the living room; the other kinds are assigned by size.
@@ -268,17 +267,17 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
     const Rect& r = rooms[order[k]];
     const double x = 0.5 * (r.x0 + r.x1), y = 0.5 * (r.y0 + r.y1);
     const std::string name = kRoomNames[k];
-    text.slab("floor_" + name, fmt::format("floor_{}", rng.below(4)), Facing::kUp, {x, y, 0},
-              r.width(), r.depth(), 0.1);
-    out.lamp("lamp_" + name, {x, y, kHeight - 0.12}, 0.85, 3.6);
-    out.cylinder({x, y, kHeight - 0.03}, 0.16, 0.03, "shade", false);
+    out.slab(Facing::kUp, {x, y, 0}, r.width(), r.depth(), 0.1,
+             fmt::format("floor_{}", rng.below(4)), {.name = "floor_" + name});
+    out.lamp("lamp_" + name, {x, y, kWallHeight - 0.12}, 0.85, 3.6);
+    out.upright_cylinder({x, y, kWallHeight - 0.03}, 0.16, 0.03, "shade", kVisual);
     furnisher.furnish(order[k], static_cast<RoomKind>(k));
   }
-  write_bounce_light(text);
+  write_bounce_light(out);
   furnisher.loosen();
   const Rect& living = rooms[order[0]];
   cfg.robot.pos = {0.5 * (living.x0 + living.x1), 0.5 * (living.y0 + living.y1), 0};
-  return text.model();
+  return out.model();
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mjsense/core/rng.h"
-#include "mjsense/scenes/generators/building_writer.h"
+#include "mjsense/scenes/generators/room_writer.h"
 #include "mjsense/scenes/scene_file.h"
 
 namespace mjsense::scenes {
@@ -34,20 +34,20 @@ struct FloorSpace {
 FloorSpace floor_space(Furniture piece);
 
 // A surface for objects is a geom "<name>_top" and is appended to `regions`, in world axes.
-void write_furniture(BuildingWriter& out, Furniture piece, const std::string& name, Rng& rng,
+void write_furniture(RoomWriter& out, Furniture piece, const std::string& name, Rng& rng,
                      std::vector<SceneRegionCfg>& regions);
 // A table for the centre of a room with chairs along its long sides, centred at the frame's origin.
-void write_dining_table(BuildingWriter& out, const std::string& name, int chairs, Rng& rng,
+void write_dining_table(RoomWriter& out, const std::string& name, int chairs, Rng& rng,
                         std::vector<SceneRegionCfg>& regions);
-void write_coffee_table(BuildingWriter& out, const std::string& name, Rng& rng,
+void write_coffee_table(RoomWriter& out, const std::string& name, Rng& rng,
                         std::vector<SceneRegionCfg>& regions);
 // Materials of furniture, rugs, windows and ceilings, in the colours of the house.
-void write_furniture_materials(RoomWriter& text, Rng& rng);
+void write_furniture_materials(RoomWriter& out, Rng& rng);
 // A material that shows an image once, for write_painting().
-void write_picture(RoomWriter& text, const std::string& name, Rng& rng);
+void write_picture(RoomWriter& out, const std::string& name, Rng& rng);
 // A rug on the floor, and a painting on a wall at height z, facing -y.
-void write_rug(BuildingWriter& out, std::string_view material, double half_x, double half_y);
-void write_painting(BuildingWriter& out, std::string_view picture, double width, double height,
+void write_rug(RoomWriter& out, std::string_view material, double half_x, double half_y);
+void write_painting(RoomWriter& out, std::string_view picture, double width, double height,
                     double z);
 
 }  // namespace mjsense::scenes

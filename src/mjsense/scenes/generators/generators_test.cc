@@ -7,6 +7,8 @@
 #include <set>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scenes/episode_scene.h"
 #include "mjsense/scenes/generators/generator.h"
@@ -19,27 +21,17 @@ namespace {
 
 using ::testing::HasSubstr;
 
-template <class Error = ValueError, class F>
-std::string error_of(F f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
-}
-
 // A house compiled without a robot, ready for episodes.
 struct Built {
   EpisodeScene scene;
   std::unique_ptr<scene::Scene> whole;
-  std::shared_ptr<mjData> data;
+  DataPtr data;
 
   explicit Built(const std::string& name) : scene(load_scene(name)) {
     scene::SceneCfg cfg = scene.scene_cfg("robot_0");
     std::erase_if(cfg.entities, [](const auto& e) { return e.second.model.empty(); });
     whole = std::make_unique<scene::Scene>(std::move(cfg));
-    data = {mj_makeData(whole->model()), mj_deleteData};
+    data = make_data(whole->model());
     scene.initialize(whole->model(), 1, "robot_0/");
   }
   std::string start(std::uint64_t seed) {
@@ -100,8 +92,8 @@ TEST(Generators, OccupancyCoversDisplacedFurniture) {
     scene.initialize(m, 1, "robot_0/");
     scene.bind(sim);
     const auto stands = [&](int geom) { return m->body_treeid[m->geom_bodyid[geom]] < 0; };
-    const std::shared_ptr<mjData> data{mj_makeData(m), mj_deleteData};
-    const std::shared_ptr<mjModel> own{mj_copyModel(nullptr, m), mj_deleteModel};
+    const DataPtr data = make_data(m);
+    const ModelPtr own(mj_copyModel(nullptr, m));
     mj_kinematics(m, data.get());
     const auto map = [&](bool wherever) {
       OccupancyCfg cfg;
@@ -138,7 +130,8 @@ TEST(Generators, OccupancyCoversDisplacedFurniture) {
 }
 
 TEST(Generators, ErrorsNameValidGenerators) {
-  EXPECT_THAT(error_of([] { load_scene("libero/table:3"); }), HasSubstr("has no generator"));
+  EXPECT_THAT(error_of<ValueError>([] { load_scene("libero/table:3"); }),
+              HasSubstr("has no generator"));
   EXPECT_THAT(error_of<KeyError>([] { load_scene("shelv:3"); }), HasSubstr("did you mean 'shelf'"));
   mjsense::testing::TempDir dir;
   const std::string file = dir.file("scene.toml");

@@ -4,7 +4,7 @@
 // opening at y = 0, and opens towards +x: pushed from x < 0, pulled from x > 0.
 
 #include "mjsense/core/rng.h"
-#include "mjsense/scenes/generators/building_writer.h"
+#include "mjsense/scenes/generators/room_writer.h"
 
 namespace mjsense::scenes {
 
@@ -14,7 +14,6 @@ struct HingedDoor {
   double handle_height = 1.0;         // m
   double handle_length = 0.125;       // m, of a lever
   double opens = 1.5708;              // rad
-  double closer = 0.0;                // N m / rad, towards the closed position
   double friction = 0.8;              // N m
   double damping = 2.0;               // N m s / rad
   double press = 0.6;                 // rad, lever angle at which the bolt is withdrawn
@@ -32,6 +31,6 @@ double opening_height(const HingedDoor& door);
 // strike of the frame, so that the door does not move until the lever is pressed by `press`. The
 // hinge turns by a negative angle if it is on the right. Uses the materials "door_paint",
 // "door_metal", "black" and "skirting".
-void write_door(BuildingWriter& out, const HingedDoor& door, double wall_thickness);
+void write_door(RoomWriter& out, const HingedDoor& door);
 
 }  // namespace mjsense::scenes

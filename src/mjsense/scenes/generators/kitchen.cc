@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mjsense/scenes/generators/kitchen_units.h"
-#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/room_shell.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense::scenes {
@@ -72,11 +72,11 @@ void clutter(RoomWriter& room, Rng& rng, double z, double y0, double wide) {
   const double x = 0.52;
   const double jar = y0 + 0.08 + rng.uniform(0, 0.05);
   room.open_body("jar", {x, jar, z});
-  room.cylinder("", "jar", {0, 0, 0}, {0, 0, 0.15}, 0.05);
+  room.cylinder({0, 0, 0}, {0, 0, 0.15}, 0.05, "jar");
   for (int i = 0; i < 4; ++i) {
     const double a = 1.6 * i + rng.uniform(0, 1);
-    room.capsule("", "board", {0, 0, 0.1},
-                 {0.035 * std::cos(a), 0.05 * std::sin(a), rng.uniform(0.26, 0.32)}, 0.006);
+    room.capsule({0, 0, 0.1}, {0.035 * std::cos(a), 0.05 * std::sin(a), rng.uniform(0.26, 0.32)},
+                 0.006, "board");
   }
   room.close_body();
   room.open_body("chopping_board", {0.562, y0 + wide - 0.17, z});  // leans against the wall
@@ -131,9 +131,8 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
                  .height = rng.uniform(2.45, 2.7)};
   shell.window_x = 0.5 * (shell.x0 - 0.3);
   write_shell(room, shell);
-  room.slab("backsplash", "splash", Facing::kMinusX,
-            {wall - 0.008, (first + last) / 2, (style.high + style.wall_low) / 2}, length,
-            style.wall_low - style.high + 0.02, 0.008);
+  room.slab(Facing::kMinusX, {wall - 0.008, (first + last) / 2, (style.high + style.wall_low) / 2},
+            length, style.wall_low - style.high + 0.02, 0.008, "splash", {.name = "backsplash"});
 
   int number = 0;
   const double fridge_y0 = fridge_first ? start : last + gap;

@@ -11,6 +11,9 @@ std::string named(std::string_view name) {
 }
 
 std::string text(Vec3 v) { return fmt::format("{:.5g} {:.5g} {:.5g}", v.x, v.y, v.z); }
+std::string ends(Vec3 from, Vec3 to, double radius) {
+  return fmt::format("fromto=\"{} {}\" size=\"{:.5g}\"", text(from), text(to), radius);
+}
 
 std::string gloss_text(Gloss gloss) {
   return fmt::format("specular=\"{}\" shininess=\"{}\" reflectance=\"{}\"", gloss.specular,
@@ -56,9 +59,9 @@ Vec3 normal(Facing facing) {
 
 }  // namespace
 
-void RoomWriter::plain(std::string_view name, Colour c, Gloss gloss, double alpha) {
-  assets_ += fmt::format("<material name=\"{}\" rgba=\"{:.4f} {:.4f} {:.4f} {}\" {}/>\n", name,
-                         c[0], c[1], c[2], alpha, gloss_text(gloss));
+void RoomWriter::plain(std::string_view name, Colour c, Gloss gloss) {
+  assets_ += fmt::format("<material name=\"{}\" rgba=\"{:.4f} {:.4f} {:.4f} 1\" {}/>\n", name, c[0],
+                         c[1], c[2], gloss_text(gloss));
 }
 
 void RoomWriter::glowing(std::string_view name, Colour c, double emission) {
@@ -87,43 +90,67 @@ void RoomWriter::wrapped(std::string_view name, std::string png, Gloss gloss) {
   assets_ += fmt::format("<material name=\"{0}\" texture=\"{0}\" {1}/>\n", name, gloss_text(gloss));
 }
 
-void RoomWriter::box(std::string_view name, std::string_view material, Vec3 middle, Vec3 half,
-                     std::string_view more) {
-  world_ += fmt::format(
-      "<geom {}class=\"furniture\" type=\"box\" pos=\"{}\" size=\"{}\" material=\"{}\" {}/>\n",
-      named(name), text(middle), text(half), material, more);
+void RoomWriter::write_geom(std::string_view type, std::string_view place,
+                            std::string_view material, const GeomOptions& options) {
+  world_ += fmt::format("<geom {}class=\"furniture\" type=\"{}\" {} material=\"{}\" {}{}/>\n",
+                        named(options.name), type, place, material,
+                        options.solid ? "" : "contype=\"0\" conaffinity=\"0\" group=\"2\" ",
+                        options.attributes);
 }
 
-void RoomWriter::slab(std::string_view name, std::string_view material, Facing facing, Vec3 middle,
-                      double wide, double high, double thick, std::string_view more) {
-  world_ += fmt::format(
-      "<geom {}class=\"furniture\" type=\"box\" pos=\"{}\" xyaxes=\"{}\" size=\"{:.5g} {:.5g} "
-      "{:.5g}\" material=\"{}\" {}/>\n",
-      named(name), text(middle - 0.5 * thick * normal(facing)), axes(facing), wide / 2, high / 2,
-      thick / 2, material, more);
+void RoomWriter::box(Vec3 middle, Vec3 half, std::string_view material,
+                     const GeomOptions& options) {
+  write_geom("box", fmt::format("pos=\"{}\" size=\"{}\"", text(middle), text(half)), material,
+             options);
 }
 
-void RoomWriter::cylinder(std::string_view name, std::string_view material, Vec3 from, Vec3 to,
-                          double radius, std::string_view more) {
-  world_ += fmt::format(
-      "<geom {}class=\"furniture\" type=\"cylinder\" fromto=\"{} {}\" size=\"{:.5g}\" "
-      "material=\"{}\" {}/>\n",
-      named(name), text(from), text(to), radius, material, more);
+void RoomWriter::slab(Facing facing, Vec3 middle, double wide, double high, double thick,
+                      std::string_view material, const GeomOptions& options) {
+  write_geom("box",
+             fmt::format("pos=\"{}\" xyaxes=\"{}\" size=\"{}\"",
+                         text(middle - 0.5 * thick * normal(facing)), axes(facing),
+                         text({wide / 2, high / 2, thick / 2})),
+             material, options);
 }
 
-void RoomWriter::capsule(std::string_view name, std::string_view material, Vec3 from, Vec3 to,
-                         double radius, std::string_view more) {
-  world_ += fmt::format(
-      "<geom {}class=\"furniture\" type=\"capsule\" fromto=\"{} {}\" size=\"{:.5g}\" "
-      "material=\"{}\" {}/>\n",
-      named(name), text(from), text(to), radius, material, more);
+void RoomWriter::cylinder(Vec3 from, Vec3 to, double radius, std::string_view material,
+                          const GeomOptions& options) {
+  write_geom("cylinder", ends(from, to, radius), material, options);
 }
 
-void RoomWriter::leaf(std::string_view material, Vec3 middle, Vec3 along, Vec3 flat, Vec3 half) {
-  world_ += fmt::format(
+void RoomWriter::upright_cylinder(Vec3 middle, double radius, double half_height,
+                                  std::string_view material, const GeomOptions& options) {
+  const Vec3 up{0, 0, half_height};
+  cylinder(middle - up, middle + up, radius, material, options);
+}
+
+void RoomWriter::capsule(Vec3 from, Vec3 to, double radius, std::string_view material,
+                         const GeomOptions& options) {
+  write_geom("capsule", ends(from, to, radius), material, options);
+}
+
+void RoomWriter::ellipsoid(Vec3 middle, Vec3 half, std::string_view material, Quat q) {
+  add(fmt::format(
+      "<geom class=\"shown\" type=\"ellipsoid\" pos=\"{}\" size=\"{}\" quat=\"{:.6g} {:.6g} {:.6g} "
+      "{:.6g}\" material=\"{}\"/>",
+      text(middle), text(half), q.w, q.x, q.y, q.z, material));
+}
+
+void RoomWriter::leaf(Vec3 middle, Vec3 along, Vec3 flat, Vec3 half, std::string_view material) {
+  add(fmt::format(
       "<geom class=\"shown\" type=\"ellipsoid\" pos=\"{}\" xyaxes=\"{} {}\" size=\"{}\" "
-      "material=\"{}\"/>\n",
-      text(middle), text(cross(flat, along)), text(flat), text(half), material);
+      "material=\"{}\"/>",
+      text(middle), text(cross(flat, along)), text(flat), text(half), material));
+}
+
+void RoomWriter::lamp(std::string_view name, Vec3 at, double brightness, double reach) {
+  add(
+      fmt::format("<light name=\"{}\" type=\"spot\" bulbradius=\"0.12\" cutoff=\"88\" "
+                  "exponent=\"1\" pos=\"{:.4g} {:.4g} {:.4g}\" "
+                  "dir=\"0 0 -1\" diffuse=\"{:.4g} {:.4g} {:.4g}\" specular=\"0.15 0.15 0.15\" "
+                  "attenuation=\"1 0 {:.4g}\" castshadow=\"true\"/>",
+                  name, at.x, at.y, at.z, brightness, 0.97 * brightness, 0.91 * brightness,
+                  1 / (reach * reach)));
 }
 
 void RoomWriter::add(std::string_view element) {
@@ -133,9 +160,13 @@ void RoomWriter::add(std::string_view element) {
 
 void RoomWriter::open_body(std::string_view name, Vec3 pos, double yaw) {
   world_ += fmt::format("<body {}pos=\"{}\" euler=\"0 0 {:.6g}\">\n", named(name), text(pos), yaw);
+  frames_.push_back(frame() * Pose{pos, axis_angle({0, 0, 1}, yaw)});
 }
 
-void RoomWriter::close_body() { world_ += "</body>\n"; }
+void RoomWriter::close_body() {
+  world_ += "</body>\n";
+  frames_.pop_back();
+}
 
 void RoomWriter::tail(std::string_view element) {
   tail_ += element;

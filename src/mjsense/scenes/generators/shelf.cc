@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/room_shell.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense::scenes {
@@ -24,8 +24,8 @@ void books(RoomWriter& room, Rng& rng, double x, double y0, double length, doubl
                  deep = rng.uniform(0.13, 0.18);
     const auto colour = rng.below(static_cast<std::uint32_t>(std::size(kSpines)));
     if (y + thick > y0 + length) return;
-    room.box("", fmt::format("spine_{}", colour), {x + deep / 2, y + thick / 2, z + high / 2},
-             {deep / 2, thick / 2 - 0.0008, high / 2});
+    room.box({x + deep / 2, y + thick / 2, z + high / 2}, {deep / 2, thick / 2 - 0.0008, high / 2},
+             fmt::format("spine_{}", colour));
     y += thick;
   }
 }
@@ -57,20 +57,20 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
 
   const double top = lowest + kBoards * step;
   for (int side = -1; side <= 1; side += 2) {
-    room.box("", "case", {front + deep / 2, side * (wide + kThick) / 2, (top + kThick) / 2},
-             {deep / 2, kThick / 2, (top + kThick) / 2});
+    room.box({front + deep / 2, side * (wide + kThick) / 2, (top + kThick) / 2},
+             {deep / 2, kThick / 2, (top + kThick) / 2}, "case");
   }
-  room.box("case_back", "case", {back + 0.008, 0, (top + kThick) / 2},
-           {0.006, wide / 2, (top + kThick) / 2});
-  room.box("plinth", "case", {front + 0.02, 0, 0.05}, {0.01, wide / 2, 0.05});
+  room.box({back + 0.008, 0, (top + kThick) / 2}, {0.006, wide / 2, (top + kThick) / 2}, "case",
+           {.name = "case_back"});
+  room.box({front + 0.02, 0, 0.05}, {0.01, wide / 2, 0.05}, "case", {.name = "plinth"});
   // the lowest board is near the floor, the highest is the top
   for (int i = -1; i <= kBoards; ++i) {
     const double z = i < 0 ? 0.1 : lowest + i * step;
     const std::string name = i < 0          ? "foot_board"
                              : i == kBoards ? "case_top"
                                             : fmt::format("board_{}", i);
-    room.box(name, "case", {front + deep / 2, 0, z - kThick / 2}, {deep / 2, wide / 2, kThick / 2},
-             "friction=\"0.9 0.005 0.0002\"");
+    room.box({front + deep / 2, 0, z - kThick / 2}, {deep / 2, wide / 2, kThick / 2}, "case",
+             {.name = name, .attributes = "friction=\"0.9 0.005 0.0002\""});
   }
   // Books below and above the arm's reach, and at one end of a board.
   const double inside = front + 0.06;
@@ -88,7 +88,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   // A plant next to the bookcase.
   const double side = rng.below(2) == 0 ? 1 : -1, px = back - 0.22, py = side * (wide / 2 + 0.4);
   room.open_body("plant", {px, py, 0});
-  room.cylinder("plant", "pot", {0, 0, 0}, {0, 0, 0.28}, 0.14);
+  room.cylinder({0, 0, 0}, {0, 0, 0.28}, 0.14, "pot", {.name = "plant"});
   constexpr int kLeaves = 16;
   for (int i = 0; i < kLeaves; ++i) {  // leaves lean away from the centre, not into the wall
     double turn = 2.4 * i;
@@ -97,8 +97,8 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
     const double away = std::sin(lean) * (out.x > 0 ? 0.4 : 1.0);
     const Vec3 along = normalized(Vec3{away * out.x, std::sin(lean) * out.y, std::cos(lean)});
     const Vec3 flat = normalized(cross(along, Vec3{-out.y, out.x, 0}));
-    room.leaf("leaf", Vec3{0, 0, 0.24} + 0.04 * out + half * along, along, flat,
-              {0.035, 0.006, half});
+    room.leaf(Vec3{0, 0, 0.24} + 0.04 * out + half * along, along, flat, {0.035, 0.006, half},
+              "leaf");
   }
   room.close_body();
 

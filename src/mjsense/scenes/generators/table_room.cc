@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "mjsense/scenes/generators/furniture.h"
-#include "mjsense/scenes/generators/room_writer.h"
+#include "mjsense/scenes/generators/room_shell.h"
 #include "mjsense/scenes/generators/surface_finishes.h"
 
 namespace mjsense::scenes {
@@ -40,12 +40,12 @@ void write_materials(RoomWriter& room, Rng& rng) {
 
 void write_table(RoomWriter& room) {
   room.open_body("table", {0.70, 0, 0});
-  room.slab("table_top", "table", Facing::kUp, {0, 0, 0.60}, 0.84, 1.30, 0.03,
-            "friction=\"0.9 0.005 0.0002\"");
-  room.box("", "table_edge", {0, 0, 0.552}, {0.40, 0.63, 0.018});
+  room.slab(Facing::kUp, {0, 0, 0.60}, 0.84, 1.30, 0.03, "table",
+            {.name = "table_top", .attributes = "friction=\"0.9 0.005 0.0002\""});
+  room.box({0, 0, 0.552}, {0.40, 0.63, 0.018}, "table_edge");
   for (const double x : {0.36, -0.36}) {
     for (const double y : {0.59, -0.59})
-      room.box("", "table_edge", {x, y, 0.267}, {0.025, 0.025, 0.267});
+      room.box({x, y, 0.267}, {0.025, 0.025, 0.267}, "table_edge");
   }
   room.close_body();
 }
@@ -60,11 +60,10 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg&) {
   write_shell(room, shell);
   write_table(room);
 
-  BuildingWriter out(room);
   std::vector<SceneRegionCfg> unused;  // objects are placed on the table only
   const auto stand = [&](Furniture piece, const char* name, double x, double y, double yaw) {
-    BuildingWriter::Local local(out, name, {x, y, 0}, yaw);
-    write_furniture(out, piece, name, rng, unused);
+    RoomWriter::Local local(room, name, {x, y, 0}, yaw);
+    write_furniture(room, piece, name, rng, unused);
   };
   const double sideboard = rng.uniform(-0.7, 0.3);
   stand(Furniture::kSideboard, "sideboard", shell.x1, sideboard, -0.5 * pi);
@@ -72,12 +71,12 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg&) {
   stand(rng.below(2) == 0 ? Furniture::kBookcase : Furniture::kArmchair, "by_the_wall",
         rng.uniform(0.7, 1.2), shell.y0, pi);
   {
-    BuildingWriter::Local wall(out, "", {shell.x1, sideboard, 0}, -0.5 * pi);
-    write_painting(out, "painting", 0.85, 0.57, 1.6);
+    RoomWriter::Local wall(room, "", {shell.x1, sideboard, 0}, -0.5 * pi);
+    write_painting(room, "painting", 0.85, 0.57, 1.6);
   }
   {
-    BuildingWriter::Local rug(out, "", {0.9, 0, 0}, 0);
-    write_rug(out, "cloth_2", 1.1, 1.2);
+    RoomWriter::Local rug(room, "", {0.9, 0, 0}, 0);
+    write_rug(room, "cloth_2", 1.1, 1.2);
   }
   return room.model();
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
@@ -24,11 +25,6 @@ namespace mjsense::sensors {
 namespace {
 
 using ::testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-using DataPtr = std::unique_ptr<mjData, DataDelete>;
 
 class Bench {
  public:
@@ -107,7 +103,7 @@ TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
     ASSERT_TRUE(spec) << error;
     spec->option = bench.model()->opt;
     if (model > 0) disturb(spec.get(), model);
-    scene::ModelPtr plain(mj_compile(spec.get(), nullptr));
+    ModelPtr plain(mj_compile(spec.get(), nullptr));
     ASSERT_TRUE(plain) << mjs_getError(spec.get());
     DataPtr data(mj_makeData(plain.get()));
 

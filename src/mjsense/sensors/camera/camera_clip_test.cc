@@ -42,7 +42,7 @@ CameraSensorCfg wide(std::vector<std::string> types) {
 }
 
 TEST(CameraClip, ClipsAtTheModelsNearPlaneLikeOpenGL) {
-  const testing::TestModel m(kHousing);
+  const TestModel m(kHousing);
   // With shadows, fixed geoms are drawn from a stored layer.
   for (const bool shadows : {false, true}) {
     CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation"});
@@ -58,7 +58,7 @@ TEST(CameraClip, ClipsAtTheModelsNearPlaneLikeOpenGL) {
 // Every field shows what is beyond the near plane: nothing is nearer. Without the near plane,
 // nearer surfaces are visible.
 TEST(CameraClip, ClipsEveryField) {
-  const testing::TestModel m(kHousing);
+  const TestModel m(kHousing);
   rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation", "normals", "point_cloud", "flow"});
@@ -87,7 +87,7 @@ TEST(CameraClip, ClipsEveryField) {
 TEST(CameraClip, ErrorsNameTheLimits) {
   const auto message = [](const CameraSensorCfg& cfg) -> std::string {
     try {
-      const testing::TestModel m(kHousing);
+      const TestModel m(kHousing);
       rays::RayScene rays(m.model, 1);
       rays.update(m.world());
       testing::shoot(cfg, m, rays);

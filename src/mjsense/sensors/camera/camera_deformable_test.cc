@@ -18,8 +18,6 @@
 namespace mjsense::sensors {
 namespace {
 
-using testing::TestModel;
-
 CameraSensorCfg camera(int width, int height) {
   CameraSensorCfg cfg;
   cfg.name = "cam";

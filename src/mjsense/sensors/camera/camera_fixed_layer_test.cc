@@ -75,7 +75,7 @@ std::vector<std::uint8_t> bytes_of(Camera& camera, int world) {
 }
 
 // Renders world 0 and returns its image.
-std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, rays::RayScene& rays,
+std::vector<std::uint8_t> image(Camera& camera, const TestModel& m, rays::RayScene& rays,
                                 ThreadPool& pool) {
   mj_forward(m.model, m.data);
   rays.update(m.world());
@@ -88,7 +88,7 @@ std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, ray
 TEST(FixedLayer, DoesNotChangeImages) {
   for (int scene = 0; scene < 4; ++scene) {
     Rng rng(5, 0, 1, scene);
-    testing::TestModel m(room(rng));
+    TestModel m(room(rng));
     rays::RayScene rays(m.model, 1);
     ThreadPool pool(1 + scene % 3);
     const bool shadows = scene != 3;
@@ -137,10 +137,10 @@ TEST(FixedLayer, DifferentWorldsHaveTheirOwnLayers) {
       {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {4}, {0, 1, 2, 3, 4, 5}, {1, 4},
       {0, 1, 2, 3, 4, 5}};
   for (int threads : {1, 3}) {
-    std::vector<std::unique_ptr<testing::TestModel>> worlds;
+    std::vector<std::unique_ptr<TestModel>> worlds;
     for (int i = 0; i < kWorlds; ++i) {
       Rng rng(5, 0, 1, 0);
-      worlds.push_back(std::make_unique<testing::TestModel>(room(rng)));
+      worlds.push_back(std::make_unique<TestModel>(room(rng)));
       mjModel* m = worlds.back()->model;
       m->light_pos[3] += 0.2 * i;
       m->cam_pos[0] += 0.1 * i;
@@ -152,7 +152,7 @@ TEST(FixedLayer, DifferentWorldsHaveTheirOwnLayers) {
     for (std::size_t i = 0; i < casts.size(); ++i) {
       Camera fresh(worlds[0]->model, kWorlds, threads);
       for (int id : casts[i]) {
-        testing::TestModel& m = *worlds[id];
+        TestModel& m = *worlds[id];
         m.data->qpos[0] += 0.05;
         if (i == 3) m.model->light_pos[4] += 0.3;  // an episode begins
         mj_forward(m.model, m.data);

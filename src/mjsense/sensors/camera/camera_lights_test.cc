@@ -26,7 +26,7 @@ int brightness(int max_lights, const std::string& head, const std::string& first
   std::string lights = first;
   for (int i = 0; i < 12; ++i)
     lights += "<light type='directional' diffuse='.05 .05 .05' specular='0 0 0' ambient='0 0 0'/>";
-  const testing::TestModel m(
+  const TestModel m(
       "<mujoco><visual><headlight ambient='0 0 0' specular='0 0 0' diffuse='.05 .05 .05' active='" +
       head + "'/></visual><worldbody>" + lights +
       "<geom type='plane' size='1 1 1' rgba='1 1 1 1'/><camera name='c' pos='0 0 "
@@ -55,7 +55,7 @@ TEST(CameraLights, TwelveLightsLookAsWithOpenGL) {
       for (int i = 0; i < 12; ++i)
         lights += "<light pos='" + testing::vec({i % 4 - 1.5, i / 4 - 1.0, 1}) +
                   "' cutoff='35' castshadow='" + shadows + "' diffuse='" + colors[i] + "'/>";
-      const testing::TestModel m(
+      const TestModel m(
           std::string("<mujoco><visual><headlight active='") + head +
           "'/><quality numquads='50' shadowsize='512'/></visual><worldbody>" + lights +
           "<geom type='plane' size='3 3 .05'/><geom type='box' size='.1 .2 .1' pos='0 0 .1'/>"

@@ -55,13 +55,13 @@ CameraSensorCfg sight(std::vector<std::string> types, std::vector<int> groups) {
   return cfg;
 }
 
-void run(const testing::TestModel& m, int steps) {
+void run(const TestModel& m, int steps) {
   for (int i = 0; i < steps; ++i) mj_step(m.model, m.data);
   mj_forward(m.model, m.data);
 }
 
 TEST(CameraMarkers, EqualThoseOfMujocosScene) {
-  const testing::TestModel m(kScene);
+  const TestModel m(kScene);
   render::Markers markers(m.model, {0x7, 0xf, true});
   mjvScene scene;
   mjv_defaultScene(&scene);
@@ -106,7 +106,7 @@ TEST(CameraMarkers, EqualThoseOfMujocosScene) {
 }
 
 TEST(CameraMarkers, LookAsWithOpenGL) {
-  const testing::TestModel m(kScene);
+  const TestModel m(kScene);
   for (int i = 0; i < 2; ++i) {
     run(m, 60 * i);
     CameraSensorCfg cfg = sight({"rgb", "depth", "segmentation"}, {0, 1, 2, 3});
@@ -126,7 +126,7 @@ TEST(CameraMarkers, LookAsWithOpenGL) {
 }
 
 TEST(CameraMarkers, AreVisibleOnlyIfTheirGroupsAre) {
-  const testing::TestModel m(kScene);
+  const TestModel m(kScene);
   rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   const auto objects = [&](std::vector<int> sites, std::vector<int> tendons) {
@@ -153,7 +153,7 @@ TEST(CameraMarkers, AreVisibleOnlyIfTheirGroupsAre) {
 }
 
 TEST(CameraMarkers, BelongToTheirBodies) {
-  const testing::TestModel m(kScene);
+  const TestModel m(kScene);
   rays::RayScene rays(m.model, 1);
   rays.update(m.world());
   const auto camera =
@@ -179,7 +179,7 @@ TEST(CameraMarkers, BelongToTheirBodies) {
 
 // A reflective box is a mirror also if it is a site, and it reflects sites.
 TEST(CameraMarkers, ReflectAndAreReflected) {
-  const testing::TestModel m(R"(<mujoco><statistic extent="2" center="0 0 0"/>
+  const TestModel m(R"(<mujoco><statistic extent="2" center="0 0 0"/>
     <asset><material name="mirror" reflectance=".8" rgba=".2 .2 .2 1"/></asset>
     <worldbody><light pos="0 0 3"/><geom type="sphere" size=".1" pos=".3 .3 .3" rgba="1 0 0 1"/>
       <site name="table" type="box" size=".8 .8 .05" material="mirror"/>

@@ -32,7 +32,7 @@ CameraSensorCfg camera_c(int width, int height, std::vector<std::string> data_ty
 // Calls visit(pixel, d, length) with each pixel's direction in the world. The pixel's depth is the
 // distance along the ray divided by `length`.
 template <class Visit>
-void each_pixel(const testing::TestModel& m, int width, int height, double fovy, Visit visit) {
+void each_pixel(const TestModel& m, int width, int height, double fovy, Visit visit) {
   const double top = std::tan(0.5 * fovy * M_PI / 180), right = top * width / height;
   for (int i = 0; i < width * height; ++i) {
     const int x = i % width, y = i / width;
@@ -62,7 +62,7 @@ TEST(CameraAgainstRays, EveryPixelEqualsItsRay) {
         testing::vec({rng.uniform(20, 70), rng.uniform(-30, 30), rng.uniform(-180, 180)});
     xml.insert(xml.find(end),
                "<camera name='c' pos='" + eye + "' euler='" + turn + "' fovy='70'/>");
-    testing::TestModel m(xml);
+    TestModel m(xml);
     rays::RayScene rays(m.model, 1);
     rays.update(m.world());
     const auto camera =
@@ -102,7 +102,7 @@ TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
     std::string heights;
     for (int i = 0; i < 14 * 11; ++i)
       heights += testing::vec({std::floor(std::clamp(rng.uniform(-1, 2), 0.0, 1.0) * 4) / 4});
-    const testing::TestModel m(
+    const TestModel m(
         "<mujoco><asset><hfield name='ground' nrow='14' ncol='11' size='2 1.5 .4 .1' elevation='" +
         heights + "'/></asset><worldbody><body pos='" +
         testing::vec({rng.uniform(-9, 9), rng.uniform(-9, 9), rng.uniform(-9, 9)}) + "' euler='" +

@@ -145,14 +145,18 @@ void CameraSensor::initialize(const SensorInit& init) {
     gl_ = render::make_gl_renderer(model_, gl, context);
     return;
   }
-  // Allocates all that cast() needs, except the shapes of the ray scene.
+  // Allocates all that cast() needs, except the shapes of the ray scene and the last views.
   const int slots =
       std::max(init.threads, std::min(init.num_worlds, kImagesPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
   workspace_->making.resize(slots);
+  const bool fixed = render::FixedLayer::possible(model_, camera_);
+  changed_tiles_.clear();
+  // The other fields follow from images that are not stored.
+  if (fixed && !optical_flow_ && !owners_ && clean_.empty()) changed_tiles_.resize(init.num_worlds);
   fixed_layers_.reset();
-  if (rgb_ && cfg_.samples == 1 && render::FixedLayer::possible(model_, camera_))
+  if (rgb_ && cfg_.samples == 1 && fixed)
     fixed_layers_ =
         std::make_unique<render::FixedLayers>(model_, cfg_.width, cfg_.height, init.num_worlds);
   render::ViewOptions options = view_options(cfg_, near_);
@@ -331,7 +335,11 @@ void CameraSensor::add_noise(const CastContext& context) {
 
 void CameraSensor::render_rows(const render::View& view, int world, int first, int last,
                                int thread) {
-  const render::ImageTargets image = targets(world, thread);
+  render::ImageTargets image = targets(world, thread);
+  if (render::ChangedTiles* tiles = changed_tiles(world)) {
+    image.changed = tiles->changed();
+    image.lit = tiles->lit();
+  }
   workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
   derive(world, image, first * render::kTileSize, std::min(last * render::kTileSize, cfg_.height));
 }
@@ -367,11 +375,14 @@ void CameraSensor::render_due(const CastContext& context) {
     context.pool.run(count, [&](int item, int thread) {
       render::ViewBuilder& builder = work.builders[thread];
       const render::View& view = build_view(rays, due_[item], builder);
+      render::ChangedTiles* changed = changed_tiles(due_[item]);
+      if (changed) changed->compare(view);
       if (render::FixedTile* tiles = settle_layer(due_[item], view)) {
         make_fixed(view, tiles, 0, tile_rows, thread);
         builder.use_fixed(tiles);
       }
       render_rows(view, due_[item], 0, tile_rows, thread);
+      if (changed) changed->keep(view);
     });
     return;
   }
@@ -384,7 +395,9 @@ void CameraSensor::render_due(const CastContext& context) {
     });
   };
   context.pool.run(count, [&](int item, int) {
-    work.making[item] = settle_layer(due_[item], build_view(rays, due_[item], work.builders[item]));
+    const render::View& view = build_view(rays, due_[item], work.builders[item]);
+    if (render::ChangedTiles* changed = changed_tiles(due_[item])) changed->compare(view);
+    work.making[item] = settle_layer(due_[item], view);
   });
   const auto making = std::span(work.making).first(count);
   if (std::ranges::any_of(making, [](render::FixedTile* tiles) { return tiles != nullptr; })) {
@@ -398,6 +411,9 @@ void CameraSensor::render_due(const CastContext& context) {
   run_bands([&](int image, int first, int last, int thread) {
     render_rows(work.builders[image].view(), due_[image], first, last, thread);
   });
+  if (changed_tiles_.empty()) return;
+  context.pool.run(
+      count, [&](int item, int) { changed_tiles_[due_[item]].keep(work.builders[item].view()); });
 }
 
 }  // namespace mjsense::sensors

@@ -8,6 +8,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/render/opengl/gl_renderer.h"
 #include "mjsense/render/view/camera_model.h"
+#include "mjsense/render/view/changed_tiles.h"
 #include "mjsense/render/view/fixed_layer.h"
 #include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/surface_assets.h"
@@ -73,6 +74,10 @@ class CameraSensor final : public Sensor {
   render::FixedTile* settle_layer(int world, const render::View& view);
   const render::View& build_view(const rays::RayScene& rays, int world,
                                  render::ViewBuilder& builder) const;
+  // The world's tiles that may have changed since its last image; null: all tiles are rendered.
+  render::ChangedTiles* changed_tiles(int world) {
+    return changed_tiles_.empty() ? nullptr : &changed_tiles_[world];
+  }
 
   CameraSensorCfg cfg_;
   const mjModel* model_ = nullptr;
@@ -85,6 +90,7 @@ class CameraSensor final : public Sensor {
   std::shared_ptr<const render::SurfaceAssets> assets_;
   std::unique_ptr<render::GlRenderer> gl_;  // only with renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
+  std::vector<render::ChangedTiles> changed_tiles_;    // by world; empty if the camera moves
   std::unique_ptr<render::FixedLayers> fixed_layers_;  // null: not useful, or the camera moves
   std::unique_ptr<OpticalFlow> optical_flow_;          // null: not requested
   std::unique_ptr<PixelOwners> owners_;                // null: not requested

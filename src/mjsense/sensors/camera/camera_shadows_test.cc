@@ -46,7 +46,7 @@ TEST(CameraShadows, FallWhereTheRayToTheLightIsBlocked) {
   for (int scene = 0; scene < 12; ++scene) {
     Rng rng(11, 0, 1, scene);
     const double elevation[] = {8, 20, 35, 50, 65, 80};
-    testing::TestModel m(hills(rng, elevation[scene % 6], scene >= 6));
+    TestModel m(hills(rng, elevation[scene % 6], scene >= 6));
     rays::RayScene rays(m.model, 1);
     rays.update(m.world());
     CameraSensorCfg cfg;

@@ -69,7 +69,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, CameraTextures,
 
 TEST_P(CameraTextures, ArePlacedAsInMujoco) {
   constexpr int kWidth = 200, kHeight = 200;
-  const testing::TestModel m(wall(GetParam()));
+  const TestModel m(wall(GetParam()));
   CameraSensorCfg cfg;
   cfg.name = "cam";
   cfg.camera_name = "c";
@@ -101,7 +101,7 @@ TEST_P(CameraTextures, ArePlacedAsInMujoco) {
 TEST(CameraTextures, OfInfinitePlanesBeginAtTheirPosition) {
   for (const char* size : {"0 0 .1", ".4 0 .1", "0 .4 .1"}) {
     for (const char* uniform : kUniform) {
-      const testing::TestModel m(
+      const TestModel m(
           std::string(
               R"(<mujoco><visual><map zfar="20"/><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>
         <statistic extent="2"/><asset><texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".2 .2 .8" width="64" height="64"/>

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/sensors/camera/pixel_owners.h"
 
 namespace mjsense::sensors {
@@ -47,9 +48,8 @@ void OpticalFlow::take(const World& world, const render::PixelGrid& grid) {
   const bool again = world.substep == w.substep && !world.first;
   if (!again) std::swap(w.now, w.before);
   const mjData* d = world.data;
-  w.now.camera = pose_from_mat(d->cam_xpos + 3 * camera_, d->cam_xmat + 9 * camera_);
-  for (std::size_t b = 0; b < w.now.bodies.size(); ++b)
-    w.now.bodies[b] = {vec3(d->xpos + 3 * b), quat(d->xquat + 4 * b)};
+  w.now.camera = camera_pose(d, camera_);
+  for (std::size_t b = 0; b < w.now.bodies.size(); ++b) w.now.bodies[b] = body_pose(d, b);
   w.now.grid = grid;
   if (first) w.before = w.now;
   w.any = true;

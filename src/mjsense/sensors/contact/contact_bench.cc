@@ -10,31 +10,21 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 
 namespace mjsense::sensors {
 namespace {
 
 struct Model {
-  mjModel* m;
-  mjData* d;
-  explicit Model(const std::string& xml) {
-    char error[1000] = "";
-    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
-    m = spec ? mj_compile(spec, nullptr) : nullptr;
-    if (!m) {
-      fmt::print(stderr, "{}\n", error);
-      std::abort();
-    }
-    mj_deleteSpec(spec);
-    d = mj_makeData(m);
+  explicit Model(const std::string& xml) : model(compile_mjcf(xml)), data(make_data(model.get())) {
     for (int i = 0; i < 200; ++i) mj_step(m, d);
     mj_forward(m, d);
   }
-  ~Model() {
-    mj_deleteData(d);
-    mj_deleteModel(m);
-  }
+  ModelPtr model;
+  DataPtr data;
+  mjModel* m = model.get();
+  mjData* d = data.get();
 };
 
 // `legs` two-link legs around a torso, with the feet on a plane. Feet are geoms foot_0, foot_1 ...

@@ -128,25 +128,32 @@ std::vector<ContactObject> ContactNames::of_entity(std::string_view context,
       fmt::format("{}: entity '{}' has no named {}", context, match.entity, kind_of(match)));
 }
 
-std::vector<ContactObject> ContactNames::literal(std::string_view context,
-                                                 const ContactMatch& match) const {
+// A full name selects that element. Other patterns with a special character are regular expressions.
+std::vector<ContactObject> ContactNames::by_full_name(std::string_view context,
+                                                      const ContactMatch& match) const {
+  std::vector<ContactObject> named;
   const std::vector<Element>& all = elements(match);
+  for (int id = 0; id < static_cast<int>(all.size()); ++id) {
+    if (!all[id].name.empty()) named.push_back({id, all[id].name, all[id].name});
+  }
+  const std::vector<std::string> names = names_of(named, &ContactObject::label);
   std::vector<ContactObject> result;
-  for (const std::string& name : match.pattern) {
-    const auto found = std::find_if(
-        all.begin(), all.end(), [&](const Element& e) { return e.name == name && !name.empty(); });
-    if (found == all.end()) {
-      std::vector<std::string> names;
-      for (const Element& e : all) {
-        if (!e.name.empty()) names.push_back(e.name);
+  for (const std::string& pattern : match.pattern) {
+    std::vector<int> matches;
+    const auto found = std::find(names.begin(), names.end(), pattern);
+    if (found != names.end())
+      matches.push_back(static_cast<int>(found - names.begin()));
+    else if (is_regex(pattern))
+      matches = match_names(std::span(&pattern, 1), names, context);
+    else
+      throw_unknown(context, kind_of(match), pattern, names);
+    for (int i : matches) {
+      for (const ContactObject& other : result) {
+        if (other.id == named[i].id)
+          throw ValueError(fmt::format("{}: '{}' is given twice", context, names[i]));
       }
-      throw_unknown(context, kind_of(match), name, names);
+      result.push_back(named[i]);
     }
-    const int id = static_cast<int>(found - all.begin());
-    for (const ContactObject& other : result) {
-      if (other.id == id) throw ValueError(fmt::format("{}: '{}' is given twice", context, name));
-    }
-    result.push_back({id, name, name});
   }
   return result;
 }
@@ -157,6 +164,13 @@ std::vector<ContactObject> ContactNames::by_regex(std::string_view context,
   std::vector<ContactObject> result;
   for (int i : match_names(match.pattern, names_of(all, &ContactObject::label), context))
     result.push_back(all[i]);
+  return result;
+}
+
+std::vector<ContactObject> ContactNames::matches(std::string_view context,
+                                                 const ContactMatch& match) const {
+  std::vector<ContactObject> result =
+      match.entity.empty() ? by_full_name(context, match) : by_regex(context, match);
   drop_excluded(context, match, result);
   return result;
 }
@@ -165,8 +179,7 @@ std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
                                                    const ContactMatch& match) const {
   const std::string context = fmt::format("sensor '{}': primary", sensor);
   validate_primary(match, context);
-  if (match.entity.empty()) return literal(context, match);
-  return by_regex(context, match);
+  return matches(context, match);
 }
 
 std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
@@ -174,11 +187,9 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
                                                      ContactPolicy policy) const {
   const std::string context = fmt::format("sensor '{}': secondary", sensor);
   validate_secondary(match, policy, context);
-  if (policy == ContactPolicy::kEach) {
-    return match.entity.empty() ? literal(context, match) : by_regex(context, match);
-  }
-  if (match.entity.empty()) return literal(context, match);
-  if (match.mode == ContactMode::kSubtree) {  // a literal name, as in mjlab
+  if (policy == ContactPolicy::kEach) return matches(context, match);
+  if (!match.entity.empty() &&
+      match.mode == ContactMode::kSubtree) {  // a literal name, as in mjlab
     const std::vector<ContactObject> all = of_entity(context, match);
     std::vector<ContactObject> result;
     for (const ContactObject& o : all) {
@@ -189,7 +200,7 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
     drop_excluded(context, match, result);
     return result;
   }
-  std::vector<ContactObject> result = by_regex(context, match);
+  std::vector<ContactObject> result = matches(context, match);
   if (result.size() > 1 && policy == ContactPolicy::kError) {
     throw ValueError(fmt::format("{}: '{}' matches {} names: {}", context, match.pattern[0],
                                  result.size(),

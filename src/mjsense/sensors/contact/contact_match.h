@@ -25,8 +25,8 @@ constexpr std::array<std::string_view, 4> enum_names(ContactPolicy) {
 }
 
 // With an entity, each pattern is a regular expression (Python's syntax) for the whole local name,
-// and the result is in model order. Without one, patterns are full MuJoCo names, in the given
-// order.
+// and the result is in model order. Without one, patterns are full MuJoCo names or regular
+// expressions for them, and the result is in the order of the patterns.
 struct ContactMatch {
   NamedEnum<ContactMode> mode;
   std::vector<std::string> pattern;
@@ -40,13 +40,14 @@ void visit_fields(V& v, ContactMatch& c) {
       .required();
   v("pattern", c.pattern,
     "With an entity: regular expressions that must match a whole local name. Without: full MuJoCo "
-    "names, taken literally. Each pattern must match something, and no element may be matched "
-    "twice.")
+    "names; a pattern that is none and has a special character, such as ``*`` or ``[``, is a "
+    "regular expression that must match a whole full name. Each pattern must match something, and "
+    "no element may be matched twice.")
       .required()
       .or_one();
   v("entity", c.entity, "Entity that contains the elements.").or_none();
   v("exclude", c.exclude,
-    "With an entity: names to leave out; an entry with any of ``.*+?[]{}()\\|^$`` is a regular "
+    "Names to leave out; an entry with a special character, such as ``*`` or ``[``, is a regular "
     "expression that is searched for.");
 }
 
@@ -82,8 +83,10 @@ class ContactNames {
     int parent;  // of a body; -1 for a geom
   };
   std::vector<ContactObject> of_entity(std::string_view context, const ContactMatch& match) const;
-  std::vector<ContactObject> literal(std::string_view context, const ContactMatch& match) const;
+  std::vector<ContactObject> by_full_name(std::string_view context,
+                                          const ContactMatch& match) const;
   std::vector<ContactObject> by_regex(std::string_view context, const ContactMatch& match) const;
+  std::vector<ContactObject> matches(std::string_view context, const ContactMatch& match) const;
   const std::vector<Element>& elements(const ContactMatch& match) const;
   bool in_terrain(int body) const;
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 
 namespace mjsense::sensors {
@@ -111,21 +112,11 @@ std::string mujoco_sensors(const ContactSensorCfg& cfg) {
 }
 
 struct Model {
-  mjModel* m = nullptr;
-  mjData* d = nullptr;
-  explicit Model(const std::string& xml) {
-    char error[1000] = "";
-    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
-    EXPECT_TRUE(spec) << error;
-    m = mj_compile(spec, nullptr);
-    EXPECT_TRUE(m) << mjs_getError(spec);
-    mj_deleteSpec(spec);
-    d = mj_makeData(m);
-  }
-  ~Model() {
-    mj_deleteData(d);
-    mj_deleteModel(m);
-  }
+  explicit Model(const std::string& xml) : model(compile_mjcf(xml)), data(make_data(model.get())) {}
+  ModelPtr model;
+  DataPtr data;
+  mjModel* m = model.get();
+  mjData* d = data.get();
 };
 
 std::unique_ptr<ContactSensor> make_sensor(const ContactSensorCfg& cfg, const mjModel* m,

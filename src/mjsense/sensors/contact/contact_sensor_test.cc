@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
@@ -278,6 +279,24 @@ TEST(Contact, ContactInBothDirectionsIsInBothPairs) {
   EXPECT_EQ(force[0], lab.read("force", "net")[0]);
 }
 
+TEST(Contact, WithoutAnEntityPatternsAreFullNamesOrRegularExpressions) {
+  const auto cfg = [](std::string name, std::vector<std::string> pattern,
+                      std::vector<std::string> exclude) {
+    ContactSensorCfg c;
+    c.name = std::move(name);
+    c.primary = {"geom", std::move(pattern), "", std::move(exclude)};
+    return c;
+  };
+  Lab lab("bot", kFeet,
+          {cfg("names", {"bot/R", "bot/L"}, {}), cfg("regex", {"bot/[LR]"}, {}),
+           cfg("exclude", {"bot/.*"}, {"bot/L", "geom_."})});
+  EXPECT_THAT(lab.sensor("names").primary_names(), ElementsAre("bot/R", "bot/L"));
+  EXPECT_THAT(lab.sensor("regex").primary_names(), ElementsAre("bot/L", "bot/R"));
+  EXPECT_THAT(lab.sensor("exclude").primary_names(), ElementsAre("bot/R"));
+  EXPECT_THROW(Lab("bot", kFeet, {cfg("none", {"foot.*"}, {})}), ValueError);
+  EXPECT_THROW(Lab("bot", kFeet, {cfg("twice", {"bot/L", "bot/[LR]"}, {})}), ValueError);
+}
+
 TEST(Contact, ExcludeRemovesSecondaries) {
   ContactSensorCfg each = feet_cfg("each", "geom", {".*"}),
                    first = feet_cfg("first", "geom", {".*"});
@@ -367,12 +386,7 @@ TEST(Contact, InvalidConfigurationsAreRefusedAtBuild) {
   const auto message = [](auto change) -> std::string {
     ContactSensorCfg cfg = box_cfg();
     change(cfg);
-    try {
-      cfg.build();
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { cfg.build(); });
   };
   using Cfg = ContactSensorCfg;
   const std::string context = "sensor '" + box_cfg().name + "': ";
@@ -394,12 +408,7 @@ TEST(Contact, InvalidConfigurationsAreRefusedAtBuild) {
 
 TEST(Contact, ErrorsNameSensorAndNearest) {
   const auto message = [](ContactSensorCfg cfg) -> std::string {
-    try {
-      Lab lab("box", kBox, {std::move(cfg)});
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { Lab lab("box", kBox, {std::move(cfg)}); });
   };
   EXPECT_THAT(message(box_cfg("BOX_GEOM")), HasSubstr("Not all regular expressions are matched"));
   ContactSensorCfg c = box_cfg();

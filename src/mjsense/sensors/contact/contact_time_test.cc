@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 
 namespace mjsense::sensors {
@@ -118,12 +119,10 @@ void check(const Replayed& r, const std::vector<Sample>& samples, const Phases* 
 }
 
 TEST(ContactTime, ExactReplayOf100000Substeps) {
-  char error[500] = "";
-  mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
-  ASSERT_TRUE(spec) << error;
-  mjModel* m = mj_compile(spec, nullptr);
-  mj_deleteSpec(spec);
-  mjData* d = mj_makeData(m);
+  const ModelPtr model = compile_mjcf(kBalls);
+  const DataPtr data = make_data(model.get());
+  const mjModel* m = model.get();
+  mjData* d = data.get();
   mj_forward(m, d);
   std::vector<Replayed> sensors;
   for (int decimation : {1, 3, 4, 10, 20}) {
@@ -168,16 +167,13 @@ TEST(ContactTime, ExactReplayOf100000Substeps) {
   // The test covers enough: many contacts, some of a single substep, compared at every decimation.
   EXPECT_GT(touchdowns[0][0] + touchdowns[0][1], 1000);
   EXPECT_GT(single, 0);
-  mj_deleteData(d);
-  mj_deleteModel(m);
 }
 
 TEST(ContactTime, StartInContactIsNotATouchdownAndResetClears) {
-  char error[500] = "";
-  mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
-  mjModel* m = mj_compile(spec, nullptr);
-  mj_deleteSpec(spec);
-  mjData* d = mj_makeData(m);
+  const ModelPtr model = compile_mjcf(kBalls);
+  const DataPtr data = make_data(model.get());
+  const mjModel* m = model.get();
+  mjData* d = data.get();
   d->qpos[1] = -0.001;
   mj_forward(m, d);
   auto s = make_sensor(m, 4);
@@ -192,18 +188,15 @@ TEST(ContactTime, StartInContactIsNotATouchdownAndResetClears) {
     for (float x : s->field(name).data.row<float>(0)) EXPECT_EQ(x, 0) << name;
   }
   EXPECT_EQ(s->field("first_touch_time").data.row<float>(0)[1], -1);
-  mj_deleteData(d);
-  mj_deleteModel(m);
 }
 
 // Phases begin with the first substep of an episode, whatever the state at the reset, because a
 // pose is often written after it. mjlab's timers do the same.
 TEST(ContactTime, FirstSubstepAfterAResetIsNotAnEvent) {
-  char error[500] = "";
-  mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
-  mjModel* m = mj_compile(spec, nullptr);
-  mj_deleteSpec(spec);
-  mjData* d = mj_makeData(m);
+  const ModelPtr model = compile_mjcf(kBalls);
+  const DataPtr data = make_data(model.get());
+  const mjModel* m = model.get();
+  mjData* d = data.get();
   auto s = make_sensor(m, 1);
   const auto flag = [&](const char* name, int p) { return s->field(name).data.row<bool>(0)[p]; };
   const auto touch = [&](bool a, bool b) {
@@ -233,8 +226,6 @@ TEST(ContactTime, FirstSubstepAfterAResetIsNotAnEvent) {
     EXPECT_FLOAT_EQ(s->field("last_contact_time").data.row<float>(0)[0], 0.004f);
     EXPECT_FLOAT_EQ(s->field("last_air_time").data.row<float>(0)[1], 0.004f);
   }
-  mj_deleteData(d);
-  mj_deleteModel(m);
 }
 
 }  // namespace

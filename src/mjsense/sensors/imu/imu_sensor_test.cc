@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/effects/timing.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
@@ -172,12 +173,7 @@ TEST(Imu, CrossAxisSensitivityMixesAxes) {
 
 TEST(Imu, ErrorsNameSiteAndPreset) {
   const auto message = [](const ImuSensorCfg& cfg) -> std::string {
-    try {
-      make_scene(cfg);
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { make_scene(cfg); });
   };
   EXPECT_THAT(message(imu("mpu6500")), HasSubstr("did you mean 'mpu6050'?"));
   ImuSensorCfg cfg = imu("ideal");

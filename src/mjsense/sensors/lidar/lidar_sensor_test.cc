@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/lidar/npy.h"
@@ -274,12 +275,7 @@ TEST(Lidar, ErrorsNameTheSetting) {
   const auto with = [](auto change) -> std::string {
     Lab lab;
     change(*lab.cfg);
-    try {
-      lab.start();
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { lab.start(); });
   };
   using Cfg = LidarSensorCfg;
   EXPECT_THAT(with([](Cfg& c) { c.dropout = 2; }), HasSubstr("sensor 'lidar': dropout is 2"));

@@ -142,6 +142,7 @@ void RayCastSensor::substep(const World& world) { remember(world); }
 void RayCastSensor::reset(const World& world) {
   if (history_.empty()) return;
   for (int f = 0; f < num_frames(); ++f) history_.clear(world.id * num_frames() + f);
+  remember(world);
 }
 
 void RayCastSensor::compute(const World& world) {

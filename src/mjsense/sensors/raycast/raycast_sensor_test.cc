@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
@@ -81,26 +83,12 @@ struct Lab {
   }
 };
 
-std::string error_of(const std::shared_ptr<RayCastSensorCfg>& cfg) {
-  try {
-    Lab lab({cfg});
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
-}
-
 // Errors that do not depend on the model are found by build().
 TEST(RayCast, InvalidConfigurationsAreRefusedAtBuild) {
   const auto message = [](auto change) -> std::string {
     const auto cfg = sensor_cfg<RayCastSensorCfg>();
     change(*cfg);
-    try {
-      cfg->build();
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "";
+    return error_of([&] { cfg->build(); });
   };
   using Cfg = RayCastSensorCfg;
   EXPECT_EQ(message([](Cfg&) {}), "");
@@ -311,7 +299,7 @@ TEST(RayCast, HeightScansOnGeneratedTerrain) {
   auto& sensor = dynamic_cast<RayCastSensor&>(scene->sensor("ray"));
   const std::vector<double> origins = scene->env_origins(kWorlds);
   const ArrayView qpos = sim.worlds().state_component("qpos");
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(m), mj_deleteData);
+  const DataPtr data = make_data(m);
   mj_forward(m, data.get());
   Rng rng(1, 0, 0, 0);
   long wrong = 0, rays = 0;
@@ -366,7 +354,7 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
   const auto with = [](auto change) {
     auto cfg = sensor_cfg<RayCastSensorCfg>();
     change(*cfg);
-    return error_of(cfg);
+    return error_of([&] { Lab lab({cfg}); });
   };
   using Cfg = RayCastSensorCfg;
   EXPECT_THAT(

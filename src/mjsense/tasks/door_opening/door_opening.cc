@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/robots/finger_grasp.h"
+#include "mjsense/robots/robot_sensors.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/robot_floor.h"
@@ -100,7 +101,7 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng,
                     rng.uniform(-kAside, kAside) * along;
     const double yaw = std::atan2(-away.y, -away.x) + rng.uniform(-kTurned, kTurned);
     if (!footprint_->fits(*floor_, at.x, at.y, yaw, 0.08)) continue;
-    return Pose{{at.x, at.y, placed.p.z}, axis_angle({0, 0, 1}, yaw)};
+    return scenes::BasePose{at.x, at.y, yaw}.at_height(placed.p.z);
   }
   episode.push = dot(placed.p - side.middle, side.direction) < 0;
   return placed;
@@ -157,11 +158,10 @@ episode::Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {
 }
 
 void DoorOpeningTask::write_info(const World& world, JsonWriter& json) const {
-  bool grasped = false;
-  for (const robots::MoveGroup& group : robot().groups()) {
-    if (group.kind == robots::GroupKind::kGripper)
-      grasped = grasped || robots::fingers_touch(world, group, door(world.id).handle);
-  }
+  const bool grasped =
+      std::ranges::any_of(robots::grippers_of(robot()), [&](const robots::MoveGroup* gripper) {
+        return robots::fingers_touch(world, *gripper, door(world.id).handle);
+      });
   const double open = fraction(world);
   json.key("handle_grasped").value(grasped);
   json.key("joint_position").value(open);

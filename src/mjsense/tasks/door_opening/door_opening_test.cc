@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
@@ -138,8 +140,7 @@ TEST(DoorOpening, ObjectPosesAreMatricesInTheBaseFrame) {
       const auto& matrix = poses[name];
       ASSERT_EQ(matrix.size(), 4u) << name;
       EXPECT_EQ(matrix[3], nlohmann::json({0, 0, 0, 1}));
-      const Pose in_base =
-          inverse(base) * Pose{vec3(p.data->xpos + 3 * body), quat(p.data->xquat + 4 * body)};
+      const Pose in_base = inverse(base) * body_pose(p.data.get(), body);
       const Vec3 axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
       for (int i = 0; i < 3; ++i) {
         EXPECT_NEAR(matrix[i][3].get<double>(), in_base.p[i], 1e-9) << name;
@@ -166,12 +167,8 @@ TEST(DoorOpening, TheSuiteHasEachToolPoseOnce) {
 TEST(DoorOpening, SceneWithoutADoorIsRejected) {
   DoorOpeningTask task(episode::task_cfg("rby1", "table"));
   scene::Scene scene(task.scene_cfg_with_robot());
-  try {
-    task.initialize(scene.model(), 1);
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("scene 'table' has no door"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] { task.initialize(scene.model(), 1); }),
+              HasSubstr("scene 'table' has no door"));
 }
 
 }  // namespace

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/observe/function_sensor.h"
-#include "mjsense/observe/pose_sensor.h"
 #include "mjsense/observe/suite.h"
-#include "mjsense/robots/finger_grasp.h"
-#include "mjsense/scene/resolve.h"
+#include "mjsense/robots/robot_sensors.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
 
 namespace mjsense::tasks {
@@ -21,10 +19,6 @@ int handle_geom(const mjModel* m, int handle) {
     if (fallback < 0) fallback = g;
   }
   return fallback;
-}
-
-std::string side_of(const robots::MoveGroup& gripper) {
-  return gripper.name.substr(0, gripper.name.find('_'));
 }
 
 }  // namespace
@@ -55,17 +49,11 @@ std::shared_ptr<Sensor> door_state_sensor(const DoorOpeningTask& task) {
 
 std::vector<std::shared_ptr<Sensor>> DoorOpeningTask::create_task_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors{door_state_sensor(*this)};
-  int grippers = 0;
-  for (const robots::MoveGroup& group : robot().groups())
-    grippers += group.kind == robots::GroupKind::kGripper ? 1 : 0;
-  for (const robots::MoveGroup& group : robot().groups()) {
-    if (group.kind != robots::GroupKind::kGripper || grippers < 2) continue;
-    sensors.push_back(std::make_shared<observe::PoseSensor>(
-        side_of(group) + "_tcp_pose",
-        observe::PoseSensor::Ref{"site", scene::name_of(model(), mjOBJ_SITE, group.leaf_site)},
-        observe::PoseSensor::Ref{"body", scene::name_of(model(), mjOBJ_BODY, robot().base_body())},
-        "Pose of the point between the finger tips in the robot's base frame, whose origin is on "
-        "the floor."));
+  const std::vector<const robots::MoveGroup*> grippers = robots::grippers_of(robot());
+  for (const robots::MoveGroup* gripper : grippers) {
+    if (grippers.size() > 1)
+      sensors.push_back(robots::tool_pose_sensor(model(), robot(), *gripper,
+                                                 robots::side_of(*gripper) + "_tcp_pose"));
   }
   if (auto grasped = episode::grasp_state_sensor(*this, std::string(kRole)))
     sensors.push_back(std::move(grasped));
@@ -79,10 +67,9 @@ std::vector<std::shared_ptr<Sensor>> DoorOpeningTask::create_task_sensors() cons
 // Removes tcp_pose_<side>: door recordings hold the same pose as <side>_tcp_pose.
 void DoorOpeningTask::edit_suite(observe::SensorSuite& suite) const {
   std::vector<std::string> names = suite.names();
-  for (const robots::MoveGroup& group : robot().groups()) {
-    const std::string side = side_of(group);
-    if (group.kind == robots::GroupKind::kGripper && suite.find(side + "_tcp_pose"))
-      std::erase(names, "tcp_pose_" + side);
+  for (const robots::MoveGroup* gripper : robots::grippers_of(robot())) {
+    const std::string side = robots::side_of(*gripper);
+    if (suite.find(side + "_tcp_pose")) std::erase(names, "tcp_pose_" + side);
   }
   suite.select(names);
 }

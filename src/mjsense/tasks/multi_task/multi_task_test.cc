@@ -8,6 +8,8 @@
 #include <set>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/text/json.h"
 #include "mjsense/episode/policy.h"
 #include "mjsense/robots/load_robot.h"
@@ -21,10 +23,6 @@ namespace mjsense::tasks {
 namespace {
 
 using testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 episode::TaskCfg cfg(const std::string& scene) {
   episode::TaskCfg cfg;
@@ -46,7 +44,7 @@ TEST(MultiTask, AnySuccessCountsAndTheRewardIsTheMaximum) {
   scene::Scene scene(task->scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task->initialize(model, 2);
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  const DataPtr data = make_data(model);
   for (int world = 0; world < 2; ++world) {
     mj_resetData(model, data.get());
     task->sample(world, 4, robots::state_row(data.get()));
@@ -107,7 +105,7 @@ TEST(MultiTask, ChildrenShareRobotPolicyAndEpisode) {
   EXPECT_EQ(policy.of, task.get());
   EXPECT_THROW(task->child(1).register_policy(other), ValueError);
 
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+  const DataPtr data = make_data(scene.model());
   const robots::StateRow state = robots::state_row(data.get());
   task->reseed(5);
   task->sample(0, 7, state);
@@ -144,7 +142,7 @@ TEST(MultiTask, CombinesRolesSensorsAndLacks) {
   for (const auto& sensor : task->create_task_sensors()) sensors.push_back(sensor->name());
   EXPECT_EQ(sensors, expected);
   EXPECT_EQ(task->grasp_scene(), task->child(1).grasp_scene());
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+  const DataPtr data = make_data(scene.model());
   task->sample(0, 1, robots::state_row(data.get()));
   mj_forward(scene.model(), data.get());
   task->begin({.id = 0, .model = scene.model(), .data = data.get()});
@@ -166,7 +164,7 @@ TEST(MultiTask, FirstTaskSamplesTheSameEpisodeAsAlone) {
     }
     scene::Scene scene(task->scene_cfg_with_robot());
     task->initialize(scene.model(), 1);
-    const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+    const DataPtr data = make_data(scene.model());
     task->sample(0, 3, robots::state_row(data.get()));
     starts.emplace_back(data->qpos, data->qpos + scene.model()->nq);
   }
@@ -181,7 +179,7 @@ TEST(MultiTask, OtherTasksChooseGoalsInTheSceneOfTheFirst) {
   scene::Scene scene(task.scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task.initialize(model, 1);
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  const DataPtr data = make_data(model);
   std::set<int> bodies;
   for (int episode = 0; episode < 10; ++episode) {
     mj_resetData(model, data.get());
@@ -201,7 +199,7 @@ TEST(MultiTask, NavAndPickConcernsOneObjectAndSucceedsIfItIsPicked) {
   scene::Scene scene(task.scene_cfg_with_robot());
   const mjModel* model = scene.model();
   task.initialize(model, 1);
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  const DataPtr data = make_data(model);
   const World w{.id = 0, .model = model, .data = data.get()};
   std::set<int> bodies;
   for (int episode = 0; episode < 4; ++episode) {
@@ -229,12 +227,8 @@ TEST(MultiTask, NavAndPickConcernsOneObjectAndSucceedsIfItIsPicked) {
 
 TEST(MultiTask, InvalidCombinationsThrow) {
   const auto message = [](std::vector<std::unique_ptr<episode::Task>> children) -> std::string {
-    try {
-      MultiTask task("multi_task", cfg("floor"), std::move(children));
-    } catch (const ValueError& e) {
-      return e.what();
-    }
-    return "";
+    return error_of<ValueError>(
+        [&] { MultiTask task("multi_task", cfg("floor"), std::move(children)); });
   };
   std::vector<std::unique_ptr<episode::Task>> one, two;
   one.push_back(std::make_unique<PickTask>(cfg("floor")));
@@ -251,13 +245,9 @@ TEST(MultiTask, TaskThatChangesTheSceneMustBeFirst) {
   MultiTask task("pick+open", cfg("kitchen"), std::move(children));
   scene::Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
-  try {
-    task.sample(0, 0, robots::state_row(data.get()));
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("task 'open' cannot choose its goal"));
-  }
+  const DataPtr data = make_data(scene.model());
+  EXPECT_THAT(error_of<ValueError>([&] { task.sample(0, 0, robots::state_row(data.get())); }),
+              HasSubstr("task 'open' cannot choose its goal"));
 }
 
 }  // namespace

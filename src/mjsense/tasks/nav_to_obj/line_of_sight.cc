@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 
 namespace mjsense::tasks {
@@ -14,13 +15,11 @@ LineOfSight::LineOfSight(const mjModel* model, int camera, int width, int height
   tan_x = tan_y * width / height;
 }
 
-Pose LineOfSight::pose(const mjData* data) const {
-  return pose_from_mat(data->cam_xpos + 3 * camera, data->cam_xmat + 9 * camera);
-}
+Pose LineOfSight::pose(const mjData* data) const { return camera_pose(data, camera); }
 
 bool LineOfSight::sees(const mjModel* m, const mjData* d, const Pose& from, int body,
                        std::span<const Vec3> points) const {
-  const Pose object{vec3(d->xpos + 3 * body), quat(d->xquat + 4 * body)};
+  const Pose object = body_pose(d, body);
   const Pose to_camera = inverse(from);
   constexpr mjtByte kDrawn[mjNGROUP] = {1, 1, 1, 0, 0, 0};
   double eye[3];

@@ -7,6 +7,8 @@
 #include <memory>
 #include <numbers>
 
+#include "mjsense/core/testing/test_model.h"
+
 namespace mjsense::tasks {
 namespace {
 
@@ -15,18 +17,6 @@ constexpr double kDeg = std::numbers::pi / 180;
 // A camera at the origin that looks along x with z up, a vertical field of view of 60 degrees, a
 // 4:3 image, and a ball 2 m away.
 struct Sighting : testing::Test {
-  Sighting() {
-    mjSpec* spec = mj_parseXMLString(R"(<mujoco><worldbody>
-      <camera name="eye" fovy="60" xyaxes="0 -1 0 0 0 1"/>
-      <body name="ball"><freejoint/><geom size=".05"/></body>
-      <body name="screen" pos="0 0 -9"><freejoint/><geom type="box" size=".01 .2 .2"/></body>
-      </worldbody></mujoco>)",
-                                     nullptr, nullptr, 0);
-    model.reset(mj_compile(spec, nullptr));
-    mj_deleteSpec(spec);
-    data.reset(mj_makeData(model.get()));
-    sight = LineOfSight(model.get(), 0, 4, 3);
-  }
   // Moves the ball to this direction: degrees to the left of and above the camera's axis.
   bool sees(double left, double up) {
     return sees_at({2, 2 * std::tan(left * kDeg), 2 * std::tan(up * kDeg)});
@@ -37,9 +27,13 @@ struct Sighting : testing::Test {
     const Vec3 middle[] = {{0, 0, 0}};
     return sight.sees(model.get(), data.get(), sight.pose(data.get()), 1, middle);
   }
-  std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model{nullptr, mj_deleteModel};
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
-  LineOfSight sight;
+  ModelPtr model = compile_mjcf(R"(<mujoco><worldbody>
+      <camera name="eye" fovy="60" xyaxes="0 -1 0 0 0 1"/>
+      <body name="ball"><freejoint/><geom size=".05"/></body>
+      <body name="screen" pos="0 0 -9"><freejoint/><geom type="box" size=".01 .2 .2"/></body>
+      </worldbody></mujoco>)");
+  DataPtr data = make_data(model.get());
+  LineOfSight sight{model.get(), 0, 4, 3};
 };
 
 TEST_F(Sighting, EndsAtEveryBorderOfTheImage) {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/object_references.h"
@@ -122,8 +123,7 @@ std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const robots
 // A base placement from which a path leads to the target; nullopt if none is found.
 std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed,
                                               const robots::StateRow& state, Rng& rng) const {
-  const double* at =
-      state.qpos + model()->jnt_qposadr[model()->body_jntadr[this->object(world).body]];
+  const double* at = state.qpos + free_qpos(model(), this->object(world).body);
   const auto distance = [at](double x, double y) { return std::hypot(x - at[0], y - at[1]); };
   for (int attempt = 0; attempt < kStarts && !places_.empty(); ++attempt) {
     const auto [x, y] = places_[rng.below(static_cast<std::uint32_t>(places_.size()))];
@@ -133,7 +133,7 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed,
     const auto path = routes_->find(
         from, [&](const scenes::BasePose& p) { return distance(p.x, p.y) < arrived_; },
         [&](double px, double py) { return std::max(0.0, distance(px, py) - arrived_); });
-    if (!path.empty()) return Pose{{x, y, placed.p.z}, axis_angle({0, 0, 1}, from.yaw)};
+    if (!path.empty()) return from.at_height(placed.p.z);
   }
   return {};
 }
@@ -149,16 +149,13 @@ std::string NavToObjTask::start_error(const World& world) const {
         context(), object(world.id).name);
   if (!routes_) return "";
   const Pose base = robot().base_pose(world), camera = inverse(base) * camera_pose(world);
-  const Vec3 ahead = rotate(base.q, {1, 0, 0});
   const auto seen = [&](const scenes::BasePose& p) {
-    const Pose there{{p.x, p.y, base.p.z}, axis_angle({0, 0, 1}, p.yaw)};
-    return distance(world, p.x, p.y) < kNearby && sees(world, there * camera);
+    return distance(world, p.x, p.y) < kNearby && sees(world, p.at_height(base.p.z) * camera);
   };
   const auto left = [&](double x, double y) {
     return std::max(0.0, distance(world, x, y) - kNearby);
   };
-  if (!routes_->find({base.p.x, base.p.y, std::atan2(ahead.y, ahead.x)}, seen, left).empty())
-    return "";
+  if (!routes_->find(scenes::BasePose::of(base), seen, left).empty()) return "";
   return fmt::format(
       "task '{}': robot '{}' cannot see the {} in scene '{}' from any base pose that it can reach",
       name(), robot().name(), object(world.id).name, scene().cfg().name);

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
@@ -41,21 +42,13 @@ std::string lower(std::string text) {
   return text;
 }
 
-struct Box {
-  Vec3 low{1e10, 1e10, 1e10}, high{-1e10, -1e10, -1e10};
-  void add(Vec3 p) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-};
-
 // A geom that moves with the joint, as a box in the frame of the joint's body.
 struct Part {
   int geom;
   Pose pose;  // pose of the box
   Vec3 half;
   bool named;  // its name contains "handle" or "knob"
-  Box box;     // bounding box along the body's axes
+  Aabb box;    // bounding box along the body's axes
 };
 
 // Pose of `body` in the frame of `root`; nullopt if there is a joint between them.
@@ -63,7 +56,7 @@ std::optional<Pose> rigid_pose(const mjModel* m, int body, int root) {
   Pose pose;
   for (; body != root; body = m->body_parentid[body]) {
     if (m->body_jntnum[body] > 0) return {};
-    pose = Pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)} * pose;
+    pose = body_frame(m, body) * pose;
   }
   return pose;
 }
@@ -71,25 +64,17 @@ std::optional<Pose> rigid_pose(const mjModel* m, int body, int root) {
 std::vector<Part> parts_of(const mjModel* m, int root) {
   std::vector<Part> parts;
   for (int g = 0; g < m->ngeom; ++g) {
-    if (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0) continue;
+    if (!is_solid(m, g)) continue;
     const int body = m->geom_bodyid[g];
     if (!observe::is_descendant_or_self(m, body, root)) continue;
     const std::optional<Pose> pose = rigid_pose(m, body, root);
     if (!pose) continue;
     const double* aabb = m->geom_aabb + 6 * g;
-    Part part{
-        g,
-        *pose * Pose{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)} * Pose{vec3(aabb), {}},
-        vec3(aabb + 3),
-        false,
-        {}};
+    Part part{g, *pose * geom_frame(m, g) * Pose{vec3(aabb), {}}, vec3(aabb + 3), false, {}};
     const std::string name = lower(scene::name_of(m, mjOBJ_GEOM, g) + " " +
                                    (body == root ? "" : scene::name_of(m, mjOBJ_BODY, body)));
     part.named = name.find("handle") != name.npos || name.find("knob") != name.npos;
-    for (int corner = 0; corner < 8; ++corner)
-      part.box.add(part.pose * Vec3{corner & 1 ? part.half.x : -part.half.x,
-                                    corner & 2 ? part.half.y : -part.half.y,
-                                    corner & 4 ? part.half.z : -part.half.z});
+    for (Vec3 corner : box_corners({}, part.half)) part.box.add(part.pose * corner);
     parts.push_back(part);
   }
   return parts;

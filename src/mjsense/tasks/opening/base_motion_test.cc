@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/tasks/opening/opening.h"
@@ -62,8 +63,7 @@ TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
   OpeningTask task(cfg, OpeningKind::kOpen);
   const scene::Scene scene(task.scene_cfg_with_robot());
   task.initialize(scene.model(), 1);
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(scene.model()),
-                                                               mj_deleteData);
+  const DataPtr data = make_data(scene.model());
   mj_resetData(scene.model(), data.get());
   const robots::Robot& robot = task.robot();
   const HandleReach& reach = task.reach();
@@ -89,13 +89,13 @@ TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
   const robots::RobotValues& end = path->motion_joints.back();
   const auto at = end[reach.base()].values;
   const Pose base{{at[0], at[1], places.at[0].p.z}, axis_angle({0, 0, 1}, at[2])};
-  const Pose tool = base * robot.fk(path->hand.arm, end);
+  const Pose tool = base * robot.fk(path->hand.tool, end);
   EXPECT_LT(norm(tool.p - last.p), 2e-4);
   EXPECT_LT(angle_between(tool.q, last.q), 2e-4);
   EXPECT_GT(norm(base.p - places.at[0].p), 0.1);
   // In MuJoCo's contacts, only the gripper touches something, and only the door is touched.
   mju_copy(data->qpos, there.qpos.data(), scene.model()->nq);
-  for (int group : {path->hand.arm, reach.base()}) {
+  for (int group : {path->hand.tool, reach.base()}) {
     for (std::size_t i = 0; i < robot.groups()[group].qpos.size(); ++i)
       data->qpos[robot.groups()[group].qpos[i]] = end[group].values[i];
   }
@@ -125,8 +125,7 @@ TEST(Opening, OpenedFractionDependsOnTheRobot) {
     OpeningTask task(cfg, OpeningKind::kOpen);
     const scene::Scene scene(task.scene_cfg_with_robot());
     task.initialize(scene.model(), 1);
-    const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(scene.model()),
-                                                                 mj_deleteData);
+    const DataPtr data = make_data(scene.model());
     task.sample(0, 0, robots::state_row(data.get()));
     mj_forward(scene.model(), data.get());
     const World world{.id = 0, .model = scene.model(), .data = data.get()};

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "mjsense/robots/start_positions.h"
+
 namespace mjsense::tasks {
 
 BaseSearch::BaseSearch(const robots::Robot& robot, const HandleReach& reach,
@@ -19,17 +21,14 @@ HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pos
                              mocap ? out.mocap_quat.data() : nullptr};
   Rng none(0, 0, 0, 0);
   robot_.write_start(row, base, none);
-  for (std::size_t g = 0; g < robot_.groups().size(); ++g) {
-    const std::vector<double>& init = robot_.cfg().groups[g].init;
-    for (std::size_t i = 0; i < init.size(); ++i) out.qpos[robot_.groups()[g].qpos[i]] = init[i];
-  }
+  robots::write_start_positions(robot_, out.qpos.data());
   return out;
 }
 
 // For a floating gripper: in front of the handle, oriented as for a grasp.
 Pose BaseSearch::before(const Pose& body, const Articulation& one, double distance, double aside,
                         double turn) const {
-  const ArmAndHand& hand = reach_.hands()[0];
+  const OrientedHand& hand = reach_.hands()[0];
   const double opening = robot_.groups()[hand.gripper].max_opening;
   const std::vector<HandleGrasp> grasps = propose_handle_grasps(one.handle, body, opening);
   if (grasps.empty()) return usual_;

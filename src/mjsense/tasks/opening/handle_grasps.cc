@@ -7,8 +7,7 @@
 #include <memory>
 #include <numbers>
 
-#include "mjsense/core/mujoco_call.h"
-#include "mjsense/observe/frame.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense::tasks {
@@ -23,21 +22,16 @@ constexpr double kSideGap = 0.004;  // m, clearance between the pads and the han
 // the open pads in the tool frame.
 Quat closing_turn(const robots::MoveGroup& gripper, const mjModel* model) {
   if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(call_mujoco(mj_makeData, model),
-                                                        mj_deleteData);
-  for (std::size_t i = 0; i < gripper.qpos.size();
-       ++i) {  // open: the end of the range with the larger opening
+  const DataPtr data = make_data(model);
+  // Open: the end of the range with the larger opening.
+  for (std::size_t i = 0; i < gripper.qpos.size(); ++i) {
     const int joint = gripper.joints[std::min(i, gripper.joints.size() - 1)];
     const double low = model->jnt_range[2 * joint], high = model->jnt_range[2 * joint + 1];
     if (model->jnt_type[joint] == mjJNT_SLIDE && model->jnt_limited[joint])
       data->qpos[gripper.qpos[i]] = std::abs(low) > std::abs(high) ? low : high;
   }
   mj_kinematics(model, data.get());
-  const Pose tool = pose_from_mat(data->site_xpos + 3 * gripper.leaf_site,
-                                  data->site_xmat + 9 * gripper.leaf_site);
-  const Vec3 apart =
-      rotate(conjugate(tool.q), vec3(data->site_xpos + 3 * gripper.pad_sites[1]) -
-                                    vec3(data->site_xpos + 3 * gripper.pad_sites[0]));
+  const Vec3 apart = robots::between_pads(data.get(), gripper);
   if (std::hypot(apart.x, apart.y) < 1e-4) return {};
   const double angle = 0.5 * std::numbers::pi - std::atan2(apart.y, apart.x);
   // Only 0 or 90 degrees: pads that are slightly off-center must not rotate the frame.
@@ -47,23 +41,10 @@ Quat closing_turn(const robots::MoveGroup& gripper, const mjModel* model) {
 
 }  // namespace
 
-std::vector<ArmAndHand> arms_with_hands(const robots::Robot& robot, const mjModel* model) {
-  std::vector<ArmAndHand> hands;
-  const auto groups = robot.groups();
-  const bool floats = std::ranges::any_of(groups, [](const robots::MoveGroup& group) {
-    return group.kind == robots::GroupKind::kBase && group.command_size == 7;
-  });
-  for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
-    if (groups[g].kind != robots::GroupKind::kGripper || groups[g].leaf_site < 0) continue;
-    bool on_arm = false;
-    for (int a = 0; a < static_cast<int>(groups.size()) && !on_arm; ++a) {
-      if (groups[a].kind != robots::GroupKind::kArm || groups[a].leaf_site < 0) continue;
-      on_arm = groups[a].leaf_site == groups[g].leaf_site ||
-               observe::is_descendant_or_self(model, groups[g].root_body, groups[a].root_body);
-      if (on_arm) hands.push_back({a, g, closing_turn(groups[g], model)});
-    }
-    if (!on_arm && floats) hands.push_back({g, g, closing_turn(groups[g], model)});
-  }
+std::vector<OrientedHand> oriented_hands(const robots::Robot& robot, const mjModel* model) {
+  std::vector<OrientedHand> hands;
+  for (const robots::Hand& hand : robots::hands_of(robot, model))
+    hands.push_back({hand, closing_turn(robot.groups()[hand.gripper], model)});
   return hands;
 }
 

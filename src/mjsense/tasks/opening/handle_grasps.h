@@ -6,20 +6,16 @@
 
 #include <vector>
 
-#include "mjsense/robots/robot.h"
+#include "mjsense/robots/hands.h"
 #include "mjsense/tasks/opening/articulation.h"
 
 namespace mjsense::tasks {
 
-// Move groups of an arm and its gripper. A floating gripper is both (arm == gripper).
-struct ArmAndHand {
-  int arm = -1, gripper = -1;
+struct OrientedHand : robots::Hand {
   Quat turn;  // from a tool frame whose fingers close along y to the gripper's own tool frame
-  bool floats() const { return arm == gripper; }
 };
-// All pairs in which the gripper is attached to the arm, and all floating grippers, in the robot's
-// order.
-std::vector<ArmAndHand> arms_with_hands(const robots::Robot& robot, const mjModel* model);
+// The hands of a robot, in its order.
+std::vector<OrientedHand> oriented_hands(const robots::Robot& robot, const mjModel* model);
 
 // Tool pose for grasping a handle: z is the approach direction, y the closing direction, and the
 // origin lies between the finger tips.

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/robots/start_positions.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/robot_floor.h"
 
@@ -13,18 +15,24 @@ namespace mjsense::tasks {
 namespace {
 
 constexpr int kOfRobot = 1 << 30;  // contact bit of the robot's geoms
-constexpr double kBuiltSo =
-    0.002;  // m, links closer than this at the initial pose are exempt from checks
+// m, links closer than this at the initial pose are exempt from checks
+constexpr double kTouching = 0.002;
 constexpr double kUnder = 0.7;  // minimum |z| of the normal of a contact with the ground
+
+void write_start(mjData* data, const HandleReach::Start& start) {
+  std::ranges::copy(start.qpos, data->qpos);
+  std::ranges::copy(start.mocap_pos, data->mocap_pos);
+  std::ranges::copy(start.mocap_quat, data->mocap_quat);
+}
 
 }  // namespace
 
 HandleReach::HandleReach(const mjModel* model, const robots::Robot& robot, HandleReachCfg cfg)
-    : own_(call_mujoco(mj_copyModel, nullptr, model), mj_deleteModel),
+    : own_(call_mujoco(mj_copyModel, nullptr, model)),
       robot_(robot),
       cfg_(cfg),
       base_(scenes::driving_base(robot)),
-      hands_(arms_with_hands(robot, model)),
+      hands_(oriented_hands(robot, model)),
       of_robot_(model->nbody, 0),
       fixed_(model->nbody, 0),
       of_gripper_(model->nbody, -1),
@@ -34,12 +42,12 @@ HandleReach::HandleReach(const mjModel* model, const robots::Robot& robot, Handl
     // A body without a name belongs to the robot if its parent does.
     if (!of_robot_[b] && scene::name_of(model, mjOBJ_BODY, b).empty())
       of_robot_[b] = of_robot_[model->body_parentid[b]];
-    for (const ArmAndHand& hand : hands_) {
+    for (const OrientedHand& hand : hands_) {
       if (observe::is_descendant_or_self(model, b, robot.groups()[hand.gripper].root_body))
         of_gripper_[b] = hand.gripper;
     }
   }
-  const bool floats = std::ranges::any_of(hands_, &ArmAndHand::floats);
+  const bool floats = std::ranges::any_of(hands_, &OrientedHand::floats);
   for (int b = 1; b < model->nbody; ++b) {
     const bool stands = !floats && b == robot.base_body();
     fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || stands);
@@ -51,7 +59,7 @@ HandleReach::HandleReach(const mjModel* model, const robots::Robot& robot, Handl
     // The broad phase uses these margins.
     own_->body_margin[body] =
         std::max(own_->body_margin[body], own_->geom_margin[g] + model->geom_gap[g]);
-    if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
+    if (!is_solid(model, g)) continue;
     // Here the robot's links collide with each other even if they do not in the simulation.
     own_->geom_contype[g] |= kOfRobot;
     own_->geom_conaffinity[g] |= kOfRobot;
@@ -61,15 +69,12 @@ HandleReach::HandleReach(const mjModel* model, const robots::Robot& robot, Handl
   // Pairs of links in contact at the initial pose are exempt from collision checks.
   const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
-  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const auto& init = robot.cfg().groups[g].init;
-    for (std::size_t i = 0; i < init.size(); ++i) data->qpos[robot.groups()[g].qpos[i]] = init[i];
-  }
+  robots::write_start_positions(robot, data->qpos);
   mj_kinematics(own_.get(), data);
   mj_collision(own_.get(), data);
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
-    if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > kBuiltSo) continue;
+    if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > kTouching) continue;
     if (of_robot_[model->geom_bodyid[contact.geom[0]]] &&
         of_robot_[model->geom_bodyid[contact.geom[1]]])
       initial_contacts_.emplace_back(contact.geom[0], contact.geom[1]);
@@ -101,16 +106,16 @@ HandleReach::Start HandleReach::start_of(const mjModel& model,
   return start;
 }
 
-void HandleReach::show(mjData* data, const robots::RobotValues& values) const {
+void HandleReach::write_joints(mjData* data, const robots::RobotValues& values) const {
   const auto set = [&](int group) {
     const auto& qpos = robot_.groups()[group].qpos;
     for (std::size_t i = 0; i < qpos.size(); ++i) data->qpos[qpos[i]] = values[group].values[i];
   };
-  for (const ArmAndHand& hand : hands_) set(hand.arm);
+  for (const OrientedHand& hand : hands_) set(hand.tool);
   if (base_ >= 0) set(base_);
 }
 
-robots::AllowedContact HandleReach::grasp_of(const ArmAndHand& hand,
+robots::AllowedContact HandleReach::grasp_of(const OrientedHand& hand,
                                              const Articulation& one) const {
   return {robot_.groups()[hand.gripper].root_body, one.body};
 }
@@ -146,18 +151,16 @@ bool HandleReach::free(mjData* data, const Start& start, double clearance,
 bool HandleReach::is_collision_free(const Start& start) const {
   const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
-  std::ranges::copy(start.qpos, data->qpos);
-  std::ranges::copy(start.mocap_pos, data->mocap_pos);
-  std::ranges::copy(start.mocap_quat, data->mocap_quat);
+  write_start(data, start);
   return free(data, start, cfg_.clearance);
 }
 
 Pose HandleReach::body_pose(const Start& start, const Articulation& one, double q) const {
   const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
-  set(data, start, one, q);
+  write_state(data, start, one, q);
   mj_kinematics(&start.model, data);
-  return {vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
+  return mjsense::body_pose(data, one.body);
 }
 
 // Whether the arm can move in a straight line in joint space from each configuration to the next.
@@ -174,7 +177,7 @@ bool HandleReach::path_is_free(mjData* data, const Start& start, int arm,
       robots::RobotValues between = path[k];
       for (std::size_t i = 0; i < n; ++i)
         between[arm].values[i] = std::lerp(a[i], b[i], static_cast<double>(s) / steps);
-      show(data, between);
+      write_joints(data, between);
       if (!free(data, start, cfg_.clearance)) return false;
     }
   }
@@ -182,7 +185,7 @@ bool HandleReach::path_is_free(mjData* data, const Start& start, int arm,
 }
 
 // Quantities computed once per start and used for all grasps.
-struct HandleReach::Seen {
+struct HandleReach::Geometry {
   robots::RobotValues now;
   Pose to_base;  // X_BW
   Pose body;     // X_WB of the handle's body
@@ -191,43 +194,42 @@ struct HandleReach::Seen {
   double z = 0;           // m, height of its frame
 };
 
-HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Articulation& one,
-                                   double q) const {
-  set(data, start, one, q);
+HandleReach::Geometry HandleReach::measure(mjData* data, const Start& start,
+                                           const Articulation& one, double q) const {
+  write_state(data, start, one, q);
   mj_kinematics(&start.model, data);
   const World world{.id = 0, .model = &start.model, .data = data};
-  Seen seen;
-  robot_.read_qpos(world, seen.now);
-  seen.to_base = inverse(robot_.base_pose(world));
-  seen.body = {vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
-  seen.axis = vec3(data->xaxis + 3 * one.joint);
-  seen.anchor = vec3(data->xanchor + 3 * one.joint);
+  Geometry at_start;
+  robot_.read_qpos(world, at_start.now);
+  at_start.to_base = inverse(robot_.base_pose(world));
+  at_start.body = mjsense::body_pose(data, one.body);
+  at_start.axis = vec3(data->xaxis + 3 * one.joint);
+  at_start.anchor = vec3(data->xanchor + 3 * one.joint);
   if (base_ >= 0) {
-    const auto& at = seen.now[base_].values;
-    seen.base = {at[0], at[1], at[2]};
-    seen.z = robot_.base_pose(world).p.z;
+    const auto& at = at_start.now[base_].values;
+    at_start.base = {at[0], at[1], at[2]};
+    at_start.z = robot_.base_pose(world).p.z;
   }
-  return seen;
+  return at_start;
 }
 
-void HandleReach::set(mjData* data, const Start& start, const Articulation& one, double q) const {
-  std::ranges::copy(start.qpos, data->qpos);
-  std::ranges::copy(start.mocap_pos, data->mocap_pos);
-  std::ranges::copy(start.mocap_quat, data->mocap_quat);
+void HandleReach::write_state(mjData* data, const Start& start, const Articulation& one,
+                              double q) const {
+  write_start(data, start);
   data->qpos[one.qpos] = q;
 }
 
 // Computes the positions of arm and base while the handle is held, starting at `q`.
-bool HandleReach::follow_handle(const Seen& seen, const HandleMotion& motion, robots::RobotValues q,
-                                HandlePath& path) const {
-  const int points = path.drive ? cfg_.drive_points : cfg_.points, arm = path.hand.arm;
+bool HandleReach::follow_handle(const Geometry& at_start, const HandleMotion& motion,
+                                robots::RobotValues q, HandlePath& path) const {
+  const int points = path.drive ? cfg_.drive_points : cfg_.points, arm = path.hand.tool;
   path.motion_joints.clear();
   for (int k = 0; k < points; ++k) {
     const double part = static_cast<double>(k) / (points - 1);
-    Pose to_base = seen.to_base;
+    Pose to_base = at_start.to_base;
     if (path.drive) {
-      const scenes::BasePose at = driven(seen.base, *path.drive, motion, path.grasp.p, part);
-      to_base = inverse(Pose{{at.x, at.y, seen.z}, axis_angle({0, 0, 1}, at.yaw)});
+      const scenes::BasePose at = driven(at_start.base, *path.drive, motion, path.grasp.p, part);
+      to_base = inverse(at.at_height(at_start.z));
       const double place[] = {at.x, at.y, at.yaw};
       q[base_].set(place);
     }
@@ -248,8 +250,8 @@ bool HandleReach::motion_is_free(mjData* data, const Start& start, const HandleM
                                  const HandlePath& path) const {
   for (std::size_t k = 0; k < path.motion_joints.size(); ++k) {
     const double part = static_cast<double>(k) / static_cast<double>(path.motion_joints.size() - 1);
-    set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
-    show(data, path.motion_joints[k]);
+    write_state(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
+    write_joints(data, path.motion_joints[k]);
     if (!free(data, start, cfg_.contact, grasp_of(path.hand, *motion.one), path.drive.has_value()))
       return false;
   }
@@ -258,61 +260,61 @@ bool HandleReach::motion_is_free(mjData* data, const Start& start, const HandleM
 
 // Tries to hold the handle with a driving base. The arm's pose at the end is checked first, because
 // this check is cheap.
-bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
+bool HandleReach::try_drives(mjData* data, const Start& start, const Geometry& at_start,
                              const HandleMotion& motion, const robots::RobotValues& before,
                              HandlePath& path) const {
   robots::RobotValues taken = before;
-  const int arm = path.hand.arm;
-  if (!robot_.ik(arm, seen.to_base * path.grasp, taken, robots::Chain::kTracking)) return false;
-  set(data, start, *motion.one, motion.from);
-  show(data, taken);
+  const int arm = path.hand.tool;
+  if (!robot_.ik(arm, at_start.to_base * path.grasp, taken, robots::Chain::kTracking)) return false;
+  write_state(data, start, *motion.one, motion.from);
+  write_joints(data, taken);
   if (!free(data, start, cfg_.contact, grasp_of(path.hand, *motion.one))) return false;
   const Pose last = motion.at(1) * path.grasp;
   for (const Drive& drive : tasks::drives()) {
-    const scenes::BasePose end = driven(seen.base, drive, motion, path.grasp.p, 1);
+    const scenes::BasePose end = driven(at_start.base, drive, motion, path.grasp.p, 1);
     robots::RobotValues q = taken;
-    const Pose base{{end.x, end.y, seen.z}, axis_angle({0, 0, 1}, end.yaw)};
-    if (!robot_.ik(arm, inverse(base) * last, q, robots::Chain::kTracking)) continue;
+    if (!robot_.ik(arm, inverse(end.at_height(at_start.z)) * last, q, robots::Chain::kTracking))
+      continue;
     path.drive = drive;
-    if (follow_handle(seen, motion, before, path) && motion_is_free(data, start, motion, path))
+    if (follow_handle(at_start, motion, before, path) && motion_is_free(data, start, motion, path))
       return true;
   }
   return false;
 }
 
 // Finds a path to the pregrasp: a straight one, or one through a via point behind the pregrasp.
-bool HandleReach::approach_path(mjData* data, const Start& start, const Seen& seen,
+bool HandleReach::approach_path(mjData* data, const Start& start, const Geometry& at_start,
                                 const robots::RobotValues& before, HandlePath& path) const {
-  const int arm = path.hand.arm;
-  path.approach_joints = {seen.now, before};
+  const int arm = path.hand.tool;
+  path.approach_joints = {at_start.now, before};
   bool ok = path_is_free(data, start, arm, path.approach_joints);
   for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
     robots::RobotValues by = before;
     const Pose back = path.pregrasp * Pose{{0, 0, -cfg_.detours[k]}, {}};
     if (!robot_.ik(arm, back, by, robots::Chain::kTracking)) continue;
-    path.approach_joints = {seen.now, by, before};
+    path.approach_joints = {at_start.now, by, before};
     ok = path_is_free(data, start, arm, path.approach_joints);
   }
   return ok;
 }
 
-bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
+bool HandleReach::try_grasp(mjData* data, const Start& start, const Geometry& at_start,
                             const HandleMotion& motion, bool driving, HandlePath& path) const {
-  const int arm = path.hand.arm;
-  path.pregrasp = seen.to_base * path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
+  const int arm = path.hand.tool;
+  path.pregrasp = at_start.to_base * path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
   // Inverse kinematics starts from the initial posture without noise, so that noise does not change
   // the solution.
-  robots::RobotValues before = seen.now;
+  robots::RobotValues before = at_start.now;
   before[arm].set(robot_.cfg().groups[arm].init);
-  if (before[arm].size != seen.now[arm].size) before[arm] = seen.now[arm];
+  if (before[arm].size != at_start.now[arm].size) before[arm] = at_start.now[arm];
   if (!robot_.ik(arm, path.pregrasp, before, 2 * robots::Chain::kTracking)) return false;
   // The pregrasp is reachable. Check the motion with the handle for collisions.
-  if (driving ? !try_drives(data, start, seen, motion, before, path)
-              : !follow_handle(seen, motion, before, path) ||
+  if (driving ? !try_drives(data, start, at_start, motion, before, path)
+              : !follow_handle(at_start, motion, before, path) ||
                     !motion_is_free(data, start, motion, path))
     return false;
-  set(data, start, *motion.one, motion.from);
-  return approach_path(data, start, seen, before, path);
+  write_state(data, start, *motion.one, motion.from);
+  return approach_path(data, start, at_start, before, path);
 }
 
 std::optional<HandlePath> HandleReach::find(const Start& start, const Articulation& one,
@@ -320,23 +322,24 @@ std::optional<HandlePath> HandleReach::find(const Start& start, const Articulati
                                             bool driving) const {
   const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
-  const Seen seen = see(data, start, one, from);
-  const HandleMotion motion{&one, from, to, seen.axis, seen.anchor};
+  const Geometry at_start = measure(data, start, one, from);
+  const HandleMotion motion{&one, from, to, at_start.axis, at_start.anchor};
   std::optional<HandlePath> found;
   if (driving && base_ < 0) return found;
-  for (const ArmAndHand& hand : hands_) {
+  for (const OrientedHand& hand : hands_) {
     int tries = 0;
     const double opening = robot_.groups()[hand.gripper].max_opening;
-    for (const HandleGrasp& grasp : propose_handle_grasps(one.handle, seen.body, opening)) {
+    for (const HandleGrasp& grasp : propose_handle_grasps(one.handle, at_start.body, opening)) {
       if (found || ++tries > max_tries) break;
       HandlePath path;
       path.hand = hand;
       path.grasp = grasp.pose * Pose{{}, hand.turn};
-      path.on_body = inverse(seen.body) * path.grasp;
+      path.on_body = inverse(at_start.body) * path.grasp;
       path.end = motion.at(1) * path.grasp;
       if (hand.floats()) {
-        if (try_floating(data, start, inverse(seen.to_base), motion, path)) found = std::move(path);
-      } else if (try_grasp(data, start, seen, motion, driving, path))
+        if (try_floating(data, start, inverse(at_start.to_base), motion, path))
+          found = std::move(path);
+      } else if (try_grasp(data, start, at_start, motion, driving, path))
         found = std::move(path);
     }
   }
@@ -348,19 +351,19 @@ std::optional<HandlePath> HandleReach::again(const Start& start, const Articulat
                                              const HandlePath& before) const {
   const worlds::ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
-  const Seen seen = see(data, start, one, from);
+  const Geometry at_start = measure(data, start, one, from);
   HandlePath path;
   path.hand = before.hand;
   path.drive = before.drive;
   path.on_body = before.on_body;
-  path.grasp = seen.body * before.on_body;
-  const HandleMotion motion{&one, from, to, seen.axis, seen.anchor};
+  path.grasp = at_start.body * before.on_body;
+  const HandleMotion motion{&one, from, to, at_start.axis, at_start.anchor};
   path.end = motion.at(1) * path.grasp;
   if (path.hand.floats()) return path;
-  path.pregrasp = seen.to_base * path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
-  robots::RobotValues q = seen.now;
-  if (!robot_.ik(path.hand.arm, path.pregrasp, q, robots::Chain::kTracking)) return {};
-  if (!follow_handle(seen, motion, q, path)) return {};
+  path.pregrasp = at_start.to_base * path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
+  robots::RobotValues q = at_start.now;
+  if (!robot_.ik(path.hand.tool, path.pregrasp, q, robots::Chain::kTracking)) return {};
+  if (!follow_handle(at_start, motion, q, path)) return {};
   return path;
 }
 

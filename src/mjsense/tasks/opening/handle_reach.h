@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/robots/allowed_contact.h"
 #include "mjsense/robots/robot.h"
@@ -25,7 +26,7 @@ namespace mjsense::tasks {
 
 // A path for one arm, or for a floating gripper, which moves on screws.
 struct HandlePath {
-  ArmAndHand hand;
+  OrientedHand hand;
   Pose grasp;                  // X_WT
   Pose on_body;                // the grasp in the frame of the handle's body
   std::vector<Pose> approach;  // X_WT of a floating gripper from the start to the pregrasp
@@ -56,7 +57,7 @@ class HandleReach {
  public:
   HandleReach(const mjModel* model, const robots::Robot& robot, HandleReachCfg cfg = {});
 
-  std::span<const ArmAndHand> hands() const { return hands_; }
+  std::span<const OrientedHand> hands() const { return hands_; }
   // The state of a world in which paths are searched: its model with collision margins around the
   // robot, its positions and mocap poses. Models differ between worlds in furniture poses and
   // object sizes. The HandleReach and the source of the model must outlive it.
@@ -69,7 +70,7 @@ class HandleReach {
   bool drives() const { return base_ >= 0; }
   int base() const { return base_; }  // move group; -1: the base cannot move
   // X_WB of a floating gripper whose tool is at X_WT.
-  Pose base_with(const ArmAndHand& hand, const Pose& tool) const;
+  Pose base_with(const OrientedHand& hand, const Pose& tool) const;
   // A path that moves the articulation from `from` to `to` with the robot as in `start`. With
   // `driving`, the base drives during the motion. Returns nullopt if there is no path or if the
   // robot is in collision at the start. At most `max_tries` grasps are tried per arm.
@@ -85,37 +86,38 @@ class HandleReach {
   bool is_collision_free(const Start& start) const;
 
  private:
-  struct Seen;
-  Seen see(mjData* data, const Start& start, const Articulation& one, double q) const;
-  void set(mjData* data, const Start& start, const Articulation& one, double q) const;
-  bool follow_handle(const Seen& seen, const HandleMotion& motion, robots::RobotValues q,
+  struct Geometry;
+  Geometry measure(mjData* data, const Start& start, const Articulation& one, double q) const;
+  void write_state(mjData* data, const Start& start, const Articulation& one, double q) const;
+  bool follow_handle(const Geometry& at_start, const HandleMotion& motion, robots::RobotValues q,
                      HandlePath& path) const;
   bool motion_is_free(mjData* data, const Start& start, const HandleMotion& motion,
                       const HandlePath& path) const;
-  bool try_grasp(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
-                 bool driving, HandlePath& path) const;
-  bool try_drives(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
-                  const robots::RobotValues& before, HandlePath& path) const;
-  bool approach_path(mjData* data, const Start& start, const Seen& seen,
+  bool try_grasp(mjData* data, const Start& start, const Geometry& at_start,
+                 const HandleMotion& motion, bool driving, HandlePath& path) const;
+  bool try_drives(mjData* data, const Start& start, const Geometry& at_start,
+                  const HandleMotion& motion, const robots::RobotValues& before,
+                  HandlePath& path) const;
+  bool approach_path(mjData* data, const Start& start, const Geometry& at_start,
                      const robots::RobotValues& before, HandlePath& path) const;
   bool free(mjData* data, const Start& start, double clearance,
             const robots::AllowedContact& allowed = {}, bool driving = false) const;
-  robots::AllowedContact grasp_of(const ArmAndHand& hand, const Articulation& one) const;
+  robots::AllowedContact grasp_of(const OrientedHand& hand, const Articulation& one) const;
   bool try_floating(mjData* data, const Start& start, const Pose& base, const HandleMotion& motion,
                     HandlePath& path) const;
-  bool screw_is_free(mjData* data, const Start& start, const ArmAndHand& hand, const Pose& from,
+  bool screw_is_free(mjData* data, const Start& start, const OrientedHand& hand, const Pose& from,
                      const Pose& to) const;
-  void float_to(mjData* data, const ArmAndHand& hand, const Pose& tool) const;
-  void show(mjData* data, const robots::RobotValues& values) const;
+  void float_to(mjData* data, const OrientedHand& hand, const Pose& tool) const;
+  void write_joints(mjData* data, const robots::RobotValues& values) const;
   bool path_is_free(mjData* data, const Start& start, int arm,
                     std::span<const robots::RobotValues> path) const;
   mjModel with_margins(const mjModel& model) const;
 
-  std::unique_ptr<mjModel, decltype(&mj_deleteModel)> own_;  // with margins about the robot
+  ModelPtr own_;  // with margins about the robot
   const robots::Robot& robot_;
   HandleReachCfg cfg_;
   int base_;
-  std::vector<ArmAndHand> hands_;
+  std::vector<OrientedHand> hands_;
   std::vector<char> of_robot_;  // [nbody]
   std::vector<char> fixed_;     // [nbody] bodies of the robot that are rigidly attached to its base
   std::vector<int> of_gripper_;  // [nbody] move group of the gripper, or -1

@@ -4,23 +4,24 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/tasks/opening/handle_reach.h"
 
 namespace mjsense::tasks {
 
-Pose HandleReach::base_with(const ArmAndHand& hand, const Pose& tool) const {
+Pose HandleReach::base_with(const OrientedHand& hand, const Pose& tool) const {
   const robots::RobotValues none;
   return tool * inverse(robot_.fk(hand.gripper, none));
 }
 
-void HandleReach::float_to(mjData* data, const ArmAndHand& hand, const Pose& tool) const {
+void HandleReach::float_to(mjData* data, const OrientedHand& hand, const Pose& tool) const {
   const Pose base = base_with(hand, tool);
-  double* qpos = data->qpos + own_->jnt_qposadr[own_->body_jntadr[robot_.base_body()]];
+  double* qpos = data->qpos + free_qpos(own_.get(), robot_.base_body());
   write_vec(base.p, qpos);
   write_quat(base.q, qpos + 3);
 }
 
-bool HandleReach::screw_is_free(mjData* data, const Start& start, const ArmAndHand& hand,
+bool HandleReach::screw_is_free(mjData* data, const Start& start, const OrientedHand& hand,
                                 const Pose& from, const Pose& to) const {
   const Twist screw = log6(inverse(from) * to);
   const double length = std::max(norm(screw.v), 0.2 * norm(screw.w));
@@ -37,11 +38,11 @@ bool HandleReach::try_floating(mjData* data, const Start& start, const Pose& bas
                                const HandleMotion& motion, HandlePath& path) const {
   for (int k = 0; k < cfg_.points; ++k) {
     const double part = static_cast<double>(k) / (cfg_.points - 1);
-    set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
+    write_state(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
     float_to(data, path.hand, motion.at(part) * path.grasp);
     if (!free(data, start, cfg_.contact, grasp_of(path.hand, *motion.one))) return false;
   }
-  set(data, start, *motion.one, motion.from);
+  write_state(data, start, *motion.one, motion.from);
   path.pregrasp = path.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
   const robots::RobotValues none;
   const Pose now = base * robot_.fk(path.hand.gripper, none);

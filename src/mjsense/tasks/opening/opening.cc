@@ -8,7 +8,9 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scenes/object_references.h"
 
 namespace mjsense::tasks {
@@ -61,8 +63,7 @@ void OpeningTask::initialize_task() {
     throw ValueError(fmt::format(
         "{} has nothing to open: no hinge or slide joint with a range and a handle", context()));
   reach_ = std::make_unique<HandleReach>(model(), robot());
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(call_mujoco(mj_makeData, model()),
-                                                               mj_deleteData);
+  const DataPtr data = make_data(model());
   if (start_key() >= 0) mj_resetDataKeyframe(model(), data.get(), start_key());
   const robots::StateRow empty = robots::state_row(data.get());
   const Pose usual = scene().clear(empty);
@@ -205,7 +206,7 @@ std::vector<std::string> OpeningTask::references(const World& world) const {
   const Articulation& target = articulations_[targets_[world.id].index];
   const Pose to_robot = inverse(robot().base_pose(world));
   const auto handle = [&](const Articulation& one) {
-    const Pose body{vec3(world.data->xpos + 3 * one.body), quat(world.data->xquat + 4 * one.body)};
+    const Pose body = body_pose(world.data, one.body);
     return to_robot * (body * one.handle.middle);
   };
   std::vector<Vec3> others;

@@ -44,7 +44,9 @@ class OpeningTask final : public scenes::ObjectTask {
   // Writes episode_step, joint_position (rad or m, of the category's first articulation) and
   // success.
   void write_info(const World& world, JsonWriter& json) const override;
-  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
+  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override {
+    return object_sensors("Pose of the drawer or door where it counts as open or closed.");
+  }
 
   // --- for planners
   OpeningKind kind() const { return kind_; }

@@ -14,7 +14,10 @@
 #include <set>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/core/testing/temp_dir.h"
+#include "mjsense/core/testing/test_model.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 
@@ -23,10 +26,6 @@ namespace {
 
 using std::numbers::pi;
 using ::testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 episode::TaskCfg franka(const std::string& scene = "") {
   episode::TaskCfg cfg;
@@ -61,19 +60,11 @@ struct Stage {
   OpeningTask task;
   scene::Scene scene;
   const mjModel* model;
-  std::unique_ptr<mjData, DataDelete> data;
+  DataPtr data;
 };
 
-using ModelPtr = std::shared_ptr<mjModel>;
 ModelPtr compiled(const std::string& bodies) {
-  const std::string xml = "<mujoco><worldbody>" + bodies + "</worldbody></mujoco>";
-  char error[500] = "";
-  mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
-  EXPECT_NE(spec, nullptr) << error;
-  ModelPtr model(mj_compile(spec, nullptr), mj_deleteModel);
-  EXPECT_NE(model, nullptr) << mjs_getError(spec);
-  mj_deleteSpec(spec);
-  return model;
+  return compile_mjcf("<mujoco><worldbody>" + bodies + "</worldbody></mujoco>");
 }
 
 // A front of 0.4 x 0.2 m at x = 0 that faces -x, with a bar 5 cm in front of it.
@@ -154,11 +145,11 @@ TEST(Articulations, MotionEqualsMuJoCo) {
     const auto found = find_articulations(m.get(), "");
     ASSERT_EQ(found.size(), 1u);
     const Articulation& one = found[0];
-    const std::unique_ptr<mjData, DataDelete> d(mj_makeData(m.get()));
+    const DataPtr d = make_data(m.get());
     const auto pose = [&](double q) {
       d->qpos[one.qpos] = q;
       mj_kinematics(m.get(), d.get());
-      return Pose{vec3(d->xpos + 3 * one.body), quat(d->xquat + 4 * one.body)};
+      return body_pose(d.get(), one.body);
     };
     const Pose before = pose(0.1);
     const Vec3 axis = vec3(d->xaxis + 3 * one.joint), anchor = vec3(d->xanchor + 3 * one.joint);
@@ -302,7 +293,7 @@ TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
     const auto path = reach.find(start, one, from, to, 12, false);
     if (!path) continue;  // a start without a path is rejected and sampled again
     ++found;
-    const int arm = path->hand.arm;
+    const int arm = path->hand.tool;
     const Pose base = robot.base_pose(w);
     for (std::size_t k = 1; k < path->motion_joints.size(); ++k) {
       robots::RobotValues between = path->motion_joints[k];
@@ -342,7 +333,7 @@ TEST(Opening, FloatingGripperMovesOnAScrew) {
     const auto path = reach.find(start, one, from, to, 40, false);
     ASSERT_TRUE(path) << episode;
     const Pose tool =
-        stage.task.robot().base_pose(w) * stage.task.robot().tcp_pose(w, reach.hands()[0].arm);
+        stage.task.robot().base_pose(w) * stage.task.robot().tcp_pose(w, reach.hands()[0].tool);
     EXPECT_NEAR(norm(path->approach.front().p - tool.p), 0, 1e-9);
     EXPECT_NEAR(norm(path->grasp.p - path->approach.back().p), 0.04, 1e-9) << "of the pregrasp";
     const Pose body = reach.body_pose(start, one, from), later = reach.body_pose(start, one, to);
@@ -395,7 +386,7 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
     };
     mj_kinematics(m, d);
     // Moves the handle towards a pad.
-    const Pose body{vec3(d->xpos + 3 * one.body), quat(d->xquat + 4 * one.body)};
+    const Pose body = body_pose(d, one.body);
     const Vec3 by = vec3(d->geom_xpos + 3 * pad) - body * one.handle.middle;
     const auto gap = [&](double part) {
       for (int i = 0; i < 3; ++i)
@@ -417,12 +408,8 @@ TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
 }
 
 TEST(Opening, ErrorsNameWhatIsMissing) {
-  try {
-    Stage stage(franka("table"), OpeningKind::kOpen);
-    FAIL() << "a table has nothing to open";
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("task 'open': scene 'table' has nothing to open"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] { Stage stage(franka("table"), OpeningKind::kOpen); }),
+              HasSubstr("task 'open': scene 'table' has nothing to open"));
 }
 
 // The phrase of an instruction fits the target, and no other articulation of the scene unless any
@@ -444,9 +431,7 @@ TEST(Opening, InstructionsDescribeTheTarget) {
       EXPECT_EQ(found[3].str(), target.category) << sentence;
       const Pose base = stage.task.robot().base_pose(w);
       const auto handle = [&](const Articulation& one) {
-        return inverse(base) *
-               (Pose{vec3(w.data->xpos + 3 * one.body), quat(w.data->xquat + 4 * one.body)} *
-                one.handle.middle);
+        return inverse(base) * (body_pose(w.data, one.body) * one.handle.middle);
       };
       const auto fits = [&](const Articulation& one) {
         if (one.category != target.category) return false;

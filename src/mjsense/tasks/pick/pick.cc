@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "mjsense/core/error.h"
+#include "mjsense/observe/touches.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/referring_expressions.h"
@@ -93,20 +95,15 @@ void PickTask::set_target(int world, int target) {
 // robot. A supporting contact is below the middle of the object, with a normal within 80 degrees of
 // up.
 bool PickTask::supported_by_others(const World& world, int body) const {
-  const mjModel* m = world.model;
   const double middle = world_box(world, body).center().z;
   const double steep = std::cos(80.0 / 180.0 * pi);
-  for (int i = 0; i < world.data->ncon; ++i) {
-    const mjContact& contact = world.data->contact[i];
-    if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-    const int root0 = m->body_rootid[m->geom_bodyid[contact.geom[0]]];
-    const int root1 = m->body_rootid[m->geom_bodyid[contact.geom[1]]];
-    if ((root0 == body) == (root1 == body)) continue;
-    const double up = root1 == body ? contact.frame[2] : -contact.frame[2];
-    if (contact.pos[2] < middle && up >= steep)
-      return (root1 == body ? root0 : root1) != robot_root_;
-  }
-  return false;
+  std::optional<bool> by_others;
+  observe::each_touch(world, body, [&](const observe::Touch& touch) {
+    const bool supports =
+        touch.contact->pos[2] < middle && touch.sign * touch.contact->frame[2] >= steep;
+    if (supports && !by_others) by_others = world.model->body_rootid[touch.other] != robot_root_;
+  });
+  return by_others.value_or(false);
 }
 
 // The unmet condition of success; "" if only the robot holds the object in the air.
@@ -114,18 +111,11 @@ std::string_view PickTask::missing(const World& world) const {
   const int body = object(world.id).body;
   if (world.data->xpos[3 * body + 2] - start(world.id).p.z < kLift)
     return "the object is not lifted";
-  bool held = false;
-  for (int i = 0; i < world.data->ncon; ++i) {
-    const mjContact& contact = world.data->contact[i];
-    if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-    const mjModel* m = world.model;
-    const int root0 = m->body_rootid[m->geom_bodyid[contact.geom[0]]];
-    const int root1 = m->body_rootid[m->geom_bodyid[contact.geom[1]]];
-    if ((root0 == body) == (root1 == body)) continue;
-    if ((root0 == body ? root1 : root0) != robot_root_)
-      return "something other than the robot touches the object";
-    held = true;
-  }
+  bool held = false, others = false;
+  observe::each_touch(world, body, [&](const observe::Touch& touch) {
+    (world.model->body_rootid[touch.other] == robot_root_ ? held : others) = true;
+  });
+  if (others) return "something other than the robot touches the object";
   return held ? "" : "the robot does not touch the object";
 }
 

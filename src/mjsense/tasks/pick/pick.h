@@ -35,7 +35,9 @@ class PickTask final : public scenes::ObjectTask, public episode::GraspScene {
                                 std::string_view role) const override;  // 5 cm above the start
   // Writes episode_step, position_error (m, to the goal), rotation_error (rad) and success.
   void write_info(const World& world, JsonWriter& json) const override;
-  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
+  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override {
+    return object_sensors("Goal pose of the lifted object.");
+  }
 
   const episode::GraspScene* grasp_scene() const override { return this; }
   std::span<const episode::GraspObject> all_objects() const override { return objects_; }

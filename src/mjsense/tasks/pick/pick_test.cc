@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 
@@ -17,10 +18,6 @@ namespace mjsense::tasks {
 namespace {
 
 using testing::HasSubstr;
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 episode::TaskCfg franka() {
   episode::TaskCfg cfg;
@@ -43,7 +40,7 @@ struct Pick : testing::Test {
   PickTask task{franka()};
   scene::Scene scene{task.scene_cfg_with_robot()};
   const mjModel* model = scene.model();
-  std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
+  DataPtr data = make_data(model);
   World w;
   void SetUp() override { task.initialize(model, 3); }
 };

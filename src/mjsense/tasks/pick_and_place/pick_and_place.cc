@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_geometry.h"
 #include "mjsense/scenes/object_references.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
 
@@ -50,10 +51,6 @@ constexpr std::array<const char*, 14> kSentences{
 constexpr std::array<std::string_view, 10> kInside{"bowl", "box", "basket", "pan", "pot",
                                                    "cup",  "mug", "bin",    "jar", "crate"};
 constexpr std::array<std::string_view, 5> kOnTop{"plate", "tray", "board", "coaster", "book"};
-
-Pose pose_of(const World& world, int body) {
-  return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
-}
 
 // Name of receptacles that differ only in color, such as "bowl".
 const std::string& noun(const scenes::SceneObject& object) {
@@ -167,8 +164,8 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng,
 void PickAndPlaceTask::begin(const World& world) {
   episode::Task::begin(world);
   Episode& episode = episodes_[world.id];
-  episode.start = pose_of(world, episode.objects[0].body);
-  episode.receptacle_start = pose_of(world, episode.objects[1].body);
+  episode.start = body_pose(world.data, episode.objects[0].body);
+  episode.receptacle_start = body_pose(world.data, episode.objects[1].body);
   episode.supported.clear();
   episode.assessment = {};
 }
@@ -180,7 +177,8 @@ const PickAndPlaceTask::Assessment& PickAndPlaceTask::assess(const World& world)
   now = {};
   now.step = episode_step(world.id);
   const int object = episode.objects[0].body, receptacle = episode.objects[1].body;
-  const Pose of_object = pose_of(world, object), of_receptacle = pose_of(world, receptacle);
+  const Pose of_object = body_pose(world.data, object),
+             of_receptacle = body_pose(world.data, receptacle);
   const Pose relative = inverse(of_receptacle) * of_object;
   now.supported = carries(world, receptacle, object);
   now.pos_diff = now.rot_diff = std::numeric_limits<double>::infinity();
@@ -217,7 +215,7 @@ std::string_view PickAndPlaceTask::missing_within(const Assessment& now) {
 std::string_view PickAndPlaceTask::missing_beside(const World& world, const Assessment& now) const {
   const Episode& episode = episodes_[world.id];
   const int object = episode.objects[0].body, other = episode.objects[1].body;
-  const WorldBox a = world_box(world, object), b = world_box(world, other);
+  const Aabb a = world_box(world, object), b = world_box(world, other);
   const double gap = gap_from_above(a, b);
   if (gap < 0 || gap > kBeside) return "the object is not next to the other one";
   if (norm(now.moved) > kMovedBeside || now.turned > kTurned) return "the other object has moved";
@@ -246,10 +244,10 @@ episode::Evaluation PickAndPlaceTask::evaluate(const World& world) const {
 void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<Vec3>& out) const {
   const Episode& episode = episodes_[world.id];
   const int body = episode.objects[1].body;
-  const WorldBox box = world_box(world, body);
+  const Aabb box = world_box(world, body);
   const Vec3 c = box.center();
   if (kind_ == PlaceKind::kNextTo) {
-    const WorldBox object = turned_box(world, episode.objects[0].body, turn);
+    const Aabb object = turned_box(world, episode.objects[0].body, turn);
     const double x = 0.5 * (box.high.x - box.low.x + object.high.x - object.low.x) + kBesideGap;
     const double y = 0.5 * (box.high.y - box.low.y + object.high.y - object.low.y) + kBesideGap;
     for (double along : {0.0, 0.02, -0.02}) {
@@ -264,7 +262,7 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
     // Remove placements beyond the edge of the supporting surface, such as on the robot's pedestal
     // next to the table: there the two objects would not be on the same surface.
     const int carrier = supporting_body(world, body);
-    const Vec3 half = 0.5 * (object.high - object.low);
+    const Vec3 half = 0.5 * object.size();
     std::erase_if(out, [&](Vec3 p) {
       return carrier >= 0 &&
              !is_supported_over_whole_area(world, p, half, carrier, episode.objects[0].body);
@@ -272,7 +270,7 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
     return;
   }
   // The height is that of the receptacle's surface: its bottom if it is open, otherwise its rim.
-  const Pose pose = pose_of(world, body);
+  const Pose pose = body_pose(world.data, body);
   std::vector<Vec3> points;
   for (Vec3 point : shape(world.id, episode.receptacle).points) points.push_back(pose * point);
   const auto surface = [&](double x, double y) {
@@ -319,13 +317,10 @@ std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
   const Pose base = robot().base_pose(world);
   const std::array<int, 2> both{episode.target, episode.receptacle};
   const auto drawn = [&](int index) {
-    scenes::References all = scenes::object_references(world, scene(), index, base, both);
     // In "put the mug next to the plate" it must not be the mug that is next to the plate.
-    if (kind_ == PlaceKind::kNextTo) {
-      for (auto& texts : all)
-        std::erase_if(texts, [](const auto& text) { return text.find(" next to ") != text.npos; });
-    }
-    return scenes::draw_reference(all, rng);
+    const bool clauses = kind_ == PlaceKind::kNextTo;
+    return scenes::draw_reference(
+        scenes::object_references(world, scene(), index, base, both, false, clauses), rng);
   };
   const std::string object = drawn(both[0]);
   const std::string where =

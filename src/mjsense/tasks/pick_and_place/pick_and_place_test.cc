@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
+#include "mjsense/core/testing/error_of.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/tasks/pick_and_place/support_check.h"
@@ -60,7 +62,7 @@ struct Table {
   }
   // Drops the object above the middle of the receptacle and waits until both are at rest.
   void drop() {
-    const WorldBox box = world_box(world, body(1)), object = world_box(world, body(0));
+    const Aabb box = world_box(world, body(1)), object = world_box(world, body(0));
     Pose at = pose(0);
     at.p = at.p + box.center() - object.center();
     at.p.z = box.high.z + 0.005 + (pose(0).p.z - object.low.z);
@@ -86,7 +88,7 @@ struct Table {
   }
   PickAndPlaceTask task;
   std::unique_ptr<scene::Scene> scene;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  DataPtr data;
   World world;
 };
 
@@ -189,8 +191,7 @@ TEST(PickAndPlace, NextToRequiresTheSameSupport) {
   // Offset along y, away from the robot and other objects.
   const auto beside = [&](double gap, Vec3 moved = {}) {
     table.put(1, {other.p + moved, other.q});
-    const WorldBox a = world_box(table.world, table.body(0)),
-                   b = world_box(table.world, table.body(1));
+    const Aabb a = world_box(table.world, table.body(0)), b = world_box(table.world, table.body(1));
     Pose at = table.pose(0);
     at.p.x += b.center().x - a.center().x;
     at.p.y += b.high.y + gap - a.low.y;
@@ -216,7 +217,7 @@ TEST(PickAndPlace, NextToPlacesAreOnTheTable) {
   const auto places = [&](double from_edge) {
     const double* at = table.data->geom_xpos + 3 * top;
     const double edge = at[0] - table.world.model->geom_size[3 * top];
-    const WorldBox other = world_box(table.world, table.body(1));
+    const Aabb other = world_box(table.world, table.body(1));
     table.put(1, {table.pose(1).p + Vec3{edge + from_edge - other.low.x, -other.center().y, 0},
                   table.pose(1).q});
     table.settle(50);
@@ -224,7 +225,7 @@ TEST(PickAndPlace, NextToPlacesAreOnTheTable) {
     table.task.places(table.world, {}, found);
     return std::pair(found, edge);
   };
-  const WorldBox object = world_box(table.world, table.body(0));
+  const Aabb object = world_box(table.world, table.body(0));
   const double half = 0.5 * (object.high.x - object.low.x);
   const auto [near, edge] = places(0.02);
   EXPECT_FALSE(near.empty());
@@ -283,12 +284,8 @@ TEST(PickAndPlace, SensorsAreThoseOfTheSpecification) {
 }
 
 TEST(PickAndPlace, SceneWithoutReceptaclesThrows) {
-  try {
-    Table table(PlaceKind::kInOrOn, "table");
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), StartsWith("task 'pick_and_place': scene 'table' has no receptacle"));
-  }
+  EXPECT_THAT(error_of<ValueError>([&] { Table table(PlaceKind::kInOrOn, "table"); }),
+              StartsWith("task 'pick_and_place': scene 'table' has no receptacle"));
 }
 
 }  // namespace

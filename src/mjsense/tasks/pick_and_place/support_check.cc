@@ -5,7 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/observe/frame.h"
+#include "mjsense/core/model_geometry.h"
+#include "mjsense/observe/touches.h"
 
 namespace mjsense::tasks {
 namespace {
@@ -17,27 +18,7 @@ constexpr int kOutline = 8;       // number of tested points on the outline
 constexpr double kRim = 0.9;      // fraction of the half extents
 constexpr double kAbove = 0.05;   // m, height from which rays are cast downwards
 
-struct Touch {
-  int other;  // body
-  const mjContact* contact;
-  double sign;  // makes the contact's normal point towards the object
-  int id;
-};
-
-// Calls f for every contact of the subtree of `object` with another body.
-template <class F>
-void each_touch(const World& world, int object, F&& f) {
-  const mjModel* m = world.model;
-  for (int i = 0; i < world.data->ncon; ++i) {
-    const mjContact& contact = world.data->contact[i];
-    if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-    const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-    const bool first = observe::is_descendant_or_self(m, a, object),
-               second = observe::is_descendant_or_self(m, b, object);
-    if (first == second) continue;
-    f(Touch{second ? a : b, &contact, second ? 1.0 : -1.0, i});
-  }
-}
+using observe::each_touch, observe::Touch;
 
 Vec3 force_of(const World& world, const Touch& touch) {
   double f[6];
@@ -50,9 +31,9 @@ Vec3 force_of(const World& world, const Touch& touch) {
 
 }  // namespace
 
-WorldBox world_box(const World& world, int body) {
+Aabb world_box(const World& world, int body) {
   const mjModel* m = world.model;
-  WorldBox box{{1e10, 1e10, 1e10}, {-1e10, -1e10, -1e10}};
+  Aabb box;
   double* const low[3] = {&box.low.x, &box.low.y, &box.low.z};
   double* const high[3] = {&box.high.x, &box.high.y, &box.high.z};
   for (int g = 0; g < m->ngeom; ++g) {
@@ -71,22 +52,15 @@ WorldBox world_box(const World& world, int body) {
   return box;
 }
 
-WorldBox turned_box(const World& world, int body, const Quat& turn) {
+Aabb turned_box(const World& world, int body, const Quat& turn) {
   const mjModel* m = world.model;
   const Vec3 origin = vec3(world.data->xpos + 3 * body);
-  WorldBox box{{1e10, 1e10, 1e10}, {-1e10, -1e10, -1e10}};
+  Aabb box;
   for (int g = 0; g < m->ngeom; ++g) {
     if (!observe::is_descendant_or_self(m, m->geom_bodyid[g], body)) continue;
-    const Pose geom = pose_from_mat(world.data->geom_xpos + 3 * g, world.data->geom_xmat + 9 * g);
+    const Pose geom = geom_pose(world.data, g);
     const Pose turned{origin + rotate(turn, geom.p - origin), turn * geom.q};
-    const double* aabb = m->geom_aabb + 6 * g;
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 p = turned * Vec3{aabb[0] + (corner & 1 ? aabb[3] : -aabb[3]),
-                                   aabb[1] + (corner & 2 ? aabb[4] : -aabb[4]),
-                                   aabb[2] + (corner & 4 ? aabb[5] : -aabb[5])};
-      box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-      box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
-    }
+    for (Vec3 corner : geom_corners(m, g)) box.add(turned * corner);
   }
   return box;
 }
@@ -107,7 +81,7 @@ bool bears(const World& world, Vec3 force, int object) {
 }
 
 bool likely_supports(const World& world, int carrier, int object) {
-  const WorldBox box = world_box(world, object), below = world_box(world, carrier);
+  const Aabb box = world_box(world, object), below = world_box(world, carrier);
   bool found = false;
   each_touch(world, object, [&](const Touch& touch) {
     if (found || !observe::is_descendant_or_self(world.model, touch.other, carrier)) return;
@@ -157,7 +131,7 @@ bool is_supported_over_whole_area(const World& world, Vec3 middle, Vec3 half, in
   return true;
 }
 
-double gap_from_above(const WorldBox& a, const WorldBox& b) {
+double gap_from_above(const Aabb& a, const Aabb& b) {
   const double x = std::max(a.low.x - b.high.x, b.low.x - a.high.x);
   const double y = std::max(a.low.y - b.high.y, b.low.y - a.high.y);
   if (x < 0 && y < 0) return std::max(x, y);

@@ -3,19 +3,15 @@
 // Tests whether one body supports another, by contact forces or, without forces, by contacts and
 // bounding boxes.
 
-#include "mjsense/core/pose.h"
+#include "mjsense/core/aabb.h"
 #include "mjsense/core/sensor.h"
 
 namespace mjsense::tasks {
 
-struct WorldBox {
-  Vec3 low, high;  // m, axis-aligned in the world frame
-  Vec3 center() const { return 0.5 * (low + high); }
-};
-// Bounding box of all geoms in the subtree of `body`.
-WorldBox world_box(const World& world, int body);
+// Bounding box of all geoms in the subtree of `body`, world frame.
+Aabb world_box(const World& world, int body);
 // The same after rotating the subtree by `turn` about the origin of `body`.
-WorldBox turned_box(const World& world, int body, const Quat& turn);
+Aabb turned_box(const World& world, int body, const Quat& turn);
 
 // Sum of the contact forces of the subtree of `carrier` on the subtree of `object`, N, world frame.
 Vec3 contact_force(const World& world, int carrier, int object);
@@ -42,7 +38,7 @@ bool is_supported_over_whole_area(const World& world, Vec3 middle, Vec3 half, in
                                   int object);
 
 // Horizontal gap between two boxes, m; negative if they overlap.
-double gap_from_above(const WorldBox& a, const WorldBox& b);
+double gap_from_above(const Aabb& a, const Aabb& b);
 
 // True if a geom in the subtree of `other_root` touches the subtree of `body`.
 bool touched_by(const World& world, int body, int other_root);

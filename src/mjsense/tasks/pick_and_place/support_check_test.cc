@@ -6,6 +6,8 @@
 #include <cmath>
 #include <memory>
 
+#include "mjsense/core/testing/test_model.h"
+
 namespace mjsense::tasks {
 namespace {
 
@@ -22,14 +24,6 @@ struct Support : testing::Test {
     <body name="block" pos="0 0 0.5"><freejoint/><geom type="box" size="0.03 0.03 0.03" mass="0.2"/></body>
     <body name="wall" pos="-0.5 0 0.2"><geom type="box" size="0.01 0.5 0.2"/></body>
   </worldbody></mujoco>)";
-  Support() {
-    char error[500] = "";
-    mjSpec* spec = mj_parseXMLString(kModel, nullptr, error, sizeof(error));
-    model.reset(mj_compile(spec, nullptr));
-    mj_deleteSpec(spec);
-    data.reset(mj_makeData(model.get()));
-    world = {.id = 0, .model = model.get(), .data = data.get()};
-  }
   // Places the block and simulates until it is at rest; `push`: constant force along x, N.
   void put(double x, double y, double z, double push = 0, int steps = 1000) {
     mj_resetData(model.get(), data.get());
@@ -40,9 +34,9 @@ struct Support : testing::Test {
     mj_forward(model.get(), data.get());
   }
   static constexpr int kTable = 1, kTray = 2, kBlock = 3, kWall = 4;
-  std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model{nullptr, mj_deleteModel};
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
-  World world;
+  ModelPtr model = compile_mjcf(kModel);
+  DataPtr data = make_data(model.get());
+  World world{.id = 0, .model = model.get(), .data = data.get()};
 };
 
 // A block with half extents of 2 x 3 x 4 cm, rotated by 90 and by 30 degrees. The half extents of
@@ -53,7 +47,7 @@ TEST_F(Support, BoundingBoxOfARotatedBlock) {
     model->geom_aabb[6 * model->body_geomadr[kBlock] + 3 + i] = 0.02 + 0.01 * i;
   for (const double degrees : {0.0, 90.0, 30.0}) {
     const double a = degrees * M_PI / 180, c = std::abs(std::cos(a)), s = std::abs(std::sin(a));
-    const WorldBox box = turned_box(world, kBlock, axis_angle({0, 0, 1}, a));
+    const Aabb box = turned_box(world, kBlock, axis_angle({0, 0, 1}, a));
     EXPECT_NEAR(box.high.x - box.low.x, 2 * (0.02 * c + 0.03 * s), 1e-9) << degrees;
     EXPECT_NEAR(box.high.y - box.low.y, 2 * (0.02 * s + 0.03 * c), 1e-9) << degrees;
     EXPECT_NEAR(box.high.z - box.low.z, 0.08, 1e-9) << degrees;
@@ -139,13 +133,13 @@ TEST_F(Support, WithoutForcesBoundingBoxesAreUsed) {
 
 TEST_F(Support, GapsBetweenBoxes) {
   put(0.2, 0.05, 0.03, 0, 0);
-  const WorldBox a = world_box(world, kTray), b = world_box(world, kBlock);
+  const Aabb a = world_box(world, kTray), b = world_box(world, kBlock);
   EXPECT_NEAR(b.low.x, 0.17, 1e-12);
   EXPECT_NEAR(a.high.z, 0.02, 1e-12);
   EXPECT_NEAR(gap_from_above(a, b), 0.07, 1e-12);
-  const WorldBox corner{{0.13, 0.14, 0}, {0.2, 0.2, 1}};
+  const Aabb corner{{0.13, 0.14, 0}, {0.2, 0.2, 1}};
   EXPECT_NEAR(gap_from_above(a, corner), 0.05, 1e-12) << "3, 4, 5";
-  const WorldBox over{{0.08, 0, 5}, {0.3, 0.1, 6}};
+  const Aabb over{{0.08, 0, 5}, {0.3, 0.1, 6}};
   EXPECT_NEAR(gap_from_above(a, over), -0.02, 1e-12);
 }
 

@@ -57,7 +57,7 @@ class CameraSensor(NativeSensor[CameraSensorData]):
     def __init__(self, cfg: Any = None, name: str | None = None) -> None:
         super().__init__(cfg, name)
         self.camera_idx = -1
-        """Name of the camera in the model."""
+        """Id of the camera in the model; -1 before the scene is made."""
 
     @property
     def camera_name(self) -> str:

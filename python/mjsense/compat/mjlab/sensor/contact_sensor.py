@@ -21,7 +21,7 @@ class ContactMatch:
     exclude: tuple[str, ...] = ()
 
     def native(self) -> configs.ContactMatch:
-        return configs.ContactMatch(**vars(self))  # type: ignore[arg-type]
+        return configs.ContactMatch(**vars(self))
 
 
 @dataclass

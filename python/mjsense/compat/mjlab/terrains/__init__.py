@@ -170,13 +170,6 @@ class TerrainEntityCfg(EntityCfg):
 
 
 __all__ = [
-    "BoxFlatTerrainCfg",
-    "BoxInvertedPyramidStairsTerrainCfg",
-    "BoxPyramidStairsTerrainCfg",
-    "HfPyramidSlopedTerrainCfg",
-    "HfRandomUniformTerrainCfg",
-    "HfWaveTerrainCfg",
-    "SubTerrainCfg",
-    "TerrainEntityCfg",
-    "TerrainGeneratorCfg",
-]
+    "BoxFlatTerrainCfg", "BoxInvertedPyramidStairsTerrainCfg", "BoxPyramidStairsTerrainCfg", "HfPyramidSlopedTerrainCfg",
+    "HfRandomUniformTerrainCfg", "HfWaveTerrainCfg", "SubTerrainCfg", "TerrainEntityCfg", "TerrainGeneratorCfg",
+]  # fmt: skip

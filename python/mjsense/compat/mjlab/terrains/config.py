@@ -23,10 +23,10 @@ ROUGH_TERRAINS_CFG = TerrainGeneratorCfg(
     num_cols=20,
     sub_terrains={
         "flat": BoxFlatTerrainCfg(proportion=0.2),
-        "pyramid_stairs": BoxPyramidStairsTerrainCfg(proportion=0.2, **_STAIRS),  # type: ignore[arg-type]
-        "pyramid_stairs_inv": BoxInvertedPyramidStairsTerrainCfg(proportion=0.2, **_STAIRS),  # type: ignore[arg-type]
-        "hf_pyramid_slope": HfPyramidSlopedTerrainCfg(proportion=0.1, **_SLOPE),  # type: ignore[arg-type]
-        "hf_pyramid_slope_inv": HfPyramidSlopedTerrainCfg(proportion=0.1, inverted=True, **_SLOPE),  # type: ignore[arg-type]
+        "pyramid_stairs": BoxPyramidStairsTerrainCfg(proportion=0.2, **_STAIRS),
+        "pyramid_stairs_inv": BoxInvertedPyramidStairsTerrainCfg(proportion=0.2, **_STAIRS),
+        "hf_pyramid_slope": HfPyramidSlopedTerrainCfg(proportion=0.1, **_SLOPE),
+        "hf_pyramid_slope_inv": HfPyramidSlopedTerrainCfg(proportion=0.1, inverted=True, **_SLOPE),
         "random_rough": HfRandomUniformTerrainCfg(proportion=0.1, noise_range=(0.02, 0.10), noise_step=0.02, border_width=0.25),
         "wave_terrain": HfWaveTerrainCfg(proportion=0.1, amplitude_range=(0.0, 0.2), num_waves=4, border_width=0.25),
     },

@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mjsense._mujoco import bodies_below
 from mjsense.compat.molmospaces.env.abstract_sensors import CoreSensor, Sensor
 from mjsense.core_sensors import TcpPoseSensor
 from mjsense.peer.matrices import matrix_of, pose_of_matrix
@@ -63,85 +64,74 @@ class DepthSensor(CoreSensor):
 class RobotJointPositionSensor(CoreSensor):
     """Joint positions by move group."""
 
-    def __init__(self, uuid: str = "qpos", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "qpos"
 
 
 class RobotJointVelocitySensor(CoreSensor):
     """Joint velocities by move group."""
 
-    def __init__(self, uuid: str = "qvel", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "qvel"
 
 
 class RobotBasePoseSensor(CoreSensor):
     """Pose of the base in the world."""
 
-    def __init__(self, uuid: str = "robot_base_pose", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "robot_base_pose"
 
 
 class EnvStateSensor(CoreSensor):
     """The state of free bodies and articulations."""
 
-    def __init__(self, uuid: str = "env_states", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "env_states"
 
 
 class TaskInfoSensor(CoreSensor):
     """The task's information about the state."""
 
-    def __init__(self, uuid: str = "task_info", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "task_info"
 
 
 class LastActionSensor(CoreSensor):
     """The action as the policy returned it."""
 
-    def __init__(self, uuid: str = "actions/commanded_action", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "actions/commanded_action"
 
 
 class LastCommandedJointPosSensor(CoreSensor):
     """Targets of the controllers."""
 
-    def __init__(self, uuid: str = "actions/joint_pos", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "actions/joint_pos"
 
 
 class LastCommandedRelativeJointPosSensor(CoreSensor):
     """Targets minus the positions observed before."""
 
-    def __init__(self, uuid: str = "actions/joint_pos_rel", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "actions/joint_pos_rel"
 
 
 class LastCommandedEETwistSensor(CoreSensor):
     """Twists from the tool frames observed before to those at the controllers' targets."""
 
-    def __init__(self, uuid: str = "actions/ee_twist", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "actions/ee_twist"
 
 
 class LastCommandedEEPoseSensor(CoreSensor):
     """Poses of the tool frames at the controllers' targets."""
 
-    def __init__(self, uuid: str = "actions/ee_pose", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "actions/ee_pose"
 
 
 class ObjectImagePointsSensor(CoreSensor):
     """Pixels that show the objects; omitted if the task has no camera."""
 
-    def __init__(self, uuid: str = "object_image_points", **kwargs: Any) -> None:
-        super().__init__(uuid, optional=True)
+    uuid = "object_image_points"
+    optional = True
 
 
 class DoorStateSensor(CoreSensor):
     """State of a door and its handle, of tasks with a door."""
 
-    def __init__(self, uuid: str = "door_state", **kwargs: Any) -> None:
-        super().__init__(uuid)
+    uuid = "door_state"
 
 
 def get_core_sensors(exp_config: Any) -> list[Any]:
@@ -155,20 +145,10 @@ def get_core_sensors(exp_config: Any) -> list[Any]:
         sensors += [CameraParameterSensor(camera.name), CameraSensor(camera.name)]
         if camera.record_depth:
             sensors.append(DepthSensor(camera.name))
-    sensors += [
-        RobotJointPositionSensor(),
-        RobotJointVelocitySensor(),
-        RobotBasePoseSensor(),
-        EnvStateSensor(),
-        TaskInfoSensor(),
-        LastActionSensor(),
-        LastCommandedJointPosSensor(),
-        LastCommandedRelativeJointPosSensor(),
-        LastCommandedEETwistSensor(),
-        LastCommandedEEPoseSensor(),
-        ObjectImagePointsSensor(),
-    ]
-    return sensors
+    others = (RobotJointPositionSensor, RobotJointVelocitySensor, RobotBasePoseSensor, EnvStateSensor, TaskInfoSensor, LastActionSensor,
+              LastCommandedJointPosSensor, LastCommandedRelativeJointPosSensor, LastCommandedEETwistSensor, LastCommandedEEPoseSensor,
+              ObjectImagePointsSensor)  # fmt: skip
+    return [*sensors, *(sensor() for sensor in others)]
 
 
 # ---------------------------------------------------------------------------------------------------- of tasks and objects
@@ -250,9 +230,9 @@ class GraspStateSensor(Sensor):
         view = env.robots[batch_index].robot_view
         if self._geoms is None:
             model = env.mj_model
-            of_object = _geoms_below(model, model.body(body_name(self.object_name, task)).id)
-            grippers = view.get_gripper_movegroup_ids()
-            self._geoms = of_object, {name: _geoms_below(model, view.get_gripper(name).root_body_id) for name in grippers}
+            roots = {name: view.get_gripper(name).root_body_id for name in view.get_gripper_movegroup_ids()}
+            of_grippers = {name: bodies_below(model, root)[model.geom_bodyid] for name, root in roots.items()}
+            self._geoms = bodies_below(model, model.body(body_name(self.object_name, task)).id)[model.geom_bodyid], of_grippers
         of_object, of_grippers = self._geoms
         touching, foreign = dict.fromkeys(of_grippers, False), False
         for one, other in data.contact.geom:
@@ -265,14 +245,6 @@ class GraspStateSensor(Sensor):
             else:
                 touching[gripper] = True
         return {name: {"touching": touches, "held": touches and not foreign} for name, touches in touching.items()}
-
-
-def _geoms_below(model: Any, root: int) -> np.ndarray:
-    """bool ``[ngeom]``: geoms of the body and of those below it."""
-    below = np.zeros(model.nbody, bool)
-    for body in range(root, model.nbody):  # parents come first
-        below[body] = body == root or below[model.body_parentid[body]]
-    return below[model.geom_bodyid]
 
 
 # ------------------------------------------------------------------------------------------------------ of robots and policies

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "mjsense/observe/frame.h"
+#include "mjsense/observe/touches.h"
 #include "mjsense/policies/planner/collision.h"
 #include "mjsense/scene/resolve.h"
 
@@ -77,16 +78,13 @@ class MotionQuality {
     last_.resize(dofs_.size());
     for (std::size_t i = 0; i < dofs_.size(); ++i) last_[i] = world.data->qvel[dofs_[i]];
     last_time_ = time;
-    for (int c = 0; c < world.data->ncon; ++c) {
-      const mjContact& contact = world.data->contact[c];
-      if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-      const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
-      if ((m->body_rootid[a] == root_) == (m->body_rootid[b] == root_)) continue;
-      if (-contact.dist <= depth) continue;
-      depth = -contact.dist;
-      deepest = scene::name_of(m, mjOBJ_BODY, a) + " in " + scene::name_of(m, mjOBJ_BODY, b) +
-                " at " + std::to_string(time) + " s in phase " + std::to_string(phase);
-    }
+    observe::each_touch(world, root_, [&](const observe::Touch& touch) {
+      if (-touch.contact->dist <= depth) return;
+      depth = -touch.contact->dist;
+      deepest = scene::name_of(m, mjOBJ_BODY, touch.own) + " in " +
+                scene::name_of(m, mjOBJ_BODY, touch.other) + " at " + std::to_string(time) +
+                " s in phase " + std::to_string(phase);
+    });
     CollisionQuery query(*model_, world);
     for (int body = 1; body < m->nbody; ++body) {
       if (m->body_rootid[body] != root_ && m->body_parentid[body] == 0) query.ignore(body);

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -31,7 +32,7 @@ struct TableStage {
   }
   std::unique_ptr<tasks::PickTask> task;
   std::unique_ptr<scene::Scene> scene;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  DataPtr data;
   World world;
 };
 

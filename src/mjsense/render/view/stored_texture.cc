@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/render/view/stored_texture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "mjsense/core/content_cache.h"
+
+namespace mjsense::render {
+namespace {
+
+// Table of linear values by sRGB value.
+std::array<std::uint8_t, 256> linear_values() {
+  std::array<std::uint8_t, 256> table;
+  for (int i = 0; i < 256; ++i) {
+    const double v = i / 255.0;
+    const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+    table[i] = static_cast<std::uint8_t>(std::lround(255.0 * linear));
+  }
+  return table;
+}
+
+// The two texels of a row of `size` between which texel i of the next level's row of `half` lies.
+struct Between {
+  int first, second;
+  float weight;  // of the second
+};
+Between between(int i, int size, int half) {
+  const float x =
+      (static_cast<float>(i) + 0.5f) * static_cast<float>(size) / static_cast<float>(half) - 0.5f;
+  const int first = static_cast<int>(x);
+  return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
+}
+
+// Functions that go over all texels are compiled for wide vectors too. Without fused operations, so
+// that the results are the same.
+#ifdef __x86_64__
+#define MJSENSE_VECTORS [[gnu::target_clones("avx2", "default")]]
+#else
+#define MJSENSE_VECTORS
+#endif
+
+// The texels (a + b + c + d + 2) / 4 of pairs of neighbours in two rows.
+MJSENSE_VECTORS void mean_row(const std::uint32_t* above, const std::uint32_t* below, int count,
+                              std::uint32_t* out) {
+  // A pair as four sums of 16 bits: red and blue, then green and alpha.
+  constexpr std::uint64_t kChannels = 0x00ff00ff00ff00ff;
+  constexpr std::uint32_t kHalf = 0x00020002;  // rounds the division by four
+  const auto mean = [](auto upper, auto lower, int shift) {
+    const auto sums = (upper >> shift & kChannels) + (lower >> shift & kChannels);
+    return (sums + (sums >> 32) + kHalf) >> 2 & 0x00ff00ff;
+  };
+  constexpr int kPairs = 2;
+  using Pairs [[gnu::vector_size(8 * kPairs)]] = std::uint64_t;
+  using Texels [[gnu::vector_size(4 * kPairs)]] = std::uint32_t;
+  int x = 0;
+  for (; x + kPairs <= count; x += kPairs) {
+    Pairs upper, lower;
+    std::memcpy(&upper, above + 2 * x, sizeof upper);
+    std::memcpy(&lower, below + 2 * x, sizeof lower);
+    const Pairs means = mean(upper, lower, 0) | mean(upper, lower, 8) << 8;
+    const Texels texels = __builtin_convertvector(means, Texels);
+    std::memcpy(out + x, &texels, sizeof texels);
+  }
+  for (; x < count; ++x) {
+    std::uint64_t upper, lower;
+    std::memcpy(&upper, above + 2 * x, sizeof upper);
+    std::memcpy(&lower, below + 2 * x, sizeof lower);
+    out[x] = static_cast<std::uint32_t>(mean(upper, lower, 0) | mean(upper, lower, 8) << 8);
+  }
+}
+
+// The texels between the two rows (`below` has the weight v) and between the given columns.
+MJSENSE_VECTORS void interpolated_row(const std::uint32_t* above, const std::uint32_t* below,
+                                      float v, std::span<const Between> columns,
+                                      std::uint32_t* out) {
+  using Channels [[gnu::vector_size(16)]] = float;
+  using Words [[gnu::vector_size(16)]] = std::int32_t;
+  constexpr Words kShifts = {0, 8, 16, 24};
+  const auto unpacked = [&](std::uint32_t texel) {
+    const auto word = static_cast<std::int32_t>(texel);
+    const Words words = Words{word, word, word, word} >> kShifts & 255;
+    return __builtin_convertvector(words, Channels);
+  };
+  for (const Between& u : columns) {
+    const auto mix = [&](const std::uint32_t* row) {
+      const Channels first = unpacked(row[u.first]);
+      return first + u.weight * (unpacked(row[u.second]) - first);
+    };
+    const Channels upper = mix(above);
+    const Channels value = upper + v * (mix(below) - upper) + 0.5f;
+    const Words words = __builtin_convertvector(value, Words) << kShifts;
+    *out++ = static_cast<std::uint32_t>(words[0] | words[1] | words[2] | words[3]);
+  }
+}
+
+// Texels of three bytes to opaque texels of four.
+MJSENSE_VECTORS void opaque_row(const mjtByte* from, int count, std::uint32_t* out) {
+  using Bytes [[gnu::vector_size(16)]] = std::uint8_t;
+  using Texels [[gnu::vector_size(16)]] = std::uint32_t;
+  int x = 0;
+  for (; x + 6 <= count; x += 4, from += 12) {  // reads 16 bytes
+    Bytes bytes;
+    std::memcpy(&bytes, from, sizeof bytes);
+    const auto spread =
+        __builtin_shufflevector(bytes, bytes, 0, 1, 2, 0, 3, 4, 5, 0, 6, 7, 8, 0, 9, 10, 11, 0);
+    const Texels texels = (Texels)spread | 0xff000000;
+    std::memcpy(out + x, &texels, sizeof texels);
+  }
+  for (; x < count; ++x, from += 3) out[x] = from[0] | from[1] << 8 | from[2] << 16 | 0xff000000;
+}
+
+// From the rows of one level to those of the next, by interpolation at its texels' centres, as
+// OpenGL drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts
+// the image nor drops its border.
+class Halving {
+ public:
+  Halving(const Texture& texture, int from)
+      : width_(static_cast<int>(texture.width[from + 1])),
+        source_height_(static_cast<int>(texture.height[from])),
+        height_(static_cast<int>(texture.height[from + 1])) {
+    const int source_width = static_cast<int>(texture.width[from]);
+    even_ = source_width == 2 * width_ && source_height_ == 2 * height_;
+    for (int x = 0; x < width_ && !even_; ++x) columns_.push_back(between(x, source_width, width_));
+  }
+
+  // Computes row y from row(i) of the finer level, whose last two results must stay valid.
+  template <class Row>
+  void compute(int y, Row row, std::uint32_t* out) const {
+    const Between v = even_ ? Between{2 * y, 2 * y + 1, 0} : between(y, source_height_, height_);
+    const std::uint32_t *above = row(v.first), *below = row(v.second);
+    if (even_) {
+      mean_row(above, below, width_, out);
+    } else {
+      interpolated_row(above, below, v.weight, columns_, out);
+    }
+  }
+
+ private:
+  int width_, source_height_, height_;
+  bool even_;
+  std::vector<Between> columns_;  // unless even_
+};
+
+// Models of MuJoCo before 3.3.3 have no colour spaces.
+int color_space(const mjModel* model, int id) {
+  return model->tex_colorspace ? model->tex_colorspace[id] : mjCOLORSPACE_AUTO;
+}
+
+int num_images(const Texture& texture) { return texture.cube && !texture.same_faces ? 6 : 1; }
+
+// Rows of the model's texture.
+class SourceRows {
+ public:
+  SourceRows(const mjModel* model, int id, const Texture& texture, int face)
+      : channels_(model->tex_nchannel[id]),
+        width_(model->tex_width[id]),
+        srgb_(color_space(model, id) == mjCOLORSPACE_SRGB && !texture.cube),
+        data_(model->tex_data + model->tex_adr[id] +
+              bytes(face * static_cast<int>(texture.height[0]))) {}
+
+  void compute(int y, std::uint32_t* out) const {
+    static const std::array<std::uint8_t, 256> linear = linear_values();
+    const mjtByte* from = data_ + bytes(y);
+    if (!srgb_ && channels_ == 3) return opaque_row(from, width_, out);
+    for (int x = 0; x < width_; ++x, from += channels_) {
+      const std::uint32_t alpha = channels_ == 4 ? from[3] : 255;
+      out[x] = srgb_ ? linear[from[0]] | linear[from[1]] << 8 | linear[from[2]] << 16 | alpha << 24
+                     : from[0] | from[1] << 8 | from[2] << 16 | alpha << 24;
+    }
+  }
+
+ private:
+  std::size_t bytes(int rows) const { return static_cast<std::size_t>(rows) * width_ * channels_; }
+  int channels_, width_;
+  bool srgb_;
+  const mjtByte* data_;
+};
+
+// Rows of a level that is computed from the source without storing the levels in between.
+class LevelRows {
+ public:
+  LevelRows(const SourceRows& source, const Texture& texture, int level) : source_(source) {
+    if (level > 0) {
+      finer_ = std::make_unique<LevelRows>(source, texture, level - 1);
+      halving_ = std::make_unique<Halving>(texture, level - 1);
+    }
+    for (std::vector<std::uint32_t>& row : rows_)
+      row.resize(static_cast<std::size_t>(texture.width[level]));
+  }
+
+  void compute(int y, std::uint32_t* out) {
+    if (!finer_) return source_.compute(y, out);
+    halving_->compute(
+        y, [this](int i) { return finer_->row(i); }, out);
+  }
+
+ private:
+  // The last even and the last odd row are kept.
+  const std::uint32_t* row(int y) {
+    std::vector<std::uint32_t>& kept = rows_[y % 2];
+    if (std::exchange(indices_[y % 2], y) != y) compute(y, kept.data());
+    return kept.data();
+  }
+
+  const SourceRows& source_;
+  std::unique_ptr<LevelRows> finer_;  // null: the source
+  std::unique_ptr<Halving> halving_;
+  std::vector<std::uint32_t> rows_[2];
+  int indices_[2] = {-1, -1};
+};
+
+void fill_texture(const mjModel* model, int id, StoredTexture& out) {
+  Texture& texture = out.texture;
+  const int faces = num_images(texture);
+  std::size_t total = 0;
+  for (int n = texture.finest; n < texture.levels; ++n) {
+    texture.offset[n] = static_cast<int>(total);
+    total += faces * static_cast<std::size_t>(texture.width[n] + 1) *
+             static_cast<std::size_t>(texture.height[n]);
+  }
+  out.texels = std::make_unique_for_overwrite<std::uint32_t[]>(total);
+  texture.texels = out.texels.get();
+  for (int f = 0; f < faces; ++f) {
+    const SourceRows source(model, id, texture, f);
+    LevelRows first(source, texture, texture.finest);
+    std::uint32_t* finer = nullptr;  // the level before
+    for (int n = texture.finest; n < texture.levels; ++n) {
+      const int width = static_cast<int>(texture.width[n]),
+                height = static_cast<int>(texture.height[n]);
+      const std::size_t stride = width + 1;
+      std::uint32_t* level = out.texels.get() + texture.offset[n] + f * stride * height;
+      std::unique_ptr<Halving> halving;
+      if (finer) halving = std::make_unique<Halving>(texture, n - 1);
+      const auto finer_row = [&](int y) {
+        return finer + y * static_cast<std::size_t>(texture.width[n - 1] + 1);
+      };
+      for (int y = 0; y < height; ++y) {
+        std::uint32_t* row = level + y * stride;
+        if (finer) {
+          halving->compute(y, finer_row, row);
+        } else {
+          first.compute(y, row);
+        }
+        row[width] = row[texture.cube ? width - 1 : 0];
+      }
+      finer = level;
+    }
+  }
+}
+
+}  // namespace
+
+Texture texture_levels(const mjModel* model, int id) {
+  Texture texture;
+  const int channels = model->tex_nchannel[id];
+  // Textures with another number of channels are encoded for another renderer and ignored.
+  if (channels != 3 && channels != 4) return texture;
+  texture.cube = model->tex_type[id] != mjTEXTURE_2D;
+  // A cube texture with a square image repeats that image on all faces.
+  texture.same_faces = texture.cube && model->tex_width[id] == model->tex_height[id];
+  int width = model->tex_width[id], height = texture.cube ? width : model->tex_height[id];
+  for (; texture.levels < Texture::kMaxLevels;
+       width = std::max(1, width / 2), height = std::max(1, height / 2)) {
+    texture.width[texture.levels] = static_cast<float>(width);
+    texture.height[texture.levels++] = static_cast<float>(height);
+    if (width == 1 && height == 1) break;
+  }
+  texture.finest = texture.levels;
+  return texture;
+}
+
+std::shared_ptr<const StoredTexture> stored_texture(const mjModel* m, int id, int finest) {
+  static ContentCache<StoredTexture> all;
+  auto made = std::make_shared<StoredTexture>();
+  made->texture = texture_levels(m, id);
+  if (made->texture.levels == 0) return made;
+  const int channels = m->tex_nchannel[id], width = m->tex_width[id], height = m->tex_height[id];
+  const int form[] = {m->tex_type[id], color_space(m, id), channels, width, height, finest};
+  const std::size_t bytes = static_cast<std::size_t>(width) * height * channels;
+  const ContentKey key = ContentKey()
+                             .add(std::span<const int>(form))
+                             .add(std::span(m->tex_data + m->tex_adr[id], bytes));
+  return all.get(key, [&] {
+    made->texture.finest = finest;
+    fill_texture(m, id, *made);
+    return made;
+  });
+}
+
+}  // namespace mjsense::render
