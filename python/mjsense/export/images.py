@@ -17,7 +17,9 @@ from mjsense.export.output import needs
 
 CRF = 18
 """Quality of videos that are encoded again, better than the recording's own."""
-_OPTIONS = {"preset": "veryfast", "tune": "fastdecode", "crf": str(CRF), "bf": "0", "g": "20"}  # as the recorder's, but for crf
+# As the recorder's, but for two options: crf, and mbtree, which in x264 165 with AVX-512 reads memory that was never written. In a
+# program that has run for a while, the same images would become different files.
+_OPTIONS = {"preset": "veryfast", "tune": "fastdecode", "crf": str(CRF), "bf": "0", "g": "20", "mbtree": "0"}
 FLAGS = ("reward", "success", "terminated", "truncated")
 """Features that every export has."""
 
