@@ -25,6 +25,9 @@ import mujoco
 import numpy as np
 from images import ssim, write_sheet
 
+# In a process in which numba compiles, as the first that uses robosuite does, the images of software OpenGL (Mesa 22.3) are wrong.
+os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
+
 GYMNASIUM = """Ant-v5 HalfCheetah-v5 Hopper-v5 Humanoid-v5 HumanoidStandup-v5 InvertedDoublePendulum-v5 InvertedPendulum-v5 Pusher-v5
     Reacher-v5 Swimmer-v5 Walker2d-v5 AdroitHandDoor-v1 AdroitHandHammer-v1 AdroitHandPen-v1 AdroitHandRelocate-v1 AntMaze_UMaze-v5
     FetchPickAndPlace-v4 FetchPush-v4 FetchReach-v4 FetchSlide-v4 FrankaKitchen-v1 HandManipulateBlock-v1 HandManipulateEgg-v1
