@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("viser", reason="viser is not installed")
 
+from devtools import Page, needs_chromium
 from mjsense._rotations import rotation_of
 from mjsense.teleoperation.devices import SpaceMouse, device_of
 from mjsense.teleoperation.page import STEP, TURN
@@ -66,10 +67,9 @@ def presses(page, key, count):
         time.sleep(0.02)
 
 
+@needs_chromium
 def test_a_block_is_picked_with_keys(tmp_path, port):
     """The recording verifies and replays."""
-    from devtools import Page
-
     options = {"scene": "table", "cameras": []}
     env = mjs.make_vec("pick", seed=SEED, arm_controller="ee_pose", **options)
     env.reset(seed=SEED)

@@ -17,7 +17,7 @@ import pytest
 import mjsense as mjs
 
 pytest.importorskip("viser", reason="viser is not installed: pip install 'mjsense[view]'")
-pytestmark = pytest.mark.skipif(devtools.chromium() is None, reason="there is no Chromium")
+pytestmark = devtools.needs_chromium
 ROBOTS = ("quadruped", "bimanual_yam/stand", "floating_rum/rum", "franka/fr3", "franka_hand/hand", "i2rt_yam/yam", "mobile_franka/base", "rby1/rby1")
 
 
