@@ -383,17 +383,6 @@ inline Vec4f columns(const Float4* rows) {
   return out;
 #endif
 }
-// Writes the lanes of `m`, one after another, to p[0], p[1]... Of the kWidth floats from p on, those
-// after them are unspecified.
-inline void compress(float* p, Mask m, Float a) {
-#if defined(__AVX512F__)
-  _mm512_storeu_ps(p, _mm512_maskz_compress_ps(m.m, a.v));
-#else
-  float lanes[kWidth];
-  std::memcpy(lanes, &a, sizeof lanes);
-  for (std::uint32_t left = bits(m); left; left &= left - 1) *p++ = lanes[__builtin_ctz(left)];
-#endif
-}
 inline Vec3f operator+(Vec3f a, Vec3f b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec3f operator-(Vec3f a, Vec3f b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Float dot(Vec3f a, Vec3f b) { return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)); }

@@ -13,7 +13,7 @@
 namespace mjsense::render {
 namespace {
 
-// A block of triangles as linear functions of x and y: f(x, y) = f[0] x + f[1] y - f[2].
+// A block of triangles as linear functions of x and y: f(x, y) = f[0] x + f[1] y + f[2].
 struct alignas(64) Drawn {
   float edges[3][3][rays::kClusterSize];
   float inverse_t[3][rays::kClusterSize];
@@ -22,10 +22,11 @@ struct alignas(64) Drawn {
   int face[rays::kClusterSize];
 };
 
+// Stores v . (x, y, -1) as a function of x and y.
 inline void store(float (*p)[rays::kClusterSize], int k, Vec3f v) {
   store(p[0] + k, v.x);
   store(p[1] + k, v.y);
-  store(p[2] + k, v.z);
+  store(p[2] + k, -v.z);
 }
 
 inline Vec3f scaled(Vec3f v, float by) {
@@ -112,31 +113,23 @@ inline std::uint32_t set_up(const View& view, const ViewGeom& g, float side,
   return drawn;
 }
 
-// Triangles that were set up for a tile, kept for samples of its pixels at other places.
+// Blocks that were set up for a tile, kept for samples of its pixels at other places.
 class KeptTriangles {
  public:
   struct OfGeom {
     int index;        // in the view
-    int first, last;  // triangles
+    int first, last;  // blocks
   };
 
   void clear() { count_ = num_geoms_ = 0; }
-  // Call begin(), add() for each block, and end() if begin() returned true. begin(): whether there is
-  // room for `blocks` blocks.
+  // Call begin(), add() for each block that is set up in next(), and end() if begin() returned true.
+  // begin(): whether there is room for `blocks` blocks.
   bool begin(int blocks) {
     first_ = count_;
-    return count_ + blocks * rays::kClusterSize <= kMost && num_geoms_ < kMostGeoms;
+    return count_ + blocks <= kMostBlocks && num_geoms_ < kMostGeoms;
   }
-  void add(const Drawn& drawn, std::uint32_t lanes) {
-    const float* row = &drawn.edges[0][0][0];
-    for (int i = 0; i < kRows; ++i, row += rays::kClusterSize)
-      for (int k = 0, at = count_; k < rays::kClusterSize; k += kWidth) {
-        const std::uint32_t some = lanes >> k & kAllLanes;
-        compress(rows_[i] + at, mask_of(some), load(row + k));
-        at += __builtin_popcount(some);
-      }
-    count_ += __builtin_popcount(lanes);
-  }
+  Drawn& next() { return blocks_[count_]; }
+  void add(std::uint32_t lanes) { lanes_[count_++] = lanes; }
   void end(int index) { geoms_[num_geoms_++] = {index, first_, count_}; }
 
   const OfGeom* find(int index) const {  // null: none are kept
@@ -144,19 +137,14 @@ class KeptTriangles {
       if (geoms_[i].index == index) return &geoms_[i];
     return nullptr;
   }
-  // Loads kClusterSize triangles; those beyond the last are unspecified.
-  void load_block(int first, Drawn& drawn) const {
-    float* row = &drawn.edges[0][0][0];
-    for (int i = 0; i < kRows; ++i, row += rays::kClusterSize)
-      for (int k = 0; k < rays::kClusterSize; k += kWidth)
-        store(row + k, loadu(rows_[i] + first + k));
-  }
+  const Drawn& block(int i) const { return blocks_[i]; }
+  std::uint32_t lanes(int i) const { return lanes_[i]; }  // that were set up
 
  private:
-  static constexpr int kMost = 4096, kMostGeoms = 64;
-  static constexpr int kRows = sizeof(Drawn) / (sizeof(float) * rays::kClusterSize);
+  static constexpr int kMostBlocks = 512, kMostGeoms = 64;
 
-  float rows_[kRows][kMost + 3 * rays::kClusterSize];  // not a power of two, which caches dislike
+  Drawn blocks_[kMostBlocks];
+  std::uint32_t lanes_[kMostBlocks];
   int count_, first_;
   OfGeom geoms_[kMostGeoms];
   int num_geoms_;

@@ -221,7 +221,7 @@ inline void copy_lanes(const Pixels& pixels, const Hits& hits, int k, int count,
 inline void keep_differing(const View& view, const Tile& centers, const std::uint32_t* always,
                            SampledPixels& pixels, Tile& tile) {
   const int samples = pixels.samples, packets = pixels.packets();
-  const float maximum = kBend * view.grid.dx;
+  const float maximum = kBend * view.grid.dx, part = 1.0f / samples;
   int kept = 0;  // pixels
   for (int q = 0; q < packets; ++q) {
     const Hits& hits = tile.hits[q];
@@ -239,7 +239,7 @@ inline void keep_differing(const View& view, const Tile& centers, const std::uin
         mean += nearness[j];
         differs |= hits.geom[j] != geom;
       }
-      const float bend = mean / samples - center;
+      const float bend = mean * part - center;
       if (!differs && (bend < 0 ? -bend : bend) <= maximum * center) continue;
       if (const int to = kept * samples; kept < i)
         copy_lanes(tile.pixels[q], hits, k, samples, tile.pixels[to / kLanes],

@@ -11,7 +11,7 @@ namespace mjsense::render {
 namespace {
 
 inline Float linear(const float (*f)[rays::kClusterSize], int lane, Float x, Float y) {
-  return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
+  return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(f[2][lane])));
 }
 
 // A triangle of a block (`lane`) and a packet that it may cover.
@@ -64,7 +64,7 @@ inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int
     if (g.mesh) continue;  // the mesh has vertex normals
     const Vec3f n =
         to_geom(g.rot, {splat(-drawn.inverse_t[0][lane]), splat(-drawn.inverse_t[1][lane]),
-                        splat(-drawn.inverse_t[2][lane])});
+                        splat(drawn.inverse_t[2][lane])});
     store(h.n[0] + k, select(hit, n.x, load(h.n[0] + k)));
     store(h.n[1] + k, select(hit, n.y, load(h.n[1] + k)));
     store(h.n[2] + k, select(hit, n.z, load(h.n[2] + k)));
@@ -198,13 +198,10 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
                       PacketMask& changed) {
   const ViewGeom& g = view.geoms[index];
   Drawing drawing{g, index, packets, tile};
-  Drawn drawn;
   if (const auto* part = tile.kept ? tile.kept->find(index) : nullptr) {
-    for (int i = part->first; i < part->last; i += rays::kClusterSize) {
-      tile.kept->load_block(i, drawn);
-      const int left = part->last - i;
-      const std::uint32_t all = left < rays::kClusterSize ? (1u << left) - 1 : 0xffffu;
-      drawing.draw(drawn, all & lanes_over(view, drawn, tile.around, nullptr));
+    for (int i = part->first; i < part->last; ++i) {
+      const Drawn& drawn = tile.kept->block(i);
+      drawing.draw(drawn, tile.kept->lanes(i) & lanes_over(view, drawn, tile.around, nullptr));
     }
     changed = drawing.changed;
     return true;
@@ -222,13 +219,15 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
   const float side = handedness(g);
   const Tile* centers = tile.regular && !view.grid.distorted_rays ? &tile : nullptr;
   KeptTriangles* const keep = tile.keep && tile.keep->begin(count) ? tile.keep : nullptr;
+  Drawn not_kept;
   for (int i = 0; i < count; ++i) {
     const rays::TriangleBlock& block = clusters.blocks[blocks[i]];
+    Drawn& drawn = keep ? keep->next() : not_kept;
     if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
     std::uint32_t lanes = set_up(view, g, side, block, keep ? tile.reach : tile.around,
                                  keep ? nullptr : centers, drawn);
     if (keep && lanes) {
-      keep->add(drawn, lanes);
+      keep->add(lanes);
       lanes &= lanes_over(view, drawn, tile.around, centers);
     }
     drawing.draw(drawn, lanes);

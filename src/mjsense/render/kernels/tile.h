@@ -172,6 +172,7 @@ inline void shade_samples(const View& view, const TileLists& lists, const std::u
   keep_differing(view, centers, always, pixels, tile);
   if (!pixels.count) return;
   const int packets = pixels.packets(), samples = pixels.samples;
+  const float part = 1.0f / samples;
   Shadows shadows;
   if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, lit);
   if (view.reflection) trace_reflection(view, packets, tile, reflection);
@@ -183,7 +184,7 @@ inline void shade_samples(const View& view, const TileLists& lists, const std::u
       for (int c = 0; c < 3; ++c) {
         float sum = 0;
         for (int i = k; i < k + samples; ++i) sum += sampled.rgb[c][i];
-        colors[pixels.packet[pixel]].rgb[c][pixels.lane[pixel]] = sum / samples;
+        colors[pixels.packet[pixel]].rgb[c][pixels.lane[pixel]] = sum * part;
       }
     }
   }
