@@ -4,8 +4,10 @@
     python bench/drop_in.py [--sizes 84 256 640x480] [--json FILE] [--pictures FOLDER] [ENVIRONMENT ...]
 
 Needs the packages of the environments (those of tests/python/test_adapters.py), PyOpenGL and EGL; environments that cannot be made are skipped.
-Both renderers draw the same states, after one step each with a random action, through the environment's own function. Times are medians of
-the images that differ from the one before. The columns "step" are the CPU times of a step and its image. --pictures writes the last image of each environment and size, the package's own at the left, mjsense's at the right.
+Both renderers draw the same states, after one step each with a random action, through the environment's own function, in turns of 50 steps
+each. Times are medians of the images that differ from the one before; ratios are medians of the turns' ratios. The columns "step" are the
+CPU times of a step and its image. --pictures writes the last image of each environment and size, the package's own at the left, mjsense's at
+the right.
 """
 
 from __future__ import annotations
@@ -173,35 +175,66 @@ def make(name: str, size: Size, use: bool) -> Made:
     return MAKE.get(name.split("/")[0], gymnasium_env)(name, size, use)
 
 
-class Measured(NamedTuple):
-    images: np.ndarray
-    image_ms: float  # median CPU time of an image
-    step_ms: float  # of a step and its image
-    first_ms: float  # of the first image with the renderer's construction
+TURN = 50
+"""Steps of one renderer before it is the other's turn."""
 
 
-def measure(name: str, size: Size, use: bool, count: int) -> Measured:
-    """The images of `count` steps and their CPU times."""
-    env, step, render = make(name, size, use)
-    start = time.process_time()
-    rows, image_times, step_times = [render()], [], []
-    first = time.process_time() - start
-    for _ in range(count):
-        begin = time.process_time()
-        step()
+class Run:
+    """Images of an environment, and their CPU times in ms."""
+
+    def __init__(self, name: str, size: Size, use: bool) -> None:
+        self._env, self._step, self._render = make(name, size, use)
         start = time.process_time()
-        rows.append(render())
-        end = time.process_time()
-        image_times.append(end - start)
-        step_times.append(end - begin)
-    env.close()
-    del env, step, render
-    gc.collect()  # frees OpenGL's contexts here, not in a later measurement
-    moved = [not np.array_equal(rows[i], rows[i + 1]) for i in range(count)]
-    if sum(moved) < count / 2:
-        raise ValueError(f"only {sum(moved)} of {count} images differ from the one before")
-    image_ms, step_ms = (1e3 * statistics.median(itertools.compress(times, moved)) for times in (image_times, step_times))
-    return Measured(np.array(rows[1:]), image_ms, step_ms, 1e3 * first)
+        self.images = [self._render()]
+        self.first = 1e3 * (time.process_time() - start)  # with the renderer's construction
+        self.image_times: list[float] = []
+        self.step_times: list[float] = []  # of steps with their images
+
+    def run(self, count: int) -> None:
+        for _ in range(count):
+            begin = time.process_time()
+            self._step()
+            start = time.process_time()
+            self.images.append(self._render())
+            end = time.process_time()
+            self.image_times.append(1e3 * (end - start))
+            self.step_times.append(1e3 * (end - begin))
+
+    def close(self) -> None:
+        """Frees OpenGL's contexts here, not in a later measurement."""
+        self._env.close()
+        del self._env, self._step, self._render
+        gc.collect()
+
+
+class Compared(NamedTuple):
+    """A time of both renderers, ms, and their ratio."""
+
+    opengl: float
+    mjsense: float
+    ratio: float
+
+
+def compare(theirs: list[float], ours: list[float], used: list[bool]) -> Compared:
+    """Medians of the used times, and the median of the turns' ratios, which changes less with the speed of the machine."""
+    turns = [
+        tuple(list(itertools.compress(times[i : i + TURN], used[i : i + TURN])) for times in (theirs, ours))
+        for i in range(0, len(used), TURN)
+    ]
+    ratio = statistics.median(statistics.median(a) / statistics.median(b) for a, b in turns if a)
+    opengl, mjsense = (statistics.median(itertools.compress(times, used)) for times in (theirs, ours))
+    return Compared(opengl, mjsense, ratio)
+
+
+def measure(name: str, size: Size, count: int) -> tuple[Run, Run]:
+    """The package's own renderer and mjsense, which draw `count` steps in turns."""
+    runs = Run(name, size, False), Run(name, size, True)
+    for i in range(0, count, TURN):
+        for run in runs:
+            run.run(min(TURN, count - i))
+    for run in runs:
+        run.close()
+    return runs
 
 
 def psnr(a: np.ndarray, b: np.ndarray) -> float:
@@ -227,7 +260,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("environments", nargs="*", default=ENVIRONMENTS)
     parser.add_argument("--sizes", nargs="+", type=size_of, default=[(84, 84), (256, 256), (640, 480)])
-    parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--json")
     parser.add_argument("--pictures", type=Path)
     arguments = parser.parse_args()
@@ -240,31 +273,33 @@ def main() -> None:
         for size in arguments.sizes:
             label = f"{size[0]}x{size[1]}"
             try:
-                theirs, ours = (measure(name, size, use, arguments.count) for use in (False, True))
+                theirs, ours = measure(name, size, arguments.count)
+                moved = [not np.array_equal(*pair) for pair in itertools.pairwise(theirs.images)]
+                if sum(moved) < 5:
+                    raise ValueError(f"only {sum(moved)} of {len(moved)} images differ from the one before")
             except Exception as error:
                 print(f"{name:38s} {label:>8s} {type(error).__name__}: {str(error)[:90]}", flush=True)
                 continue
             if arguments.pictures:
                 save_picture(arguments.pictures / f"{name.replace('/', '_')}_{label}.jpg", theirs.images[-1], ours.images[-1])
+            image = compare(theirs.image_times, ours.image_times, moved)
+            step = compare(theirs.step_times, ours.step_times, moved)
             row = {
                 "environment": name,
                 "size": label,
-                "opengl_ms": theirs.image_ms,
-                "mjsense_ms": ours.image_ms,
-                "opengl_step_ms": theirs.step_ms,
-                "mjsense_step_ms": ours.step_ms,
-                "first_ms": ours.first_ms,
-                "psnr": psnr(theirs.images, ours.images),
+                "opengl_ms": image.opengl,
+                "mjsense_ms": image.mjsense,
+                "ratio": image.ratio,
+                "opengl_step_ms": step.opengl,
+                "mjsense_step_ms": step.mjsense,
+                "step_ratio": step.ratio,
+                "first_ms": ours.first,
+                "psnr": psnr(np.array(theirs.images[1:]), np.array(ours.images[1:])),
             }
             rows.append(row)
-            numbers = (theirs.image_ms, ours.image_ms, theirs.image_ms / ours.image_ms)
-            steps = (theirs.step_ms, ours.step_ms, theirs.step_ms / ours.step_ms)
-            print(
-                f"{name:38s} {label:>8s} " + " ".join(f"{x:9.2f}" for x in (*numbers, *steps, ours.first_ms, row["psnr"])),
-                flush=True,
-            )
+            print(f"{name:38s} {label:>8s} " + " ".join(f"{x:9.2f}" for x in list(row.values())[2:]), flush=True)
     for size in sorted({row["size"] for row in rows}):
-        ratios = [row["opengl_ms"] / row["mjsense_ms"] for row in rows if row["size"] == size]
+        ratios = [row["ratio"] for row in rows if row["size"] == size]
         print(f"median ratio at {size}: {statistics.median(ratios):.1f}, lowest {min(ratios):.1f}")
     if arguments.json:
         with open(arguments.json, "w") as file:
