@@ -34,9 +34,10 @@ constexpr int kBodies = 40;
 // Free bodies, some transparent, on a floor that reflects or does not, under lights with shadows.
 std::string crowd(const std::string& lights, double reflectance) {
   Rng rng(5, 0, 0, 0);
-  const char* types[] = {"box", "sphere", "capsule", "ellipsoid", "cylinder"};
+  const char* shapes[] = {"box", "sphere", "capsule", "ellipsoid", "cylinder", "mesh' mesh='ball"};
   std::string xml = fmt::format(
       "<asset><material name='floor' rgba='.6 .6 .7 1' reflectance='{}'/>"
+      "<mesh name='ball' builtin='sphere' params='4' scale='.2 .1 .6'/>"
       "<texture type='skybox' builtin='gradient' rgb1='.3 .5 .7' rgb2='0 0 0' width='32' "
       "height='32'/></asset><worldbody>{}<geom type='plane' size='0 0 1' material='floor'/>",
       reflectance, lights);
@@ -45,7 +46,7 @@ std::string crowd(const std::string& lights, double reflectance) {
         "<body pos='{} {} {}' euler='{} {} 0'><freejoint/><geom type='{}' size='{} .1 {}' rgba='{} "
         ".5 .5 {}'/></body>",
         rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(.2, 2), rng.uniform(0, 90),
-        rng.uniform(0, 90), types[i % 5], rng.uniform(.05, .4), rng.uniform(.05, .4),
+        rng.uniform(0, 90), shapes[i % 6], rng.uniform(.05, .4), rng.uniform(.05, .4),
         rng.uniform(0, 1), i % 7 == 0 ? .5 : 1.);
   return xml + "</worldbody>";
 }

@@ -17,4 +17,17 @@ RenderTiles best_render_tiles() {
   }
 }
 
+MayShow best_may_show() {
+  switch (cpu_isa()) {
+#if defined(__x86_64__)
+    case Isa::kAvx512:
+      return may_show_avx512;
+    case Isa::kAvx2:
+      return may_show_avx2;
+#endif
+    default:
+      return may_show_portable;
+  }
+}
+
 }  // namespace mjsense::render

@@ -139,6 +139,12 @@ inline int find_blocks(const rays::Clusters& clusters, const TileFrustum& frustu
   return found;
 }
 
+// See MayShow. If it is false, rasterize() draws nothing into a tile within `window`.
+inline bool may_show(const ViewGeom& g, const float* window) {
+  if (!has_clusters(g)) return true;
+  return find_blocks(clusters_of(g), TileFrustum(g, window, kInfinity), 0, nullptr) != 0;
+}
+
 inline void prefetch(const rays::TriangleBlock& block) {
   const char* p = reinterpret_cast<const char*>(&block);
   for (std::size_t line = 0; line < sizeof block; line += 64) __builtin_prefetch(p + line);

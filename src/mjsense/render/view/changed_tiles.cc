@@ -75,6 +75,8 @@ class Outline {
     }
   }
 
+  bool known() const { return count_ > 0; }
+
   // Whether the geom may be in the tile, or so near to it that the tile depends on it.
   bool meets(int column, int row) const {
     constexpr float kHalf = 0.5f * kTileSize, kReach = kHalf + kSlack;
@@ -166,20 +168,34 @@ void ChangedTiles::mark_changes(const Kept& kept, const View& view) {
   for (std::size_t i = 0; i < kept.geoms.size(); ++i)
     if (!present_[i]) changes_.push_back({&kept.geoms[i], nullptr});
   for (const auto& [before, now] : changes_) {
-    if (before && before - kept.geoms.data() < visible(kept.view)) mark_geom(view.grid, *before);
-    if (now && now - view.geoms < visible(view)) mark_geom(view.grid, *now);
+    if (before) mark_geom(kept.view, before - kept.geoms.data(), *before);
+    if (now) mark_geom(view, now - view.geoms, *now);
   }
 }
 
-void ChangedTiles::mark_geom(const PixelGrid& grid, const ViewGeom& geom) {
+// Marks the tiles that may show geom `index` of the view.
+void ChangedTiles::mark_geom(const View& view, std::ptrdiff_t index, const ViewGeom& geom) {
+  static const MayShow may_show = best_may_show();
+  if (index >= visible(view)) return;
+  const PixelGrid& grid = view.grid;
   const Range x = tiles_of(geom.window[0], geom.window[1], grid.left, grid.dx, grid.width);
   const Range y = tiles_of(geom.window[2], geom.window[3], grid.top, grid.dy, grid.height);
   if (x.first > x.last || y.first > y.last) return;
   const Outline outline(grid, geom);
+  const bool parts =
+      outline.known() && index < view.num_opaque && !grid.orthographic && !geom.height_field;
   const int across = tiles_along(grid.width);
   for (int row = y.first; row <= y.last; ++row)
-    for (int column = x.first; column <= x.last; ++column)
-      if (outline.meets(column, row)) changed_[row * across + column] = 1;
+    for (int column = x.first; column <= x.last; ++column) {
+      std::uint8_t& changed = changed_[row * across + column];
+      if (changed || !outline.meets(column, row)) continue;
+      const float left = grid.left + grid.dx * (column * kTileSize - kSlack),
+                  right = grid.left + grid.dx * ((column + 1) * kTileSize + kSlack),
+                  top = grid.top + grid.dy * (row * kTileSize - kSlack),
+                  bottom = grid.top + grid.dy * ((row + 1) * kTileSize + kSlack);
+      const float window[4] = {left, right, bottom, top};
+      changed = !parts || may_show(geom, window);
+    }
 }
 
 // Windows of the geoms that differ, as they were and as they are.

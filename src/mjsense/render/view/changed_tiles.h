@@ -4,6 +4,7 @@
 // the view only. If all but the geoms is equal, a tile can differ only if it may show a geom that
 // has changed, or if such a geom may cast a shadow on what the tile shows.
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -43,7 +44,7 @@ class ChangedTiles {
     void assign(const View& view);
   };
   void mark_changes(const Kept& kept, const View& view);
-  void mark_geom(const PixelGrid& grid, const ViewGeom& geom);
+  void mark_geom(const View& view, std::ptrdiff_t index, const ViewGeom& geom);
   void mark_shadows(const View& view);
   std::span<const LightWindow> shadow_windows(const View& view, const LightFrame& frame);
 

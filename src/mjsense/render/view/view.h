@@ -261,7 +261,15 @@ void render_tiles_portable(const View&, const ImageTargets&, int first, int last
 void render_tiles_avx2(const View&, const ImageTargets&, int first, int last, TileScratch&);
 void render_tiles_avx512(const View&, const ImageTargets&, int first, int last, TileScratch&);
 
-// The fastest version that this CPU supports.
+// Whether a tile may show parts of the geom, an opaque one without walls of a height field, if the
+// camera is not orthographic. `window`: contains the tile, as ViewGeom::window.
+using MayShow = bool (*)(const ViewGeom& geom, const float* window);
+bool may_show_portable(const ViewGeom&, const float* window);
+bool may_show_avx2(const ViewGeom&, const float* window);
+bool may_show_avx512(const ViewGeom&, const float* window);
+
+// The fastest versions that this CPU supports.
 RenderTiles best_render_tiles();
+MayShow best_may_show();
 
 }  // namespace mjsense::render
