@@ -8,8 +8,6 @@ void render_tiles_avx2(const View& view, const ImageTargets& targets, int first,
   render_tiles(view, targets, first, last, scratch);
 }
 
-bool may_show_avx2(const ViewGeom& geom, const float* window) {
-  return may_show(geom, window);
-}
+bool may_show_avx2(const ViewGeom& geom, const float* window) { return may_show(geom, window); }
 
 }  // namespace mjsense::render

@@ -8,8 +8,6 @@ void render_tiles_avx512(const View& view, const ImageTargets& targets, int firs
   render_tiles(view, targets, first, last, scratch);
 }
 
-bool may_show_avx512(const ViewGeom& geom, const float* window) {
-  return may_show(geom, window);
-}
+bool may_show_avx512(const ViewGeom& geom, const float* window) { return may_show(geom, window); }
 
 }  // namespace mjsense::render

@@ -8,9 +8,7 @@ void render_tiles_portable(const View& view, const ImageTargets& targets, int fi
   render_tiles(view, targets, first, last, scratch);
 }
 
-bool may_show_portable(const ViewGeom& geom, const float* window) {
-  return may_show(geom, window);
-}
+bool may_show_portable(const ViewGeom& geom, const float* window) { return may_show(geom, window); }
 
 std::size_t tile_bytes() { return sizeof(TileSpace); }
 
