@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 from images import ssim, write_sheet
 
-# In a process in which numba compiles, as the first that uses robosuite does, the images of software OpenGL (Mesa 22.3) are wrong.
+# While numba compiles robosuite's functions, once after an installation, the images of software OpenGL (Mesa 22.3) are wrong.
 os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
 
 GYMNASIUM = """Ant-v5 HalfCheetah-v5 Hopper-v5 Humanoid-v5 HumanoidStandup-v5 InvertedDoublePendulum-v5 InvertedPendulum-v5 Pusher-v5

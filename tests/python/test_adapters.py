@@ -84,7 +84,7 @@ def prepare_libero(folder):
 
 def run(python, *arguments):
     path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    # In a process in which numba compiles, as the first that uses robosuite does, the images of software OpenGL (Mesa 22.3) are wrong.
+    # While numba compiles robosuite's functions, once after an installation, the images of software OpenGL (Mesa 22.3) are wrong.
     variables = {**os.environ, "PYTHONPATH": path, "LIBERO_CONFIG_PATH": str(python.parents[1]), "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([python, "-W", "ignore", *arguments], capture_output=True, text=True, env=variables)
     if done.returncode == 77:

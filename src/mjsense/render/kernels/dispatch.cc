@@ -3,31 +3,29 @@
 #include "mjsense/render/view/view.h"
 
 namespace mjsense::render {
+namespace {
 
-RenderTiles best_render_tiles() {
+struct Kernels {
+  RenderTiles render_tiles;
+  MayShow may_show;
+};
+
+Kernels best_kernels() {
   switch (cpu_isa()) {
 #if defined(__x86_64__)
     case Isa::kAvx512:
-      return render_tiles_avx512;
+      return {render_tiles_avx512, may_show_avx512};
     case Isa::kAvx2:
-      return render_tiles_avx2;
+      return {render_tiles_avx2, may_show_avx2};
 #endif
     default:
-      return render_tiles_portable;
+      return {render_tiles_portable, may_show_portable};
   }
 }
 
-MayShow best_may_show() {
-  switch (cpu_isa()) {
-#if defined(__x86_64__)
-    case Isa::kAvx512:
-      return may_show_avx512;
-    case Isa::kAvx2:
-      return may_show_avx2;
-#endif
-    default:
-      return may_show_portable;
-  }
-}
+}  // namespace
+
+RenderTiles best_render_tiles() { return best_kernels().render_tiles; }
+MayShow best_may_show() { return best_kernels().may_show; }
 
 }  // namespace mjsense::render

@@ -261,8 +261,8 @@ void render_tiles_portable(const View&, const ImageTargets&, int first, int last
 void render_tiles_avx2(const View&, const ImageTargets&, int first, int last, TileScratch&);
 void render_tiles_avx512(const View&, const ImageTargets&, int first, int last, TileScratch&);
 
-// Whether a tile may show parts of the geom, an opaque one without walls of a height field, if the
-// camera is not orthographic. `window`: contains the tile, as ViewGeom::window.
+// Whether a tile within `window` may show the geom. Not for transparent geoms, height fields and
+// orthographic cameras. `window`: as ViewGeom::window.
 using MayShow = bool (*)(const ViewGeom& geom, const float* window);
 bool may_show_portable(const ViewGeom&, const float* window);
 bool may_show_avx2(const ViewGeom&, const float* window);
