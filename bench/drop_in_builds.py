@@ -75,7 +75,7 @@ def main() -> None:
     parser.add_argument("--size", default="256")
     parser.add_argument("--rounds", type=int, default=100)
     parser.add_argument("--draw", help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()  # environments may follow options
     if arguments.draw:
         return draw(arguments.draw, arguments.size)
     for name in arguments.environments:
