@@ -43,7 +43,7 @@ def ids(function):
 
 
 NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # created by scenes only
-STATIC = {f.__qualname__: f for c in {*CLASSES, mjs.TaskVectorEnv} - NATIVE for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
+STATIC = {f.__qualname__: f for c in [*(c for c in CLASSES if c not in NATIVE), mjs.TaskVectorEnv] for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
 STATIC["RecordEpisodes.__init__"] = mjs.RecordEpisodes.__init__
 STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.replace and f.__name__ != "checked"}
 
