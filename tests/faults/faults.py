@@ -522,3 +522,13 @@ def encoders(lab: Lab, names=None) -> Row:
     except subprocess.TimeoutExpired:
         row.wrong("hung", "-encoders hangs")
     return row
+
+
+def generated(lab: Lab, trials: int) -> Row:
+    """Changes a valid recording at one or two places, and runs all readers of the Python package."""
+    import generated
+
+    row = Row("generated changes, read by verify, Dataset, replay, render, export, inspect and repair", trials)
+    for column, note in generated.trials(lab.fresh("generated"), trials):
+        row.wrong(column, note)
+    return row
