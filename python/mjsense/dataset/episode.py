@@ -75,7 +75,8 @@ def _unit_of(unit: str, leaf: str) -> str:
     return by_group.get(leaf, "") if by_group else unit
 
 
-def _is_json(dataset: Rows) -> bool:
+def is_json(dataset: Rows) -> bool:
+    """Whether a dataset contains JSON rows."""
     is_bytes = dataset.dtype == np.uint8 and dataset.ndim == 2
     if "encoding" in dataset.attrs or "spec" in dataset.attrs:
         if (is_json := dataset.attrs.text("encoding") == "json") and not is_bytes:
@@ -356,7 +357,7 @@ class Episode:
                     info = videos[name]
                     dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
                     streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
-            elif _is_json(dataset):
+            elif is_json(dataset):
                 if NUMBERS + name in trajectory:
                     known[place] = None
                     return
@@ -412,7 +413,7 @@ class Episode:
                 if place is None:
                     continue
                 dataset = trajectory[place]
-                if _is_json(dataset):
+                if is_json(dataset):
                     if place not in decoded:
                         decoded.add(place)
                         found.update(self._decode(place, dataset))

@@ -85,7 +85,7 @@ def _house(path: Path) -> int | None:
     return int(match[1]) if match else None
 
 
-def _batches(root: Path) -> list[Path]:
+def batches(root: Path) -> list[Path]:
     """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and batches."""
     if not root.exists():
         raise missing(root)
@@ -128,7 +128,7 @@ def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeE
     entries: list[EpisodeEntry] = []
     texts: dict[str, int] = {}
     descriptions: list[Description] = []
-    for path in _batches(root):
+    for path in batches(root):
         with open_h5(path) as file:
             text = file.attrs.text("recording", "{}", DESCRIPTION_BYTES)
             if text not in texts:

@@ -251,12 +251,16 @@ class Rows:
         """All of it, after its checksum has been compared: an array, or the bytes of a text."""
         if not self.is_number:
             return self._text()
-        most = limits.UNPACKED_FREE + limits.UNPACKED_RATIO * self._file_bytes
-        if self.bytes > most:
-            raise ValueError(f"{self.where} has {self.bytes} bytes, more than the {most} that are read from a file of {self._file_bytes} bytes")
+        self.check_whole()
         values = self._read(0, self.shape[0] if self.shape else 1)
         self._compare(values)
         return values if self.shape else values.reshape(())[()]
+
+    def check_whole(self) -> None:
+        """Raises an error if there is too much to read at once."""
+        most = limits.UNPACKED_FREE + limits.UNPACKED_RATIO * self._file_bytes
+        if self.bytes > most:
+            raise ValueError(f"{self.where} has {self.bytes} bytes, more than the {most} that are read from a file of {self._file_bytes} bytes")
 
     def rows_of(self, length: int) -> Rows:
         """This dataset, if it has so many rows."""

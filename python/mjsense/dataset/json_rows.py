@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.dataset import bounded_json
-from mjsense.dataset.limits import ROW_BYTES, ROW_LEAVES
+from mjsense.dataset.limits import JSON_ROW_BYTES, ROW_LEAVES
 from mjsense.dataset.places import is_plain_name, printable
 
 
@@ -52,7 +52,7 @@ def decode(rows: np.ndarray, what: str = "a row") -> dict[str, tuple[np.ndarray,
     """
     columns: dict[str, tuple[list[int], list[Any]]] = {}
     for t, row in enumerate(rows):
-        for path, value in _leaves(bounded_json.parse_object(row.tobytes().rstrip(b"\0") or b"{}", f"{what} row {t}", ROW_BYTES), ""):
+        for path, value in _leaves(bounded_json.parse_object(row.tobytes().rstrip(b"\0") or b"{}", f"{what} row {t}", JSON_ROW_BYTES), ""):
             if value == []:
                 continue
             if path not in columns:

@@ -14,6 +14,8 @@ JSON_DEPTH = 64
 """Nesting of JSON values; readers recurse once for each level."""
 JSON_VALUES = 200_000
 """Values in one JSON text. The longest text that was recorded, with 100 objects, has 3,000."""
+JSON_ROW_BYTES = 1 << 20
+"""One JSON row. The recorder writes 4000 bytes, and more if a sensor asks for it."""
 ROW_LEAVES = 4096
 """Leaves of one JSON row, each of which becomes a stream."""
 NAME_BYTES = 255

@@ -12,7 +12,7 @@ from pathlib import Path
 from mjsense._input_files import missing
 from mjsense.dataset.limits import NAME_BYTES, SPARSE_FREE, SPARSE_RATIO
 
-_KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
+_KINDS = ((stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
 
 
 def is_plain_name(name: str) -> bool:
@@ -68,6 +68,9 @@ def open_plain(path: Path) -> PlainFile:
         os.close(folder)
     about = os.fstat(descriptor)
     wrong = ""
+    if stat.S_ISDIR(about.st_mode):
+        os.close(descriptor)
+        raise IsADirectoryError(f"{path}: is a directory, not a file")
     if not stat.S_ISREG(about.st_mode):
         wrong = f"is {next((kind for test, kind in _KINDS if test(about.st_mode)), 'a device')}, not a file"
     elif about.st_size > SPARSE_FREE and about.st_size > SPARSE_RATIO * 512 * about.st_blocks and _has_hole(descriptor, about.st_size):
