@@ -8,6 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/sensor_spec.h"
+#include "mjsense/hdf5/lzf.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
@@ -67,6 +68,17 @@ void bind_core(nb::module_& m) {
       },
       nb::arg("place"), nb::arg("kind"), nb::arg("name"), nb::arg("names"),
       "Error text for a name that does not exist, with the nearest names.");
+
+  m.def(
+      "lzf_unpack",
+      [](nb::bytes packed, std::size_t most) {
+        std::vector<std::uint8_t> out(most);
+        const auto* data = reinterpret_cast<const std::uint8_t*>(packed.c_str());
+        out.resize(hdf5::lzf_unpack({data, packed.size()}, out));
+        return nb::bytes(reinterpret_cast<const char*>(out.data()), out.size());
+      },
+      nb::arg("packed"), nb::arg("most"),
+      "Unpacks a chunk of HDF5's filter lzf; no bytes if it is damaged or larger than ``most``.");
 
   nb::class_<SensorSpec>(m, "SensorSpec",
                          "Description of a measurement: name, type, shape, unit, frame and range.")

@@ -14,6 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from edited_recordings import changed
 from mjsense.dataset import video
 
 import mjsense as mjs
@@ -296,7 +297,7 @@ def test_a_move_group_that_only_some_episodes_command(tmp_path, root, monkeypatc
 
     shutil.copytree(root / "house_0", tmp_path / "house_0")
     for i, path in enumerate(sorted((tmp_path / "house_0").glob("*.h5"))):
-        with h5py.File(path, "a") as file:
+        with changed(path) as file:
             without_numbers(file)
             if i == 0:
                 file.copy("traj_0", "traj_1")

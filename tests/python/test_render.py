@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 import tasks
+from edited_recordings import changed, file_of
 
 import mjsense as mjs
 
@@ -284,7 +285,7 @@ def test_damage_is_noticed(recorded, tmp_path):
         at = opened["traj_1/replay/state"].id.get_chunk_info(0).byte_offset
     damaged(file, at + 50)
     assert (code := verify(tmp_path / "data"))[0] == 1 and "traj_1/replay/state" in code[1]
-    with pytest.raises((RuntimeError, OSError), match=r"replay/state|read"):
+    with pytest.raises(ValueError, match="replay/state"):
         mjs.render(tmp_path / "data", tmp_path / "out")
 
 
@@ -390,7 +391,7 @@ def test_sensors_from_states(recorded, tmp_path):
     made = json.loads(json.dumps(report.to_dict()))
     assert made["ok"] and made["episodes"][0]["sensors"]["equal"] == check.equal
     shutil.copytree(recorded, tmp_path / "data")
-    with h5py.File(next((tmp_path / "data").glob("house_0/*.h5")), "a") as file:
+    with changed(file_of(tmp_path / "data")) as file:
         rows = file["traj_1/obs/extra/tcp_pose"]
         pose = rows[3]
         pose[1] = np.nextafter(pose[1], np.float32(2))

@@ -12,6 +12,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from edited_recordings import changed, file_of
 
 import mjsense as mjs
 
@@ -38,10 +39,6 @@ def door(tmp_path_factory):
 def copied(pick, tmp_path):
     shutil.copytree(pick, tmp_path / "data")
     return tmp_path / "data"
-
-
-def file_of(root):
-    return next(root.glob("house_0/*.h5"))
 
 
 @pytest.mark.parametrize("name", ["pick", "door"])
@@ -102,7 +99,7 @@ def test_a_changed_state_is_named(copied):
     """The joint, the step and the part of the state."""
     model = mjs.Dataset(copied).episodes[1].model()
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "robot_0/fr3_joint4")
-    with h5py.File(file_of(copied), "a") as file:
+    with changed(file_of(copied)) as file:
         states = file["traj_1/replay/state"]
         row = states[12]
         value = row[1 + model.jnt_qposadr[joint]]
@@ -117,19 +114,19 @@ def test_a_changed_state_is_named(copied):
     assert re.search(r"episode 1, stepwise: step 12: qpos of joint 'robot_0/fr3_joint4'\[0\]: recorded ", repr(report))
 
 
-@pytest.mark.parametrize("changed", [False, True])
-def test_without_the_package_mujoco(copied, door, changed):
+@pytest.mark.parametrize("damaged", [False, True])
+def test_without_the_package_mujoco(copied, door, damaged):
     """The states are simulated by the MuJoCo that mjsense contains, with the same report."""
-    if changed:
-        with h5py.File(file_of(copied), "a") as file:
+    if damaged:
+        with changed(file_of(copied)) as file:
             row = file["traj_1/replay/state"][12]
             row[5] = np.nextafter(row[5], 10)
             file["traj_1/replay/state"][12] = row
-    for root in (copied,) if changed else (copied, door):
+    for root in (copied,) if damaged else (copied, door):
         words = [sys.executable, "-m", "mjsense", "replay", root, "--json"]
         done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "MJSENSE_MUJOCO": "private"})
         assert json.loads(done.stdout) == mjs.check_replay(root).to_dict(), done.stderr
-        assert done.returncode == changed
+        assert done.returncode == damaged
 
 
 def test_every_part_of_the_state_has_a_name(door):

@@ -1,23 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjsense verify``, ``inspect`` and ``repair`` of a recording with an index, or at an address.
+"""``mjsense verify``, and ``inspect`` and ``repair`` of a recording with an index, or at an address.
 
-The C++ program checks and shows the files of the shards. This module adds the comparison of the index with them.
+The C++ program checks and shows the files. This module adds what the readers in Python refuse, and the comparison of the index with the
+files of the shards.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from mjsense import _core
 from mjsense.cluster.index import write_index
 from mjsense.cluster.job import ShardResult
 from mjsense.cluster.storage import Storage
+from mjsense.dataset import check
 from mjsense.dataset.files import INDEX, EpisodeEntry, entries_of, read_index
 from mjsense.dataset.remote import is_address, resolved
 
@@ -26,10 +31,10 @@ _ATTRIBUTES = ("length", "number", "seed", "outcome")
 
 
 def path_of(words: list[str]) -> str | None:
-    """The path of a command with these words if it is a recording with an index or at an address."""
+    """The path of a command with these words if it is to be verified, or is a recording with an index or at an address."""
     if words[:1] and words[0] in TOOLS and not {"-h", "--help"} & {*words}:
         path = _parse(words[1:])[0].path or ""
-        if is_address(path) or Path(path).name == INDEX or any((Path(path) / name).exists() for name in (INDEX, "job.json")):
+        if (path and words[0] == "verify") or is_address(path) or Path(path).name == INDEX or any((Path(path) / name).exists() for name in (INDEX, "job.json")):
             return path
     return None
 
@@ -50,8 +55,11 @@ def run(words: list[str]) -> int:
     try:
         if words[0] == "verify":
             found = verify(given.path, *options)
+            if found is None:
+                return 2
             if given.json or not found["ok"] or not {"-q", "--quiet"} & {*others}:
-                print(json.dumps(found, indent=2) if given.json else _verify_text(found))
+                text = {key: value for key, value in found.items() if key != "of_job"}
+                print(json.dumps(text, indent=2) if given.json else _verify_text(found))
             return 0 if found["ok"] else 1
         if words[0] == "repair":
             if options:
@@ -108,17 +116,37 @@ def _summary_text(about: dict[str, Any] | None) -> str:
             f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n")  # fmt: skip
 
 
-def verify(path: str, *options: str) -> dict[str, Any]:
-    """The result of ``mjsense verify --json`` for the files that an index names, and the comparison of the index with them.
+def _verified(path: Path, *options: str) -> dict[str, Any] | None:
+    """Findings of the C++ program, which runs in this process and shows its progress; None: it has printed an error."""
+    saved = os.dup(1)
+    sys.stdout.flush()
+    with tempfile.TemporaryFile() as output:
+        try:
+            os.dup2(output.fileno(), 1)
+            code = _core.run_program([b"mjsense", b"verify", *map(os.fsencode, [str(path), "--json", *options])], [])
+        finally:
+            os.dup2(saved, 1)
+            os.close(saved)
+        output.seek(0)
+        return json.loads(output.read()) if code in (0, 1) else None
+
+
+def verify(path: str, *options: str) -> dict[str, Any] | None:
+    """The result of ``mjsense verify --json``, with what readers refuse, and the comparison of an index with its files. None: the program has
+    printed an error.
 
     Args:
         path: Folder, index or address of a recording.
         options: Further options of ``mjsense verify``.
     """
     local, rows = _fetched(path)
-    found: dict[str, Any] = json.loads(_program("verify", local, "--json", *options))
+    found = _verified(local, *options)
+    if found is None:
+        return None
+    damaged = {f["place"].split(" ")[0] for f in found["findings"] if f["error"]}
+    found["findings"] += [{"error": True, "place": place, "text": text} for place, text in check.findings(local, damaged)]
     if rows is None:
-        return found
+        return found | {"ok": not any(f["error"] for f in found["findings"]), "of_job": (local / "job.json").exists()}
     shards = {row["path"].split("/")[0] for row in rows}
     # A shard that no row names may be incomplete: its worker may have died while it copied the files.
     findings = [f for f in found["findings"] if f["place"].split("/")[0].split(" ")[0] in shards or not f["place"].startswith("shard_")]
@@ -127,10 +155,18 @@ def verify(path: str, *options: str) -> dict[str, Any]:
 
 
 def _verify_text(found: dict[str, Any]) -> str:
-    lines = [f"{'error' if f['error'] else 'note'}: {f['place']} {f['text']}" for f in found["findings"]]
+    """The text of the C++ program: a note about many episodes is one line."""
+    notes = Counter(f["text"] for f in found["findings"] if not f["error"])
+    lines: list[str] = []
+    for f in found["findings"]:
+        if f["error"]:
+            lines.append(f"error: {f['place']} {f['text']}")
+        elif same := notes.pop(f["text"], 0):
+            lines.append(f"note: {f['place']} {f['text']}" + (f" (and {same - 1} more)" if same > 1 else ""))
     counts = f"{found['files']} files, {found['episodes']} episodes, {found['steps']} observations, {found['videos']} videos"
-    index = f"; {found['indexed']} episodes in {INDEX}" if "indexed" in found else f"; no {INDEX}: the recording is not complete"
-    return "\n".join([*lines, f"{'intact' if found['ok'] else 'NOT intact'}: {counts}{index}"])
+    counts += f", {found['unpublished']} episodes not published" if found["unpublished"] else ""
+    counts += f"; {found['indexed']} episodes in {INDEX}" if "indexed" in found else f"; no {INDEX}: the recording is not complete" if found.get("of_job") else ""
+    return "\n".join([*lines, f"{'intact' if found['ok'] else 'NOT intact'}: {counts}"])
 
 
 def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str]]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import bisect
+import copy
 import difflib
 import fnmatch
 import itertools
@@ -20,6 +21,7 @@ from mjsense._arguments import checked
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
 from mjsense.dataset.files import entries_of
+from mjsense.dataset.places import printable
 from mjsense.dataset.remote import resolved
 from mjsense.errors import UnknownNameError
 
@@ -158,7 +160,7 @@ class Dataset:
     def __repr__(self) -> str:
         outcomes = Counter(episode.outcome for episode in self.episodes)
         lines = [f"Dataset({str(self.root)!r}): {len(self.episodes)} episodes, {len(self)} observations"]
-        lines += [f"  {count} x {outcome}" for outcome, count in outcomes.most_common()]
+        lines += [f"  {count} x {printable(outcome)}" for outcome, count in outcomes.most_common()]
         return "\n".join(lines + [f"  {stream}" for stream in self.streams.values()])
 
     def _repr_html_(self) -> str:
@@ -228,7 +230,7 @@ class Dataset:
             try:
                 result += _expand(name, known)
             except UnknownNameError:
-                leaf = next((e.streams[name] for e in self.episodes if name in e.streams and e.streams[name].kind == "json"), None)
+                leaf = next((e._streams[name] for e in self.episodes if name in e._streams and e._streams[name].kind == "json"), None)
                 if leaf is None:
                     raise
                 known[name] = leaf
@@ -243,7 +245,7 @@ class Dataset:
         tables: list[dict[str, Stream]] = []
         for group in groups.values():
             probed = np.unique(np.linspace(0, len(group) - 1, min(_PROBED, len(group))).astype(int))
-            tables.append({name: stream for k in reversed(probed) for name, stream in group[k].streams.items()})
+            tables.append({name: stream for k in reversed(probed) for name, stream in group[k]._streams.items()})
         return {name: stream for name, stream in tables[0].items() if all(name in table for table in tables)}
 
     def _place(self, i: int) -> tuple[Episode, int]:
@@ -273,7 +275,7 @@ class Dataset:
         if array.shape[1:] != stream.shape:
             raise ValueError(f"{self.root}: '{name}' has the shape {list(array.shape[1:])} in one episode, {list(stream.shape)} in the first")
         values = array[rows]
-        return values if array.dtype == object else np.array(values)  # a copy: the array is in the cache
+        return copy.deepcopy(values) if array.dtype == object else np.array(values)  # a copy: the array is in the cache
 
 
 def opened(root: str | Path | Dataset, episodes: Iterable[int] | None) -> Dataset:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import json
+import copy
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,9 +15,13 @@ import numpy as np
 
 from mjsense import _show
 from mjsense._arguments import checked
-from mjsense.dataset import json_rows, playback
+from mjsense.dataset import bounded_json, json_rows, playback
 from mjsense.dataset.cache import Cache
-from mjsense.dataset.files import EpisodeEntry, open_h5, text_of
+from mjsense.dataset.description import Description, image_size, rate_of
+from mjsense.dataset.files import EpisodeEntry
+from mjsense.dataset.hdf5 import Group, Rows, open_h5, text_of
+from mjsense.dataset.limits import NAME_BYTES, PERIOD_MS, SCENE_BYTES
+from mjsense.dataset.places import plain_name, printable
 from mjsense.dataset.quality import EpisodeQuality, idle_steps, kept_rows, quality_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
 from mjsense.errors import UnknownNameError, did_you_mean
@@ -26,6 +30,7 @@ if TYPE_CHECKING:
     import mujoco
 
 VIDEOS = "obs/sensor_data/"
+_ENCODINGS = ("rgb", "depth16", "molmospaces_red_green")
 REPLAY = "replay/"
 NUMBERS = "numbers/"  # the fields of JSON rows as arrays; older recordings have only the JSON rows
 LARGE_ROW = 1 << 16  # bytes; rows of at least this size (segmentation) are read one by one and not kept
@@ -55,6 +60,11 @@ def given_name(stream: str) -> str | None:
     return "/".join([*parts[:2], "given", *parts[2:]]) if parts[0] == "actions" and len(parts) > 2 else None
 
 
+def _own(values: np.ndarray) -> np.ndarray:
+    """A copy, of lists in it too: those of the cache stay as they are."""
+    return copy.deepcopy(values) if values.dtype == object else values.copy()
+
+
 def _video_name(camera: str) -> str:
     return camera if camera.startswith(VIDEOS) else VIDEOS + camera
 
@@ -65,22 +75,25 @@ def _unit_of(unit: str, leaf: str) -> str:
     return by_group.get(leaf, "") if by_group else unit
 
 
-def _is_json(dataset: Any) -> bool:
-    encoding = dataset.attrs.get("encoding")
-    if encoding is not None or "spec" in dataset.attrs:
-        return text_of(encoding or "") == "json"
+def is_json(dataset: Rows) -> bool:
+    """Whether a dataset contains JSON rows."""
+    is_bytes = dataset.dtype == np.uint8 and dataset.ndim == 2
+    if "encoding" in dataset.attrs or "spec" in dataset.attrs:
+        if (is_json := dataset.attrs.text("encoding") == "json") and not is_bytes:
+            raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; JSON rows must be uint8 [T, N]")
+        return is_json
     # MolmoSpaces' files have no attributes.
-    return dataset.dtype == np.uint8 and dataset.ndim == 2 and len(dataset) > 0 and dataset[0, 0] == ord("{")
+    return is_bytes and min(dataset.shape) > 0 and dataset[0][0] == ord("{")
 
 
-def _place_of(trajectory: Any, name: str) -> str | None:
+def _place_of(trajectory: Group, name: str) -> str | None:
     """The dataset that contains a stream: the stream itself or, for a leaf or a mask, its array of numbers or the JSON rows of a prefix
     of its name."""
-    if NUMBERS + name in trajectory:
-        return NUMBERS + name if hasattr(trajectory[NUMBERS + name], "dtype") else None
+    if (found := trajectory.get(NUMBERS + name)) is not None:
+        return NUMBERS + name if isinstance(found, Rows) else None
     while name:
-        if name in trajectory:
-            return name if hasattr(trajectory[name], "dtype") else None
+        if (found := trajectory.get(name)) is not None:
+            return name if isinstance(found, Rows) else None
         name = name.rpartition("/")[0]
     return None
 
@@ -88,7 +101,7 @@ def _place_of(trajectory: Any, name: str) -> str | None:
 class Store:
     """What all episodes of a data set share: the recordings' descriptions and the caches."""
 
-    def __init__(self, recordings: list[dict[str, Any]], cache_bytes: int) -> None:
+    def __init__(self, recordings: list[Description], cache_bytes: int) -> None:
         self.recordings = recordings
         self.rows = Cache(cache_bytes // 2)
         self.frames = FrameReader(Cache(cache_bytes // 2), self.rows)
@@ -176,39 +189,39 @@ class Episode:
     @property
     def settings(self) -> dict[str, Any]:
         """The recording's settings: task, robot, policy, seed and so on. Empty for files that MolmoSpaces wrote."""
-        return self._recording.get("settings", {})
+        return copy.deepcopy(self._recording.all_settings)
 
     @property
     def obs_scene(self) -> dict[str, Any]:
         """Task, description, objects, cameras and phases of the episode."""
-        return self._store.rows.get((self.index, "scene"), self._read_scene)
+        return copy.deepcopy(self._scene)
 
     @property
     def task(self) -> str:
         """The instruction."""
-        scene = self.obs_scene
+        scene = self._scene
         return str(scene.get("instruction") or scene.get("text") or scene.get("task_description") or "")
 
     @property
     def fps(self) -> Fraction:
         """Observations per second, exactly."""
-        if "fps" in self._recording:
-            return Fraction(self._recording["fps"])
-        period = self.obs_scene.get("policy_dt_ms")
-        if not period:
+        if self._recording.fps is not None:
+            return self._recording.fps
+        period = self._scene.get("policy_dt_ms")
+        if not isinstance(period, (int, float)) or not 1e-3 <= period <= PERIOD_MS:
             raise ValueError(f"{self.path} does not state its rate: no attribute 'recording' and no policy_dt_ms in obs_scene")
         return Fraction(1000) / Fraction(period).limit_denominator(1000)
 
     @property
     def streams(self) -> dict[str, Stream]:
         """All streams by name. JSON rows appear as one stream per leaf: ``obs/agent/qpos/arm``."""
-        return self._store.rows.get((self.index, "streams"), self._find_streams)
+        return dict(self._streams)
 
     def __len__(self) -> int:
         return self.length
 
     def __repr__(self) -> str:
-        return f"Episode({self.index}, {self.task!r}, {self.length} observations, {self.outcome!r})"
+        return f"Episode({self.index}, {self.task!r}, {self.length} observations, {printable(self.outcome)!r})"
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the episode's attributes, and images of its start, middle and end."""
@@ -228,20 +241,20 @@ class Episode:
         return "".join(strips)
 
     def __contains__(self, name: str) -> bool:
-        return name in self.streams or any(stream.startswith(f"{name}/") for stream in self.streams)
+        return name in self._streams or any(stream.startswith(f"{name}/") for stream in self._streams)
 
     def __getitem__(self, name: str) -> Any:
         """All rows of a stream; of a group (``actions/joint_pos``, ``env_states/actors``) a dict of its streams."""
         if name.startswith(VIDEOS):
             return self.video(name)[:]
         if found := self._load([name]):
-            return found[name].copy()
-        inside = [stream for stream in self.streams if stream.startswith(f"{name}/")]
+            return _own(found[name])
+        inside = [stream for stream in self._streams if stream.startswith(f"{name}/")]
         if not inside:
             raise self._unknown(name)
         if any(self.streams[stream].kind == "video" for stream in inside):
             raise KeyError(f"'{name}' is the group of the videos; name one of {', '.join(inside)}")
-        return {stream[len(name) + 1 :]: values.copy() for stream, values in self._load(inside).items()}
+        return {stream[len(name) + 1 :]: _own(values) for stream, values in self._load(inside).items()}
 
     def video(self, camera: str) -> Video:
         """Frames of a camera (``wrist_camera``, ``wrist_camera_depth``), decoded when they are indexed."""
@@ -257,6 +270,8 @@ class Episode:
             return None
         with open_h5(self.path) as file:
             counts = file[self.trajectory][_video_name(camera)].attrs.get("histogram")
+        if counts is not None and np.shape(counts) != (3, 256):
+            raise ValueError(f"{self.path} {self.trajectory}: the histogram of '{camera}' has the shape {list(np.shape(counts))}, not [3, 256]")
         return None if counts is None else counts.astype(np.int64)
 
     # The next functions are for this package.
@@ -274,13 +289,25 @@ class Episode:
         return self._store.frames.frames([(self._video(camera), at) for camera, at in zip(cameras, rows)])
 
     @property
-    def _recording(self) -> dict[str, Any]:
+    def _recording(self) -> Description:
         return self._store.recordings[self._entry.recording]
+
+    @property
+    def _scene(self) -> dict[str, Any]:
+        return self._store.rows.get((self.index, "scene"), self._read_scene)
+
+    @property
+    def _streams(self) -> dict[str, Stream]:
+        return self._store.rows.get((self.index, "streams"), self._find_streams)
 
     def _read_scene(self) -> tuple[dict[str, Any], int]:
         with open_h5(self.path) as file:
-            text = file[self.trajectory]["obs_scene"][()] if "obs_scene" in file[self.trajectory] else b"{}"
-        return json.loads(text_of(text)), 16 * len(text)
+            dataset = file[self.trajectory].get("obs_scene")
+            text = "{}" if dataset is None else text_of(dataset.read())
+        scene = bounded_json.parse_object(text, f"{self.path} {self.trajectory}/obs_scene", SCENE_BYTES)
+        if isinstance(scene.get("objects", {}), (bool, int, float, str, type(None))):
+            raise ValueError(f"{self.path} {self.trajectory}/obs_scene: objects is {bounded_json.kind_of(scene['objects'])}; it must be an object")
+        return scene, 16 * len(text)
 
     def _unknown(self, name: str) -> UnknownNameError:
         known = [*self.streams, *{stream.rsplit("/", 1)[0] for stream in self.streams}]
@@ -289,12 +316,18 @@ class Episode:
     def _find_videos(self) -> tuple[dict[str, VideoInfo], int]:
         videos: dict[str, VideoInfo] = {}
         with open_h5(self.path) as file:
-            for key, dataset in file[self.trajectory].get(VIDEOS, {}).items():
-                name, at = text_of(dataset[:].tobytes()), dataset.attrs
-                if name and "width" in at:
-                    videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, int(at["width"]), int(at["height"]),
-                                                     text_of(at["encoding"]), float(at.get("metres_per_unit", 0)),
-                                                     Fraction(text_of(at["fps"])))  # fmt: skip
+            for key, dataset in file[self.trajectory].get(VIDEOS.rstrip("/"), {}).items():
+                if isinstance(dataset, Group) or dataset.dtype != np.uint8 or dataset.ndim != 1 or len(dataset) > 4 * NAME_BYTES:
+                    raise ValueError(f"{dataset.where} must be the bytes of a file name")
+                name, at = text_of(dataset[0 : len(dataset)].tobytes()), dataset.attrs  # its checksum is that of the video
+                if not name or "width" not in at:
+                    continue
+                plain_name(name, f"{dataset.where}: its video")
+                width, height = image_size(*(at.integer(side, 1, 2**31) for side in ("width", "height")), dataset.where)
+                if (encoding := at.text("encoding")) not in _ENCODINGS:
+                    raise ValueError(f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}")
+                videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, width, height, encoding, at.number("metres_per_unit", 0.0),
+                                                 rate_of(at.text("fps"), f"{dataset.where}: fps"), at.text("crc32"))  # fmt: skip
         return videos, 500 * len(videos)
 
     def _find_streams(self) -> tuple[dict[str, Stream], int]:
@@ -310,18 +343,21 @@ class Episode:
                 streams[stream.name] = stream
 
         def add(place: str) -> None:
-            dataset = trajectory[place]
-            if not hasattr(dataset, "dtype") or place in ("obs_scene", REPLAY + "held") or place.startswith(REPLAY + "model/"):
+            if place in ("obs_scene", REPLAY + "held") or place.startswith(REPLAY + "model/"):
                 known[place] = None
                 return
-            about = {key: text_of(dataset.attrs.get(key, "")) for key in ("unit", "frame", "description")}
+            dataset = trajectory[place]
+            if isinstance(dataset, Group) or not (dataset.is_number and dataset.shape):
+                known[place] = None  # a group, or nothing that a stream can be
+                return
+            about = {key: dataset.attrs.text(key) for key in ("unit", "frame", "description")}
             name = place.removeprefix(NUMBERS)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
                     dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
                     streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
-            elif _is_json(dataset):
+            elif is_json(dataset):
                 if NUMBERS + name in trajectory:
                     known[place] = None
                     return
@@ -336,13 +372,14 @@ class Episode:
 
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
-            trajectory.visit(visit)
+            for place in trajectory.datasets():
+                visit(place)
         return dict(sorted(streams.items())), 500 * len(streams)
 
     def _decode(self, place: str, dataset: Any) -> dict[str, np.ndarray]:
         """Arrays of the leaves of a dataset of JSON rows; they and their masks are cached."""
         result: dict[str, np.ndarray] = {}
-        for path, (values, given) in json_rows.decode(dataset[:]).items():
+        for path, (values, given) in json_rows.decode(dataset.rows_of(self._entry.length).read(), dataset.where).items():
             leaf = place + path
             result[leaf] = values
             self._store.rows.add((self.index, leaf), values, values.nbytes)
@@ -376,14 +413,14 @@ class Episode:
                 if place is None:
                     continue
                 dataset = trajectory[place]
-                if _is_json(dataset):
+                if is_json(dataset):
                     if place not in decoded:
                         decoded.add(place)
                         found.update(self._decode(place, dataset))
                     if (values := cache.find((self.index, name))) is not None:
                         found[name] = values
                 elif place.removeprefix(NUMBERS) == name:
-                    found[name] = dataset[:]
+                    found[name] = dataset.rows_of(self._entry.length).read()
                     if found[name].nbytes < LARGE_ROW * max(1, self._entry.length):
                         cache.add((self.index, name), found[name], found[name].nbytes)
         return {name: found[name] for name in names if name in found}
@@ -393,7 +430,7 @@ class Episode:
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
             dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name]
-            return np.stack([dataset[t] for t in rows])
+            return np.stack([dataset.rows_of(self._entry.length)[t] for t in rows])
 
     # Replay
 

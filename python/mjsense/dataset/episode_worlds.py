@@ -14,7 +14,7 @@ import numpy as np
 from mjsense import _mujoco
 from mjsense.configs import SceneCfg
 from mjsense.dataset import playback
-from mjsense.dataset.files import open_h5
+from mjsense.dataset.hdf5 import open_h5
 from mjsense.scene import Scene
 from mjsense.simulation import Simulation
 

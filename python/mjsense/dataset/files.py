@@ -1,42 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""HDF5 files of a recording. Every access opens the file and closes it again, so that no handle crosses a fork."""
+"""The files and episodes of a recording. Every access opens a file and closes it again, so that no handle crosses a fork."""
 
 from __future__ import annotations
 
-import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from mjsense._input_files import missing, unreadable
-from mjsense._optional import optional
+from mjsense._input_files import missing
+from mjsense.dataset import index
+from mjsense.dataset.description import Description
+from mjsense.dataset.hdf5 import Group, open_h5
+from mjsense.dataset.limits import DESCRIPTION_BYTES
+from mjsense.dataset.places import plain_folder, printable
 
 INDEX = "index.parquet"
 """Index of a recording on a cluster."""
-BATCH = re.compile(r"trajectories_batch_(\d+)_of_(\d+)\.h5")
-
-
-def open_h5(path: Path) -> Any:
-    """The file, opened for reading."""
-    h5py = optional("h5py", "dataset", "Reading recordings")
-    try:
-        return h5py.File(path, "r")
-    except OSError as error:
-        raise unreadable(path, error, "an HDF5 file") from None
-
-
-def video_options(recording: dict[str, Any]) -> dict[str, Any]:
-    """The recorder's options that give equal videos of equal images. Recordings of older versions have no tuning."""
-    about = {"tune": "", **recording["video"]} if "video" in recording else {}
-    return {"encoder_threads" if key == "threads" else key: value for key, value in about.items()}
-
-
-def text_of(value: Any) -> str:
-    """A text attribute or a text dataset's value; a row of bytes ends at the first 0."""
-    if isinstance(value, str):
-        return value
-    return bytes(value).split(b"\0", 1)[0].decode()
+BATCH = re.compile(r"trajectories_batch_([0-9]{1,9})_of_([0-9]{1,9})\.h5")
+_TRAJECTORY = re.compile(r"traj_(0|[1-9][0-9]{0,8})")
+_OUTCOMES = ("no success", "success")
 
 
 class Fetcher(Protocol):
@@ -72,15 +56,17 @@ class EpisodeEntry:
 
 def read_index(root: Path) -> list[dict[str, Any]]:
     """The rows of ``index.parquet``."""
-    index = root / INDEX
-    parquet = optional("pyarrow.parquet", "ray", f"Reading {index}")
-    return parquet.read_table(index).to_pylist()
+    return index.rows_of(root / INDEX)
 
 
-def _indexed(root: Path, source: Fetcher | None) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:
+def _description(file: Group, path: Path) -> Description:
+    return Description.parse(file.attrs.text("recording", "{}", DESCRIPTION_BYTES), str(path))
+
+
+def _indexed(root: Path, source: Fetcher | None) -> tuple[list[EpisodeEntry], list[Description]]:
     """The episodes that an index names. Only one file of each house is opened: all shards of a job have the same description."""
     entries: list[EpisodeEntry] = []
-    descriptions: list[dict[str, Any]] = []
+    descriptions: list[Description] = []
     of_house: dict[str, int] = {}
     for row in read_index(root):
         place = root / row["path"]
@@ -89,35 +75,37 @@ def _indexed(root: Path, source: Fetcher | None) -> tuple[list[EpisodeEntry], li
                              of_house.setdefault(house, len(of_house)), source)  # fmt: skip
         if entry.recording == len(descriptions):
             with open_h5(entry.path) as file:
-                descriptions.append(json.loads(text_of(file.attrs.get("recording", "{}"))))
+                descriptions.append(_description(file, place))
         entries.append(entry)
     return entries, descriptions
 
 
 def _house(path: Path) -> int | None:
-    match = re.fullmatch(r"house_(\d+)", path.parent.name)
+    match = re.fullmatch(r"house_([0-9]{1,9})", path.parent.name)
     return int(match[1]) if match else None
 
 
-def _batches(root: Path) -> list[Path]:
+def batches(root: Path) -> list[Path]:
     """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and batches."""
     if not root.exists():
         raise missing(root)
-    if root.is_file():
+    if not root.is_dir():
         return [root]
     found = [path for folder in ("", "house_*/", "shard_*/house_*/") for path in root.glob(f"{folder}trajectories_batch_*.h5")]
     if (root / "job.json").exists():  # recorded on a cluster: a shard without done.json may be incomplete
         found = [path for path in found if (path.parents[1] / "done.json").exists()]
 
     def order(path: Path) -> tuple[str | int, ...]:
-        house, batch = re.fullmatch(r"house_(\d+)", path.parent.name), BATCH.fullmatch(path.name)
-        shard = re.fullmatch(r"shard_(\d+)", path.parent.parent.name)
+        house, batch = re.fullmatch(r"house_([0-9]{1,9})", path.parent.name), BATCH.fullmatch(path.name)
+        shard = re.fullmatch(r"shard_([0-9]{1,9})", path.parent.parent.name)
         return "" if house else path.parent.name, *(int(match[1]) if match else 0 for match in (house, shard, batch))
 
     if not found:
         waiting = any(root.glob("**/.recording"))
         hint = ": it is unfinished; `mjsense repair` publishes its episodes" if waiting else ""
         raise FileNotFoundError(f"{root} contains no recording (house_*/trajectories_batch_*.h5){hint}")
+    for folder in {folder for path in found for folder in (path.parent, path.parents[1]) if folder != root and root in folder.parents}:
+        plain_folder(folder)
     return sorted(found, key=order)
 
 
@@ -128,7 +116,7 @@ def is_unfinished(root: Path) -> bool:
     return (root / "job.json").exists() or any(any(root.glob(f"{folder}.recording")) for folder in ("", "house_*/", "shard_*/house_*/"))
 
 
-def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeEntry], list[dict[str, Any]]]:
+def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeEntry], list[Description]]:
     """All episodes of a recording, and the distinct descriptions of its files.
 
     Args:
@@ -139,16 +127,31 @@ def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeE
         return _indexed(root, source)
     entries: list[EpisodeEntry] = []
     texts: dict[str, int] = {}
-    for path in _batches(root):
+    descriptions: list[Description] = []
+    for path in batches(root):
         with open_h5(path) as file:
-            recording = texts.setdefault(text_of(file.attrs.get("recording", "{}")), len(texts))
-            for name in sorted((name for name in file if name.startswith("traj_")), key=lambda name: int(name[5:])):
-                trajectory = file[name]
-                flags = trajectory["success"]
-                outcome = trajectory.attrs.get("outcome")
-                if outcome is None:  # MolmoSpaces' files have no attributes
-                    outcome = "success" if len(flags) and flags[-1] else "no success"
-                seed = trajectory.attrs.get("seed")
-                entries.append(EpisodeEntry(path, name, len(flags), _house(path), int(trajectory.attrs.get("episode", int(name[5:]))),
-                                            None if seed is None else int(seed), text_of(outcome), recording))  # fmt: skip
-    return entries, [json.loads(text) for text in texts]
+            text = file.attrs.text("recording", "{}", DESCRIPTION_BYTES)
+            if text not in texts:
+                descriptions.append(_description(file, path))
+                texts[text] = len(texts)
+            entries += _episodes(file, path, texts[text])
+    return entries, descriptions
+
+
+def _episodes(file: Group, path: Path, recording: int) -> Iterator[EpisodeEntry]:
+    """The episodes of a file, in the order of their numbers."""
+    names = [name for name in file if name.startswith("traj_")]
+    for name in names:
+        if not _TRAJECTORY.fullmatch(name):
+            raise ValueError(f"{path} has a trajectory named '{printable(name[:100])}'; it must be traj_0, traj_1 and so on")
+    for name in sorted(names, key=lambda name: int(name[5:])):
+        trajectory = file[name]
+        flags = trajectory["success"]
+        if flags.ndim != 1 or not flags.is_number:
+            raise ValueError(f"{flags.where} is {flags.dtype} {list(flags.shape)}; it must be one bool for each observation")
+        outcome = trajectory.attrs.text("outcome") if "outcome" in trajectory.attrs else None
+        if outcome is None:  # MolmoSpaces' files have no attributes
+            outcome = _OUTCOMES[bool(len(flags) and flags[-1])]
+        number = trajectory.attrs.integer("episode", 0, 2**53)
+        yield EpisodeEntry(path, name, len(flags), _house(path), int(name[5:]) if number is None else number, trajectory.attrs.integer("seed", 0, 2**64 - 1), outcome,
+                           recording)  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
-from mjsense.dataset.files import open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5, text_of
 from mjsense.dataset.import_rows import OPTIONS, Rows, archive_of, compile_archive, unique_name
 
 if TYPE_CHECKING:

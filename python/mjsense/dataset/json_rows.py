@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+
+from mjsense.dataset import bounded_json
+from mjsense.dataset.limits import JSON_ROW_BYTES, ROW_LEAVES
+from mjsense.dataset.places import is_plain_name, printable
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
@@ -30,14 +33,30 @@ def _array(values: list[Any]) -> np.ndarray:
         return array
 
 
-def decode(rows: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _check_leaf(what: str, path: str, number: int) -> None:
+    if not all(map(is_plain_name, path[1:].split("/"))):
+        raise ValueError(f"{what} has the key '{printable(path[1:101])}', which is not a plain name")
+    if number >= ROW_LEAVES:
+        raise ValueError(f"{what} has more than {ROW_LEAVES} keys")
+
+
+def decode(rows: np.ndarray, what: str = "a row") -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """``{"/arm": (values [T, 7], given [T])}`` of uint8 rows ``[T, N]``. Values of rows without the leaf are 0. Lists without
-    elements are left out."""
+    elements are left out.
+
+    Args:
+        what: What has the rows, for errors.
+
+    Raises:
+        ValueError: A row is no JSON object, the name of a leaf is no plain name, or there are too many leaves.
+    """
     columns: dict[str, tuple[list[int], list[Any]]] = {}
     for t, row in enumerate(rows):
-        for path, value in _leaves(json.loads(row.tobytes().rstrip(b"\0") or b"{}"), ""):
+        for path, value in _leaves(bounded_json.parse_object(row.tobytes().rstrip(b"\0") or b"{}", f"{what} row {t}", JSON_ROW_BYTES), ""):
             if value == []:
                 continue
+            if path not in columns:
+                _check_leaf(f"{what} row {t}", path, len(columns))
             at, values = columns.setdefault(path, ([], []))
             at.append(t)
             values.append(value)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _libmujoco
-from mjsense.dataset.files import open_h5
+from mjsense.dataset.hdf5 import open_h5
 
 if TYPE_CHECKING:
     import mujoco
@@ -71,7 +71,7 @@ def _require_mujoco() -> None:
 
 def archive_of(episode: Episode) -> Path:
     """The file with the model and its assets."""
-    name = episode._recording.get("model_archive")
+    name = episode._recording.model_archive  # a plain file name
     if not name:
         inputs_of(episode)  # states the reason if there is no data for replay at all
         raise ValueError(f"{where(episode)}: the attribute 'recording' names no model_archive")

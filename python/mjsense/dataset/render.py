@@ -21,7 +21,7 @@ from mjsense.core_sensors import CoreSensor
 from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.files import open_h5, video_options
+from mjsense.dataset.hdf5 import open_h5, text_of
 from mjsense.dataset.playback import archive_of, inputs_of
 from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.ffmpeg import use_installed_ffmpeg
@@ -101,7 +101,7 @@ class _House:
             first, options["cameras"], options["add_cameras"], options["camera_system"],
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
         )  # fmt: skip
-        settings = first.settings
+        settings = first._recording.settings
         defaults = {"shadows": settings.get("shadows", True), "samples": settings.get("samples", 1),
                     "brightness": settings.get("render", {}).get("brightness", 1.0)}  # fmt: skip
         shadows, samples, brightness = (value if options[key] is None else options[key] for key, value in defaults.items())
@@ -111,7 +111,7 @@ class _House:
         self._frames = sum(1 + camera.depth for camera in new_cameras)
         handles = self._make_worlds(new_cameras, shadows, samples, brightness, options)
         changed = {"cameras": [camera.settings() for camera in cameras], "shadows": shadows, "samples": samples,
-                   "render": {"of": first._recording, "episodes": [episode.number for episode in episodes], "brightness": brightness,
+                   "render": {"of": first._recording.provenance, "episodes": [episode.number for episode in episodes], "brightness": brightness,
                               "camera_system": options["camera_system"]}}  # fmt: skip
         self._recorder = self._make_recorder(out, handles, settings | changed, options)
         self.path = Path(self._recorder.path)
@@ -146,8 +146,8 @@ class _House:
         first, sim = self._episodes[0], self._worlds.sim
         description, archive, rate = first._recording, archive_of(first), Fraction(first.fps)
         files = FILE_OPTIONS | {"episodes": len(self._episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
-                                "gzip": description.get("gzip", 4), "archive": (archive.name, archive.read_bytes())}  # fmt: skip
-        video = video_options(description) | {key: options[key] for key in ("crf", "preset") if options[key] is not None}
+                                "gzip": description.gzip, "archive": (archive.name, archive.read_bytes())}  # fmt: skip
+        video = (description.video or {}) | {key: options[key] for key in ("crf", "preset") if options[key] is not None}
         use_installed_ffmpeg()
         text = json.dumps(settings, sort_keys=True, separators=(",", ":"))
         return _core.Recorder(sim._core, sim.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, files | video)
@@ -182,7 +182,8 @@ class _House:
     def _begin(self, world: int, episode: Episode) -> _Playing:
         self._worlds.begin(world, episode)
         with open_h5(episode.path) as file:
-            steps = {name: file[episode.trajectory][name][:] for name in _STEP_FIELDS}
+            trajectory = file[episode.trajectory]
+            steps = {name: trajectory[name].rows_of(episode.length).read() for name in _STEP_FIELDS}
         if self._system:
             show_states(self._worlds.sim, [world], [inputs_of(episode).state[0]])
             self._system.place(world, episode)
@@ -191,9 +192,9 @@ class _House:
 
     def _finish(self, world: int, episode: Episode) -> None:
         with open_h5(episode.path) as file:
-            scene = file[episode.trajectory]["obs_scene"][()]
+            scene = text_of(file[episode.trajectory]["obs_scene"].read())
         self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
-        self._recorder.finish_episode(world, scene.decode() if isinstance(scene, bytes) else str(scene), episode.outcome)
+        self._recorder.finish_episode(world, scene, episode.outcome)
 
 
 def _replaced_streams(episode: Episode, copied: list[RenderCamera]) -> list[str]:

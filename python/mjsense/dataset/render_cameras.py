@@ -13,7 +13,8 @@ from mjsense import _core, _mujoco
 from mjsense._rotations import quaternions_of
 from mjsense.configs import CameraSensorCfg
 from mjsense.core_sensors import CameraImageSensor, CameraParameterSensor
-from mjsense.dataset.files import open_h5, text_of
+from mjsense.dataset.description import is_known_thing
+from mjsense.dataset.hdf5 import open_h5
 from mjsense.errors import UnknownNameError, did_you_mean
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class RenderCamera:
 
 def recorded_cameras(episode: Episode, names: Sequence[str] | None) -> list[RenderCamera]:
     """Cameras of the recording, all or some, as they were recorded."""
-    entries = {entry["name"]: entry for entry in episode.settings.get("cameras", [])}
+    entries = {entry["name"]: entry for entry in episode._recording.settings.get("cameras", [])}
     chosen = list(entries) if names is None else list(names)
     cameras = []
     with open_h5(episode.path) as file:
@@ -72,7 +73,7 @@ def recorded_cameras(episode: Episode, names: Sequence[str] | None) -> list[Rend
                 raise UnknownNameError(_core.unknown_name(str(episode.path), "camera", name, list(entries)))
             entry = entries[name]
             if "pos" not in entry and "camera" not in entry:
-                frame = text_of(file[episode.trajectory][f"obs/sensor_data/{name}"].attrs["frame"])
+                frame = file[episode.trajectory][f"obs/sensor_data/{name}"].attrs.text("frame")
                 entry = {**entry, "camera": frame.removeprefix("camera ")}
             about: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
             cameras.append(RenderCamera(**about))
@@ -134,9 +135,11 @@ class CameraSystem:
     """A camera system of the recording's robot, by name or file. Its variation is that of a recording with the same seed."""
 
     def __init__(self, name: str, episode: Episode) -> None:
-        robot = episode.settings.get("robot")
+        robot = episode._recording.settings.get("robot")
         if not robot:
             raise ValueError(f"camera_system '{name}': {episode.path} was recorded without a robot; use add_cameras")
+        if not is_known_thing(robot):
+            raise ValueError(f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from a recording; use add_cameras")
         self._robot = _core.Robot(robot)
         self._system = _core.CameraSystem(name, self._robot.file, ROBOT_PREFIX, self._robot.base)
         self.cameras: list[RenderCamera] = []
@@ -160,8 +163,9 @@ class CameraSystem:
         if not self._system.varies:
             return
         sim = self._worlds.sim
-        roles = episode.obs_scene.get("objects", {}).values()
-        bodies = [_mujoco.name2id(sim.model, _mujoco.Obj.BODY, role["body"]) for role in roles]
+        objects = episode.obs_scene.get("objects", {})
+        names = [role.get("body") for role in (objects.values() if isinstance(objects, dict) else ()) if isinstance(role, dict)]
+        bodies = [_mujoco.name2id(sim.model, _mujoco.Obj.BODY, name) for name in names if isinstance(name, str)]
         points = [sim.data.xpos[world, body] for body in bodies if body >= 0]
         points += [sim.data.site_xpos[world, site] for site in self._sites if site >= 0]
         centre = sum(points, np.zeros(3)) * (1.0 / len(points)) if points else np.zeros(3)

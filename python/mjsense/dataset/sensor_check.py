@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,12 +14,15 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.assets import use_installed_meshes
-from mjsense.dataset import json_rows, render_cameras
+from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
+from mjsense.dataset.description import named_file
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import VIDEOS
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.files import open_h5, text_of, video_options
+from mjsense.dataset.hdf5 import Rows, open_h5, text_of
+from mjsense.dataset.limits import TEXT_BYTES
+from mjsense.dataset.places import open_plain
 from mjsense.dataset.playback import ReplayInputs, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
@@ -57,7 +59,7 @@ class _Rebuilt:
     simulated from the recorded state with the recorded controls, so that sensors with a memory are right, too."""
 
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
-        settings = episode.settings
+        settings = episode._recording.settings
         cameras = settings["cameras"]
         options = {key: settings[key] for key in _core.rollout_options() if key in settings}
         options |= {"policy": "", "replay_sensor": True, "num_worlds": num_worlds, "threads": threads, "cameras": [camera["name"] for camera in cameras]}
@@ -114,7 +116,7 @@ class _Archived:
     """The archived model with the recorded cameras, for recordings whose task cannot be rebuilt."""
 
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
-        cameras, settings = render_cameras.recorded_cameras(episode, None), episode.settings
+        cameras, settings = render_cameras.recorded_cameras(episode, None), episode._recording.settings
         views = [camera.scene_sensor(settings.get("shadows", True), settings.get("samples", 1)) for camera in cameras]
         self._worlds = EpisodeWorlds(episode, num_worlds, views, brightness=settings.get("render", {}).get("brightness", 1.0), threads=threads)
         self.sim = self._worlds.sim
@@ -133,7 +135,9 @@ class _Archived:
 
 def _worlds_of(episode: Episode, num_worlds: int, threads: int) -> tuple[Any, str]:
     """The worlds, and the reason for streams that they do not have."""
-    settings = episode.settings
+    settings = episode._recording.settings
+    if files := named_file(settings):
+        return _Archived(episode, num_worlds, threads), f"of a file that the recording names is not read: {files}"
     if "render" in settings:
         return _Archived(episode, num_worlds, threads), "carried over from the recording that was rendered"
     if "task" in settings.get("code", {}):
@@ -149,7 +153,7 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     """Records the sensors of these episodes on their recorded states, under the numbers 0, 1, ..."""
     first = episodes[0]
     rate = Fraction(first.fps)
-    video = video_options(first._recording)
+    video = first._recording.video or {}
     options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
     recorder = _core.Recorder(worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options)
     for start in range(0, len(episodes), worlds.sim.num_worlds):
@@ -202,34 +206,39 @@ def _array_deviation(name: str, recorded: np.ndarray, replayed: np.ndarray) -> D
 def _video_deviation(name: str, recorded: Episode, replayed: Episode) -> Deviation | None:
     """The encoder gives the same bytes for the same images; other bytes are decoded and compared."""
     a, b = recorded.video(name), replayed.video(name)
-    if a.path.read_bytes() == b.path.read_bytes():
-        return None
+    with open_plain(a.path) as old, open_plain(b.path) as new:
+        if old.size == new.size and old.read() == new.read():
+            return None
     for t in range(min(len(a), len(b))):
         if found := _array_deviation(name, a[t][None], b[t][None]):
             return Deviation(t, name, found.element.replace("value", "pixel"), found.recorded, found.replayed, found.count)
     return None
 
 
+def _sensor_of(dataset: Rows) -> str:
+    """Name of the sensor of a stream."""
+    return str(bounded_json.parse_object(dataset.attrs.text("spec", "{}"), f"{dataset.where}: the attribute 'spec'", TEXT_BYTES).get("sensor", ""))
+
+
 def _compare(recorded: Episode, replayed: Episode, worlds: Any, otherwise: str) -> SensorCheck:
     check, has_task = SensorCheck(), isinstance(worlds, _Rebuilt)
     with open_h5(recorded.path) as old_file, open_h5(replayed.path) as new_file:
         old, new = old_file[recorded.trajectory], new_file[replayed.trajectory]
-        names: list[str] = []
-        old.visititems(lambda name, dataset: names.append(name) if hasattr(dataset, "dtype") else None)
+        names = [name for name in old.datasets() if isinstance(old[name], Rows) and (old[name].is_number or name == "obs_scene")]
         for name in names:
             if name in _NOT_COMPARED or name.startswith("replay/"):
                 continue
             if name not in new or (name in _OF_TASK and not has_task):
                 if name.startswith("numbers/"):  # the same as in the sensor's JSON rows
                     continue
-                sensor = json.loads(text_of(old[name].attrs.get("spec", "{}"))).get("sensor", "")
+                sensor = _sensor_of(old[name])
                 check.not_computed[name] = worlds.reasons.get(sensor, otherwise)
                 continue
             if name.startswith(VIDEOS):
                 found = _video_deviation(name, recorded, replayed)
             else:
                 found = _array_deviation(name, old[name][:], new[name][:])
-                if found and text_of(old[name].attrs.get("encoding", "")) == "json":
+                if found and old[name].attrs.text("encoding") == "json":
                     found = _text_deviation(name, old[name][:], new[name][:], found.step)
             if found:
                 check.deviations.append(found)

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
+import resource
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -18,9 +21,13 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.dataset.cache import Cache
-from mjsense.dataset.video_decoder import Decoder, Packets, have_av, to_array
+from mjsense.dataset.places import PlainFile, open_plain, printable
+from mjsense.dataset.video_decoder import CODECS, Decoder, Packets, check_sum, container_format, have_av, to_array
 from mjsense.ffmpeg import use_installed_ffmpeg
 
+_CHUNK_BYTES = 1 << 28  # of the frames that one start of ffmpeg decodes, at most
+_CPU_S, _BYTES_PER_S, _MEMORY = 60, 50_000, 4 << 30  # limits of ffmpeg; it needs a tenth of this time for a real video
+_MESSAGES = 1 << 16  # bytes that ffmpeg may write to stderr
 _CHUNK = 64  # frames that one start of ffmpeg decodes; a start costs as much as about 50 frames of 640x368
 _OPEN_DECODERS = 16
 _LARGE_IMAGE = 100_000  # pixels; with smaller images, starting threads costs more than they save
@@ -38,6 +45,8 @@ class VideoInfo:
     """``rgb``, ``depth16`` or ``molmospaces_red_green``."""
     metres_per_unit: float
     fps: Fraction
+    crc: str = ""
+    """Checksum of the file; empty: unknown."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -50,9 +59,11 @@ class VideoInfo:
 
 def decoded(info: VideoInfo, pixels: np.ndarray) -> np.ndarray:
     """Values of a picture: uint8 [H, W, 3] of rgb, float32 [H, W] m of depth."""
+    if not all(got in (stated, stated + stated % 2) for got, stated in zip(pixels.shape, (info.height, info.width))):
+        raise RuntimeError(f"{info.path}: a frame has {pixels.shape[1]} x {pixels.shape[0]} pixels, the recording states {info.width} x {info.height}")
     pixels = pixels[: info.height, : info.width]  # odd sizes are stored with one column or row more
     if info.encoding == "rgb":
-        return np.ascontiguousarray(pixels)
+        return np.array(pixels, order="C")  # a copy: the array may be in the cache
     if info.encoding == "depth16":
         return pixels * np.float32(info.metres_per_unit)
     code = (pixels[..., 0].astype(np.float32) * 256) + pixels[..., 1]
@@ -94,6 +105,24 @@ class _Job:
 
 def _no_frame(info: VideoInfo, index: int) -> Exception:
     return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
+
+
+def _run_limited(command: list[str], file: PlainFile) -> tuple[bytes, str | None]:
+    """Output of ffmpeg on an open file, and its messages if it fails; its time, memory and messages are limited."""
+    seconds = _CPU_S + file.size // _BYTES_PER_S
+    with tempfile.TemporaryFile() as messages, subprocess.Popen(command, stdout=subprocess.PIPE, stderr=messages, pass_fds=[file.fileno()]) as process:
+        for what, most in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, _MEMORY), (resource.RLIMIT_FSIZE, _MESSAGES)):
+            with contextlib.suppress(ProcessLookupError):
+                resource.prlimit(process.pid, what, (most, most))
+        try:
+            output, _ = process.communicate(timeout=10 * seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            return b"", f"it has not finished after {10 * seconds} s"
+        messages.seek(0)
+        text = printable(" ".join(messages.read(_MESSAGES).decode(errors="replace").split())[:500])
+        return output, (text or f"it ended with {process.returncode}") if process.returncode else None
 
 
 class FrameReader:
@@ -139,7 +168,7 @@ class FrameReader:
 
     def _packets(self, info: VideoInfo) -> Packets:
         def read() -> tuple[Packets, int]:
-            packets = Packets(info.path, info.fps)
+            packets = Packets(info.path, info.fps, info.frames, (info.width, info.height), info.crc)
             return packets, packets.bytes
 
         return self._tables.get(info.path, read)
@@ -152,18 +181,23 @@ class FrameReader:
         depth = info.encoding == "depth16"
         odd = 1 if info.encoding == "rgb" else 0
         shape = (info.height + (info.height & odd), info.width + (info.width & odd)) + (() if depth else (3,))
-        first = index - index % _CHUNK
+        first = index - index % _CHUNK if np.prod(shape) * 2 * _CHUNK <= _CHUNK_BYTES else index
         # A tenth of a frame early: ffmpeg drops the frames before this time, and the file's times are rounded.
         at = ["-ss", f"{float((first - Fraction(1, 10)) / info.fps):.6f}"] if first else []
-        command = [program, "-nostdin", "-v", "error", *at, "-i", f"file:{info.path}", "-frames:v", str(_CHUNK), "-f", "rawvideo",
-                   "-pix_fmt", info.pixel_format, "-"]  # fmt: skip
-        done = subprocess.run(command, capture_output=True)
         size = int(np.prod(shape)) * (2 if depth else 1)
-        if done.returncode or len(done.stdout) % size:
-            raise RuntimeError(f"{info.path}: ffmpeg cannot decode it: {done.stderr.decode(errors='replace').strip()}")
+        count = max(1, min(_CHUNK, _CHUNK_BYTES // size))
+        with open_plain(info.path) as file:
+            self._tables.get((info.path, "sum"), lambda: (check_sum(file, info.crc, str(info.path)) or True, 1))
+            # The file is named by its descriptor, so its name is neither an option nor a protocol.
+            command = [program, "-nostdin", "-v", "error", "-protocol_whitelist", "file", "-f", container_format(info.path), "-codec_whitelist", CODECS,
+                       "-max_pixels", str((info.width + 64) * (info.height + 64)), "-threads", "1", *at, "-i", f"/proc/self/fd/{file.fileno()}", "-an", "-sn", "-dn",
+                       "-frames:v", str(count), "-f", "rawvideo", "-pix_fmt", info.pixel_format, "-"]  # fmt: skip
+            output, message = _run_limited(command, file)
+        if message is not None or len(output) % size:
+            raise RuntimeError(f"{info.path}: ffmpeg cannot decode it: {message or 'its images have another size than the recording states'}")
         found = None
-        for i in range(len(done.stdout) // size):
-            pixels = np.frombuffer(done.stdout, "<u2" if depth else np.uint8, int(np.prod(shape)), i * size).reshape(shape).copy()
+        for i in range(len(output) // size):
+            pixels = np.frombuffer(output, "<u2" if depth else np.uint8, int(np.prod(shape)), i * size).reshape(shape).copy()
             self._cache.add((info.path, first + i), pixels, size)
             found = pixels if first + i == index else found
         if found is None:
@@ -187,6 +221,11 @@ class Video:
     def path(self) -> Path:
         """The file."""
         return self._info.path
+
+    def check(self) -> None:
+        """Raises an error if the file is missing, is no regular file, or differs from what was recorded: for a program that copies it."""
+        with open_plain(self.path) as file:
+            check_sum(file, self._info.crc, str(self.path))
 
     @property
     def trimmed(self) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mjsense.dataset import Episode, statistics
-from mjsense.export.output import needs
+from mjsense.dataset.video_decoder import open_container
 
 _LONG_SIDE = 160  # pixels; every n-th row and column counts, so that the longer side has at most so many, as in the recorder
 _PERIOD = 20  # frames from one key frame to the next, by default; with far fewer key frames, every 20th frame is used
@@ -38,8 +38,7 @@ def key_frame_histograms(path: Path, length: int) -> tuple[np.ndarray, int]:
 
 def _decoded(path: Path, wanted: set[int] | None) -> tuple[np.ndarray, int]:
     """Histograms of the wanted frames; None: of the key frames."""
-    av = needs("av")
-    with av.open(str(path)) as video:
+    with open_container(path) as video:
         stream = video.streams.video[0]
         stream.codec_context.options = {"skip_loop_filter": "all"}  # changes pixels at edges of blocks by a few levels, and is 20 % faster
         if wanted is None:

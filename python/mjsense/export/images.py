@@ -54,6 +54,7 @@ def padded(image: np.ndarray) -> Any:
 @contextlib.contextmanager
 def video_file(video: Video, folder: Path) -> Iterator[Path]:
     """The file of a colour video. That of a trimmed episode is encoded again, into ``folder``, and deleted at the end of the block."""
+    video.check()
     if not video.trimmed:
         yield video.path
         return

@@ -200,6 +200,7 @@ class Writer:
         video = self._source.video(episode, camera)
         exact = self._path / f"extras/depth/{camera}/episode_{self._count:06d}{video.path.suffix}"
         if not video.trimmed:
+            video.check()
             shutil.copyfile(video.path, in_folder(exact))
         elif video._info.encoding == "depth16":
             lerobot_depth.encode_exactly(video, in_folder(exact))  # without the frames that are left out

@@ -14,6 +14,7 @@ import numpy as np
 from mjsense._arguments import checked
 from mjsense._rotations import quaternions_of
 from mjsense.dataset import Episode, Video
+from mjsense.dataset.video_decoder import open_container
 from mjsense.export.images import CRF, depth_videos, padded
 from mjsense.export.mapping import Mapping, Source
 from mjsense.export.output import join_folders, needs, new_output
@@ -144,10 +145,9 @@ def _video(source: Source, episode: Episode, name: str, encode_again: bool) -> I
 
 def _copied(video: Video) -> list[bytes] | None:
     """The frames as Annex B, each with the parameter sets if it is a key frame; None if the video has B-frames."""
-    import av  # pyright: ignore[reportMissingImports]
     from av.bitstream import BitStreamFilterContext  # pyright: ignore[reportMissingImports]
 
-    with av.open(str(video.path)) as container:
+    with open_container(video.path, video._info.crc) as container:
         stream = container.streams.video[0]
         convert = BitStreamFilterContext("h264_mp4toannexb", stream)
         packets = [packet for packet in container.demux(stream) if packet.size]

@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from mjsense.dataset.video_decoder import open_container
 from mjsense.export.output import needs
 
 
@@ -31,7 +32,7 @@ class Concatenation:
     def add(self, path: Path, frames: int) -> bool:
         """Appends the video ``path``, which must have this number of frames."""
         av = needs("av")
-        with av.open(str(path)) as video:
+        with open_container(path) as video:
             stream = video.streams.video[0]
             packets = [packet for packet in video.demux(stream) if packet.dts is not None]
             if len(packets) != frames:

@@ -104,6 +104,7 @@ def _log_features(rr: Any, stream: Any, source: Source, episode: Episode) -> Non
 
 def _log_camera(rr: Any, stream: Any, source: Source, episode: Episode, name: str) -> None:
     place, video, times = f"world/cameras/{name}", source.video(episode, name), _times(rr, source, episode.length)
+    video.check()
     asset = rr.AssetVideo(path=video.path)
     stream.log(f"{place}/colour", asset, static=True)
     frames = rr.VideoFrameReference.columns(timestamp=[rr.components.VideoTimestamp(nanoseconds=int(t)) for t in asset.read_frame_timestamps_nanos()])

@@ -12,6 +12,7 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recording_description.h"
+#include "mjsense/replay/description_checks.h"
 #include "mjsense/replay/json_text.h"
 
 namespace mjsense::replay {
@@ -88,11 +89,25 @@ class FileVerifier {
     const Json description = record::parse_description(text);
     if (!description.is_object())
       return error(recorded_.name, "has a description of the recording that cannot be read");
+    for (const std::string& wrong : description_faults(description))
+      error(recorded_.name, "has a description of the recording " + wrong);
+    listed_ = listed_places(description);
+    if (listed_.empty())
+      note(recorded_.name, "does not list its streams, so missing ones are not noticed");
     const auto archive = description.find("model_archive");
     if (archive == description.end()) return;
-    if (!archive->is_string())
-      return error(recorded_.name, "has a description whose model_archive is not a file name");
-    out_["archive"] = *archive;
+    if (archive->is_string()) out_["archive"] = *archive;
+  }
+
+  // A stream that the description lists is in the file.
+  void check_listed(hid_t trajectory, const std::string& context) {
+    for (const ListedStream& stream : listed_) {
+      const bool there = std::ranges::any_of(
+          stream.places, [&](const std::string& place) { return hdf5::exists(trajectory, place); });
+      if (!there)
+        error(context, fmt::format("has no '{}': the stream '{}' was recorded", stream.places[0],
+                                   stream.name));
+    }
   }
 
   void check_trajectory(hid_t trajectory, const std::string& context) {
@@ -109,6 +124,7 @@ class FileVerifier {
     for (const char* name : {"rewards", "fail", "terminated", "truncated", "obs_scene"}) {
       if (!hdf5::exists(trajectory, name)) error(context, fmt::format("has no '{}'", name));
     }
+    check_listed(trajectory, context);
     hdf5::each_dataset(trajectory, [&](const std::string& name) {
       if (name.starts_with("obs/sensor_data/")) return;
       try {
@@ -246,6 +262,7 @@ class FileVerifier {
   Json out_{{"findings", Json::array()}, {"videos", Json::array()}};
   std::size_t findings_ = 0;
   bool ours_ = false;
+  std::vector<ListedStream> listed_;  // by the description of the recording
   int episodes_ = 0, without_sum_ = 0, with_sum_ = 0;
   std::int64_t steps_ = 0;
   std::uint64_t unpacked_ = 0;

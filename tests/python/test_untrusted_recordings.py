@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings that someone has changed on purpose: each reader gives one line that says what is wrong, or the right values, and ``mjsense
+verify`` refuses what a reader refuses. Nothing outside of the recording is read or written, and nothing is started."""
+
+import json
+import os
+import resource
+import shutil
+import time
+from fractions import Fraction
+
+import h5py
+import numpy as np
+import pytest
+from edited_recordings import changed, describe, file_of, rename_video
+
+pytest.importorskip("av")
+pytest.importorskip("zarr")
+
+from mjsense.cluster import tools
+from mjsense.dataset.description import Description
+from mjsense.dataset.places import is_plain_name, open_plain
+from mjsense.export import export_lerobot, export_zarr
+
+import mjsense as mjs
+
+CAMERA = "wrist_camera"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("made") / "data"
+    mjs.record("pick", out=out, episodes=1, horizon=4, keep_failures=True, width=32, height=24, cameras=[CAMERA], depth=True, seed=5, progress=False)
+    return out
+
+
+@pytest.fixture
+def root(made, tmp_path):
+    return shutil.copytree(made, tmp_path / "data")
+
+
+def read(root, out):
+    dataset = mjs.Dataset(root)
+    for i in range(len(dataset)):
+        dataset[i]
+    for episode in dataset.episodes:
+        assert repr(episode) and episode.settings is not None
+        for name, stream in episode.streams.items():
+            if stream.kind != "video":
+                episode[name]
+
+
+READERS = {
+    "read": read,
+    "lerobot": lambda root, out: export_lerobot(root, out / "lerobot"),
+    "zarr": lambda root, out: export_zarr(root, out / "data.zarr"),
+    "render": lambda root, out: mjs.render(root, out / "render", width=16, height=12, progress=False),
+}
+
+
+def errors_of(root):
+    """Errors of ``mjsense verify``."""
+    found = tools.verify(str(root))
+    assert found is not None
+    assert found["ok"] == (not any(f["error"] for f in found["findings"]))
+    return [f"{f['place']} {f['text']}" for f in found["findings"] if f["error"]]
+
+
+def refusals(root, out, readers):
+    """The message of each reader that refuses a recording, within a second of CPU time and 1 GB of memory more than before."""
+    refused = {}
+    for name in readers:
+        before, cpu = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+        try:
+            READERS[name](root, out)
+        except (ValueError, LookupError, OSError, RuntimeError) as error:
+            refused[name] = str(error.args[0])
+            assert "\n" not in refused[name] and str(root) in refused[name]
+            assert time.process_time() - cpu < 5
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_000_000
+    return refused
+
+
+def assert_refused(root, out, text, readers=("read", "zarr")):
+    """Every reader names what is wrong, and verify does."""
+    found = refusals(root, out, readers)
+    assert found.keys() == set(readers) and all(text in message for message in found.values()), found
+    assert any(text in error for error in errors_of(root)), errors_of(root)
+
+
+def test_an_unchanged_recording_is_read_and_verified(root, tmp_path):
+    assert refusals(root, tmp_path, READERS) == {}
+    assert errors_of(root) == []
+
+
+# ------------------------------------------------------------------------------------------------------------ the description
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda about: about.update(fps="1e999999999"), "fps is '1e999999999'; it must be a rate"),
+        (lambda about: about.update(fps="1/0"), "fps is '1/0'; it must be a rate"),
+        (lambda about: about.update(fps="-15"), "fps is '-15'; it must be a rate"),
+        (lambda about: about.update(fps="nan"), "fps is 'nan'; it must be a rate"),
+        (lambda about: about.update(fps="1" * 5000), "it must be a rate"),
+        (lambda about: about.update(fps=[15]), "fps is [15]; it must be a rate"),
+        (lambda about: about.update(gzip=12), "gzip is 12; it must be a whole number from 0 to 9"),
+        (lambda about: about.update(model_archive="../../model.zip"), "model_archive is '../../model.zip'; it must be a plain name"),
+        (lambda about: about.update(model_archive="/etc/hostname"), "model_archive is '/etc/hostname'; it must be a plain name"),
+        (lambda about: about.update(model_archive=7), "model_archive is 7; it must be a plain name"),
+        (lambda about: about.update(settings=[1]), "settings is [1]; it must be an object"),
+        (lambda about: about["video"].update(crf=500), "video.crf is 500; it must be a whole number from 0 to 51"),
+        (lambda about: about["video"].update(preset="-y"), "video.preset is '-y'; it must be one of ultrafast"),
+        (lambda about: about["video"].update(threads=True), "video.threads is True; it must be a whole number"),
+        (lambda about: about["settings"].update(policy_dt_ms=1e15), "policy_dt_ms is 1000000000000000.0; it must be a number above 0"),
+        (lambda about: about["settings"].update(policy_dt_ms="x"), "policy_dt_ms is 'x'; it must be a number above 0"),
+        (lambda about: about["settings"].update(samples=-1), "samples is -1; it must be a whole number"),
+        (lambda about: about["settings"].update(render={"brightness": "x"}), "render.brightness is 'x'; it must be a number above 0"),
+        (lambda about: about["settings"]["cameras"][0].update(name="../../../escaped"), "cameras[0].name is '../../../escaped'; it must be a plain name"),
+        (lambda about: about["settings"]["cameras"][0].update(width=10**9), "cameras[0].width is 1000000000; it must be a whole number from 1 to 16384"),
+        (lambda about: about["settings"]["cameras"].append("x"), "cameras[1] is 'x'; it must be an object"),
+    ],
+)  # fmt: skip
+def test_values_of_the_description(root, tmp_path, change, text):
+    describe(root, change)
+    assert_refused(root, tmp_path, text, ("read",))
+
+
+@pytest.mark.parametrize(("text", "says"), [("{oops", "is not JSON text"), ("[]", "is a list, not an object"), ("[" * 30000 + "]" * 30000, "is nested deeper")])
+def test_text_of_the_description(root, tmp_path, text, says):
+    with changed(file_of(root)) as file:
+        file.attrs["recording"] = text
+    assert_refused(root, tmp_path, f"the attribute 'recording' {says}", ("read",))
+
+
+def test_a_program_that_the_description_names_is_not_started(root, tmp_path):
+    """Options of the recorder that are not about the images are not taken from a file."""
+    program, mark = tmp_path / "encode", tmp_path / "was_started"
+    program.write_text(f'#!/bin/sh\ntouch {mark}\nexec ffmpeg "$@"\n')
+    program.chmod(0o755)
+    describe(root, lambda about: about["video"].update(ffmpeg=str(program), archive=["../x.zip", "y"], max_encoders=0, queue_frames=-1))
+    mjs.render(root, tmp_path / "out", width=16, height=12, progress=False)
+    assert mjs.check_replay(root, states=True, progress=False)
+    assert not mark.exists()
+    assert "ffmpeg" not in file_of(tmp_path / "out").read_bytes().decode(errors="replace")
+    assert any("video.ffmpeg, which is never recorded" in error for error in errors_of(root))
+
+
+def test_another_recording_is_not_replaced(root, made, tmp_path):
+    describe(root, lambda about: about["video"].update(overwrite=True))
+    precious = shutil.copytree(made, tmp_path / "out")
+    before = {path: path.read_bytes() for path in sorted(precious.rglob("*")) if path.is_file()}
+    with pytest.raises((ValueError, RuntimeError), match=r"resume|overwrite"):
+        mjs.render(root, precious, width=16, height=12, progress=False)
+    assert {path: path.read_bytes() for path in sorted(precious.rglob("*")) if path.is_file()} == before
+
+
+def test_a_robot_of_a_file_is_not_read(root, tmp_path):
+    """The streams are compared on the archived model instead."""
+    describe(root, lambda about: about["settings"].update(robot=str(tmp_path / "robot.toml")))
+    report = mjs.check_replay(root, actions=False, states=True, progress=False)
+    assert report.ok and "of a file that the recording names is not read: robot" in repr(report)
+    with pytest.raises(ValueError, match="a file, which is not taken from a recording"):
+        mjs.render(root, tmp_path / "out", camera_system="droid", progress=False)
+
+
+def test_settings_of_other_programs():
+    """A recorder's own settings may have any name and value. Those that are not of our type are not used."""
+    settings = {"samples": "many", "cameras": ["front"], "code": "1a2b3c", "render": True, "shadows": 3}
+    found = Description.parse(json.dumps({"fps": "30", "settings": settings}), "x.h5")
+    assert (found.fps, found.settings, found.all_settings) == (Fraction(30), {"cameras": []}, settings)
+
+
+# ---------------------------------------------------------------------------------------------------------- names and files
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "../secret.mp4", "..", "a/b.mp4", "/dev/zero", "a\nb.mp4"])
+def test_a_video_name_is_no_path(root, tmp_path, name):
+    rename_video(root, CAMERA, name)
+    assert_refused(root, tmp_path, "plain file name", ("read", "lerobot"))
+
+
+@pytest.mark.parametrize("kind", ["link", "fifo", "folder"])
+def test_a_video_is_a_regular_file(root, tmp_path, kind):
+    place = root / "house_0/other.mp4"
+    if kind == "link":
+        shutil.copy(next(root.glob("house_0/*.mp4")), tmp_path / "secret.mp4")
+        place.symlink_to(tmp_path / "secret.mp4")
+    elif kind == "fifo":
+        os.mkfifo(place)
+    else:
+        place.mkdir()
+    rename_video(root, CAMERA, "other.mp4")
+    expected = {"link": "is a symbolic link, which is not followed", "fifo": "is a pipe", "folder": "is a"}[kind]
+    assert_refused(root, tmp_path, expected, ("read", "lerobot"))
+
+
+@pytest.mark.parametrize("content", ["#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{}\n#EXT-X-ENDLIST\n", "ffconcat version 1.0\nfile {}\n"])
+@pytest.mark.parametrize("without_av", [False, True])
+def test_a_playlist_is_no_video(root, tmp_path, monkeypatch, content, without_av):
+    """The content of a file does not choose how it is read: a playlist would open other files."""
+    monkeypatch.setattr("mjsense.dataset.video.have_av", lambda: not without_av)
+    secret = shutil.copy(next(root.glob("house_0/*.mp4")), tmp_path / "secret.mp4")
+    (root / "house_0/list.mp4").write_text(content.format(secret))
+    rename_video(root, CAMERA, "list.mp4")
+    with changed(file_of(root)) as file:
+        del file[f"traj_0/obs/sensor_data/{CAMERA}"].attrs["crc32"]
+    with pytest.raises(RuntimeError, match=r"list\.mp4: (not a video that can be read|ffmpeg cannot decode it)"):
+        mjs.Dataset(root)[0]
+    assert errors_of(root)
+
+
+@pytest.mark.parametrize("without_av", [False, True])
+@pytest.mark.parametrize("name", ["a:b", "file:x", "http:"])
+def test_a_folder_with_a_colon(made, tmp_path, monkeypatch, name, without_av):
+    """The relative path of a recording is never read as an address."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("mjsense.dataset.video.have_av", lambda: not without_av)
+    shutil.copytree(made, name)
+    (tmp_path / "x").mkdir()
+    np.testing.assert_array_equal(mjs.Dataset(name).episodes[0].video(CAMERA)[:], mjs.Dataset(made).episodes[0].video(CAMERA)[:])
+    export_lerobot(name, tmp_path / "lerobot")
+    assert errors_of(name) == []
+
+
+def test_a_file_and_a_folder_that_are_links(root, tmp_path):
+    moved = tmp_path / "moved.h5"
+    file_of(root).rename(moved)
+    (root / "house_0/trajectories_batch_1_of_1.h5").symlink_to(moved)
+    assert_refused(root, tmp_path, "is a symbolic link, which is not followed", ("read",))
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "house_0").symlink_to(root / "house_0")
+    with pytest.raises(OSError, match="house_0: is a symbolic link, which is not followed"):
+        mjs.Dataset(other)
+
+
+@pytest.mark.parametrize("wrong", ["", ".", "..", "a/b", "/a", "a\0b", "a\x1b[31m", "x" * 300, "é" * 200, "\udc80"])
+def test_plain_names(wrong):
+    assert not is_plain_name(wrong) and is_plain_name("episode_00000000_wrist_camera.mp4") and is_plain_name("a:b ü.mp4")
+
+
+def test_a_device_is_not_read(tmp_path):
+    with pytest.raises(OSError, match="/dev/zero: is a device, not a file"):
+        open_plain(__import__("pathlib").Path("/dev/zero"))
+
+
+# --------------------------------------------------------------------------------------------------------------------- HDF5
+
+
+def dataset_of(make):
+    """Adds a stream ``obs/extra/evil`` that a function makes: ``make(group, rows)``."""
+
+    def change(file):
+        make(file["traj_0/obs/extra"], len(file["traj_0/rewards"]))
+
+    return change
+
+
+def virtual(group, rows):
+    layout = h5py.VirtualLayout((rows, 1), "f8")
+    layout[:] = h5py.VirtualSource("/tmp/other.h5", "x", (50, 1), "f8")[:rows]
+    group.create_virtual_dataset("evil", layout)
+
+
+def short_chunk(group, rows):
+    """A chunk of 8 bytes, which the HDF5 library would read beyond its end."""
+    group.create_dataset("evil", shape=(rows, 1000), dtype="f8", chunks=(rows, 1000), compression="gzip").id.write_direct_chunk((0, 0), b"x\x9ccddd\xe4\x02\x00\x00\x1e\x00\x0a")
+
+
+def json_rows(row):
+    def make(group, rows):
+        made = group.create_dataset("evil", data=np.tile(np.frombuffer(row, np.uint8), (rows, 1)), compression="gzip")
+        made.attrs["encoding"] = "json"
+
+    return dataset_of(make)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (dataset_of(virtual), "virtual dataset, which is not read"),
+        (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 4), dtype="u1", external=[("/etc/passwd", 0, 4 * n)])), "files, which are not read"),
+        (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 10**9), chunks=(1, 10**7), dtype="f8", compression="gzip")), "has rows of 8000000000 bytes"),
+        (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 10**6, 8), chunks=(n, 10**6, 8), dtype="f8", compression="gzip")), "has chunks of 320000000 bytes"),
+        (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 4 * 10**6), chunks=(1, 10**6), dtype="f8", compression="gzip")), "declares 160000000 bytes but stores 0"),
+        (dataset_of(short_chunk), "is damaged: one of its chunks does not"),
+        (dataset_of(lambda g, n: g.create_dataset("evil", data=np.zeros((n + 1, 3)))), f"has {6} rows"),
+        (json_rows(b'{"a":' * 20000 + b"1" + b"}" * 20000), "evil row 0 is"),
+        (json_rows(b'{"../../escaped": [1.0]}'), "has the key '../../escaped', which is not a plain name"),
+        (json_rows(b'{"": 1}'), "has the key '', which is not a plain name"),
+        (json_rows(json.dumps({f"k{i}": i for i in range(5000)}).encode()), "has more than 4096 keys"),
+        (json_rows(b"[1]"), "evil row 0"),
+        (lambda file: file.move("traj_0", "traj_x"), "traj_x"),
+        (lambda file: file.move("traj_0", "traj_" + "9" * 200), "traj_999"),
+        (lambda file: file["traj_0/obs/sensor_data/wrist_camera"].attrs.__setitem__("width", 10**9), "width is 1000000000"),
+        (lambda file: file["traj_0/obs/sensor_data/wrist_camera"].attrs.__setitem__("width", 16384), "pixels"),
+        (lambda file: file["traj_0/obs/sensor_data/wrist_camera"].attrs.__setitem__("fps", "1e999999999"), "fps is '1e999999999'"),
+        (lambda file: file["traj_0/obs/sensor_data/wrist_camera"].attrs.__setitem__("encoding", "hls"), "its encoding is 'hls'"),
+        (lambda file: file["traj_0"].attrs.__setitem__("episode", -3), "the attribute 'episode' is np.int64(-3)"),
+        (lambda file: file["traj_0"].attrs.__setitem__("outcome", "x" * 60000 * 2), "the attribute 'outcome' has 120000 bytes"),
+        (lambda file: file["traj_0"].attrs.__setitem__("outcome", np.zeros(3)), "the attribute 'outcome' is"),
+    ],
+)  # fmt: skip
+def test_hdf5(root, tmp_path, change, text):
+    with changed(file_of(root)) as file:
+        change(file)
+    found = refusals(root, tmp_path, ("read", "zarr"))
+    assert found and text in found["read"], found
+    assert errors_of(root)
+
+
+@pytest.mark.parametrize("kind", ["external", "soft", "hard loop", "reference", "opaque"])
+def test_what_is_no_stream_is_left_out(root, tmp_path, kind):
+    """Readers see only datasets of numbers that hard links reach; verify names the others."""
+    before = set(mjs.Dataset(root).streams)
+    with h5py.File(tmp_path / "secret.h5", "w") as secret:
+        secret["x"] = np.arange(5.0)
+    with changed(file_of(root)) as file:
+        group, rows = file["traj_0/obs/extra"], len(file["traj_0/rewards"])
+        if kind in ("external", "soft"):
+            group["evil"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "x") if kind == "external" else h5py.SoftLink("/traj_0/obs/extra/evil")
+        elif kind == "hard loop":
+            group["evil"] = file["traj_0/obs"]
+        elif kind == "reference":
+            group.create_dataset("evil", (rows,), dtype=h5py.ref_dtype)
+        else:
+            group.create_dataset("evil", data=np.zeros(rows, "V7"))
+    assert refusals(root, tmp_path, ("read", "zarr", "lerobot")) == {}
+    assert set(mjs.Dataset(root).streams) == before and errors_of(root)
+    with pytest.raises((ValueError, KeyError), match="obs/extra/evil"):
+        mjs.Dataset(root).episodes[0]["obs/extra/evil"]
+
+
+def test_more_data_than_a_file_can_hold_is_not_unpacked(root, tmp_path):
+    """A dataset of 1.2 GB zeros in 1 MB, in chunks of the allowed size."""
+    with changed(file_of(root)) as file:
+        rows = len(file["traj_0/rewards"])
+        made = file["traj_0/obs/extra"].create_dataset("evil", shape=(rows, 8 * 10**6), chunks=(1, 10**6), dtype="f8", compression="gzip", fillvalue=0)
+        for t in range(rows):
+            made[t] = np.zeros(8 * 10**6)
+        made[0, 0] = 1
+        file["traj_0"].move("rewards", "old")
+        del file["traj_0/old"]
+        file["traj_0"].create_dataset("rewards", data=np.zeros(rows, np.float32))
+    found = refusals(root, tmp_path, ("read",))
+    if rows * 64 * 10**6 > (1 << 29) + 200 * file_of(root).stat().st_size:
+        assert "more than the" in found["read"] and errors_of(root)
+
+
+def test_streams_that_the_description_lists(root):
+    """A stream that is gone is named."""
+    for place in ("obs/sensor_data/wrist_camera", "obs/extra/tcp_pose", "actions/joint_pos", "obs/agent/qpos", "replay", "env_states/articulations"):
+        copy = shutil.copytree(root, root.with_name("copy"))
+        with changed(file_of(copy)) as file:
+            del file[f"traj_0/{place}"]
+        assert any(place.split("/")[0] in error and "was recorded" in error for error in errors_of(copy)), (place, errors_of(copy))
+        shutil.rmtree(copy)
