@@ -36,6 +36,8 @@ SIDES = ("fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
 _MESHES = (".stl", ".obj", ".msh")
 _CONTENT = {"image/png", "image/ktx", "image/vnd.mujoco.texture", "image/vnd.mujoco.hfield", "model/stl", "model/obj", "model/vnd.mujoco.msh"}
+_CONVERSION = re.compile(r"%[-+ #0'*.$\dhlLqjztw]*[A-Za-z]")
+"""MuJoCo 4.0.1 uses a name that it does not know as the format of a message: ``%n`` ends the process."""
 _REFUSED = {"include": "reads other files", "attach": "reads other files", "model": "reads other files"}
 
 
@@ -54,6 +56,9 @@ def parsed(text: str | bytes, about: str) -> Element:
         if count > MAX_ELEMENTS or depth > MAX_DEPTH:
             what, limit = ("elements", MAX_ELEMENTS) if count > MAX_ELEMENTS else ("nested elements", MAX_DEPTH)
             raise ValueError(f"{about}: line {parser.CurrentLineNumber}: more than {limit} {what}, which is the limit")
+        for key, value in attributes.items():
+            if "%" in value and _CONVERSION.search(value):
+                raise ValueError(f"{about}: line {parser.CurrentLineNumber}: {key[:40]} of '{tag[:40]}' is {value[:60]!r}, which is a format of printf")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -87,7 +92,7 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
         if element.tag in _REFUSED:
             raise ValueError(f"{about}: the element '{element.tag}' {_REFUSED[element.tag]}, which the model of a recording must not")
         for key in element.attrib:
-            named = key.startswith("file") and key != "file" and key not in SIDES or (key == "file" and element.tag not in FILE_TAGS)
+            named = (key.startswith("file") and key != "file" and key not in SIDES) or (key == "file" and element.tag not in FILE_TAGS)
             if named or (key in SIDES and element.tag != "texture"):
                 raise ValueError(f"{about}: the element '{element.tag[:40]}' names a file ('{key[:40]}'), expected one of {', '.join(FILE_TAGS)}")
         kind = element.get("content_type")
