@@ -19,6 +19,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "mjsense/core/model_indices.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/compiled_model.h"
 #include "python/bindings/bindings.h"
@@ -283,6 +284,11 @@ void bind_mujoco_views(nb::module_& m) {
       .def_prop_ro("address", &OwnedData::address);
   m.def("model_fields", &model_fields, nb::arg("model"),
         "Fields of an mjModel: name -> (address, data type, shape).");
+  m.def(
+      "check_model_indices",
+      [](std::uintptr_t model) { check_model_indices(*reinterpret_cast<const mjModel*>(model)); },
+      nb::arg("model"),
+      "Raises ValueError for an id or address in an mjModel that is out of range.");
   m.def("make_model", &make_model, nb::arg("sizes"),
         "Address of a new mjModel, which the caller owns. Other sizes and all arrays are 0.");
   m.def("data_fields", &data_fields, nb::arg("model"), nb::arg("data"),

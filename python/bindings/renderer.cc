@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <bit>
 #include <cstdint>
@@ -166,10 +167,17 @@ struct BoundRenderer {
 }  // namespace
 
 void bind_renderer(nb::module_& m) {
+  m.def("scene_index_fields", &render::scene_index_fields,
+        "Arrays of integers of an mjModel that MuJoCo reads when it updates a scene.");
   nb::class_<BoundRenderer>(m, "SceneRenderer")
       .def(nb::init<nb::dict, nb::dict, nb::dict, nb::dict, nb::dict>())
       .def("render", &BoundRenderer::render)
-      .def("reload", [](BoundRenderer& r) { r.renderer.reload(); })
+      .def("check_indices", [](const BoundRenderer& r) { r.renderer.check_indices(); })
+      .def("reload",
+           [](BoundRenderer& r) {
+             r.renderer.check_indices();
+             r.renderer.reload();
+           })
       .def("prepared", [](const BoundRenderer& r) {
         const render::PreparedAssets found = r.renderer.prepared();
         nb::dict out;

@@ -142,6 +142,13 @@ scene::SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors,
     cfg.entities[i++].second.model = read_source(entity, alive);
   for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
   cfg.spec = spec_of(spec);
+  // The files of an archive, for dataset/episode_worlds.py. All that the base names are among them.
+  if (nb::hasattr(config, "_mjs_members")) {
+    for (auto [name, bytes] : nb::cast<nb::dict>(config.attr("_mjs_members"))) {
+      const auto data = nb::cast<nb::bytes>(bytes);
+      cfg.base.assets[nb::cast<std::string>(name)] = std::string(data.c_str(), data.size());
+    }
+  }
   // Called once during construction of the Scene; afterwards the stored config may be destroyed
   // without the GIL.
   cfg.spec_fn = [edit](mjSpec*) {

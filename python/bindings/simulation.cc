@@ -14,6 +14,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_indices.h"
 #include "mjsense/scene/mujoco_log.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/data_copies.h"
@@ -247,6 +248,7 @@ void bind_simulation(nb::module_& m) {
             s.change("randomize", [&](sim::Simulation& sim) {
               const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
               if (checked.empty()) return;  // MuJoCo would interpret an empty list as all worlds
+              for (const int w : checked) check_element_indices(sim.model_of(w));
               if (set_const) set_constants(sim.worlds().batch(), checked);
               sim.worlds().model_changed();
             });

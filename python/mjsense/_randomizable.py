@@ -10,7 +10,7 @@ import numpy as np
 from mjsense import _mujoco
 from mjsense._written_values import numbers
 
-_IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
+_IDS = {"geom_matid": "nmat", "site_matid": "nmat", "flex_matid": "nmat", "skin_matid": "nmat", "tendon_matid": "nmat", "mat_texid": "ntex"}
 """Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
 _WHOLE = {
     "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_group", "geom_matid", "geom_castshadow",
@@ -32,13 +32,17 @@ _FIXED = {
 _NOT_NEGATIVE = {"body_mass", "body_inertia", "geom_size", "site_size"}
 
 
+def is_randomizable(like: np.ndarray, field: str) -> bool:
+    """Whether a field of the model, of this type, may differ between worlds."""
+    return field not in _FIXED if like.dtype.kind == "f" else field in _WHOLE
+
+
 def check_randomizable(model: Any, field: str) -> None:
     """Raises ValueError for a field that is the same in all worlds."""
     like = getattr(model, field, None)
     if not isinstance(like, np.ndarray):
         return  # Simulation.model_field() reports the available fields
-    real = like.dtype.kind == "f"
-    if (real and field in _FIXED) or (not real and field not in _WHOLE):
+    if not is_randomizable(like, field):
         raise ValueError(f"{field}: part of the model's structure, which is the same in all worlds")
 
 

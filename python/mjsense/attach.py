@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mjsense import _foreign_model
+from mjsense import _core, _foreign_model
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense._randomizable import check_randomizable
 from mjsense.configs import SceneCfg
@@ -260,6 +260,10 @@ class Attached(KnownAttributes):
         sim = self._sim
         values, rows = dict(known), []
         copy = model if self._same_series else _foreign_model.copy_of(model)
+        try:
+            _core.check_model_indices(copy._address)
+        except ValueError as error:
+            raise ValueError(str(error).replace("the model's ", what.split("{}")[0], 1)) from None
         for name, now in _foreign_model.values_of(copy, sim.model).items():
             old = known[name] if name in known else self._base[name][: len(now)]
             if now.shape != old.shape:

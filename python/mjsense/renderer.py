@@ -152,6 +152,7 @@ class Renderer:
         arrays = {name: getattr(model, name) for name in _MODEL_ARRAYS if hasattr(model, name)}
         if arrays["tex_adr"].dtype != np.int64:
             arrays["tex_adr"] = arrays["tex_adr"].astype(np.int64)
+        arrays |= {name: getattr(model, name) for name in _core.scene_index_fields() if hasattr(model, name)}
         soft = {name: getattr(scene, name) for name in _SCENE_ARRAYS}
         self._alive = (arrays, soft)  # the native renderer reads their memory
         quality, map_, rgba, extent = model.vis.quality, model.vis.map, model.vis.rgba, float(model.stat.extent)
@@ -269,6 +270,7 @@ class Renderer:
             self._check_sizes(owner, "`data` belongs to another model")
         if not data.xmat[0].any():  # MuJoCo has not computed any pose, not even that of the world
             raise ValueError("Renderer: `data` has no poses yet: call mujoco.mj_forward(model, data) before update_scene()")
+        self._native.check_indices()
         mujoco, view = self._mujoco, self._camera(camera)
         self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
         # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.

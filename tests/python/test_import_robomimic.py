@@ -81,7 +81,7 @@ def test_robosuite_demonstrations(demonstrations, tmp_path):
 
 def test_errors_name_the_demonstration(demonstrations, tmp_path):
     path, package = demonstrations
-    with pytest.raises(FileNotFoundError, match=r"the model of data/demo_1 names .*/wood\.png, which does not exist"):
+    with pytest.raises(FileNotFoundError, match=r"the model of data/demo_1 names .*/wood\.png', which does not exist"):
         mjs.import_robomimic(path, tmp_path / "out", assets=tmp_path / "nowhere")
     with h5py.File(path, "a") as file:
         del file["data/demo_2/states"]

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +12,10 @@ import numpy as np
 from mjsense import _mujoco
 from mjsense.configs import SceneCfg
 from mjsense.dataset import playback
+from mjsense.dataset.archive import MODEL_FILE, read_archive
+from mjsense.dataset.closed_model import check_compiled, closed_model
 from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.model_fields import check_inputs
 from mjsense.scene import Scene
 from mjsense.simulation import Simulation
 
@@ -28,9 +29,12 @@ _RENUMBERED = {"cam": (_mujoco.Obj.CAMERA, "ncam"), "light": (_mujoco.Obj.LIGHT,
 _PARTS = ["time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "userdata"]
 
 
-def _model_fields(episode: Episode) -> dict[str, np.ndarray]:
-    with open_h5(episode.path) as file:
-        return {name: dataset[:] for name, dataset in file[episode.trajectory].get("replay/model", {}).items()}
+class _ArchivedSceneCfg(SceneCfg):
+    """A scene whose base is the model of an archive, of which nothing is read from disk."""
+
+    def __init__(self, text: str, members: dict[str, bytes], **more: Any) -> None:
+        super().__init__(base=text, **more)
+        object.__setattr__(self, "_mjs_members", members)  # C++ reads it
 
 
 class EpisodeWorlds:
@@ -61,13 +65,11 @@ class EpisodeWorlds:
                 edit(spec)
 
         archive = playback.archive_of(episode)
-        with tempfile.TemporaryDirectory(prefix="mjsense") as folder:
-            for name, data in playback.read_archive(archive).items():
-                (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
-                (Path(folder) / name).write_bytes(data)
-            model_file = Path(folder) / playback.MODEL_FILE
-            recorded = Scene(SceneCfg(base=model_file)).model
-            self.scene = Scene(SceneCfg(base=model_file, sensors=tuple(sensors), spec_fn=edit_spec))
+        members = read_archive(archive)
+        text = closed_model(members.pop(MODEL_FILE), members, f"{archive}: {MODEL_FILE}")
+        recorded = Scene(_ArchivedSceneCfg(text, members)).model
+        check_compiled(recorded, str(archive))
+        self.scene = Scene(_ArchivedSceneCfg(text, members, sensors=tuple(sensors), spec_fn=edit_spec))
         self.sim = Simulation(self.scene, num_worlds, threads=threads)
         self._rows: dict[str, Any] = {}
         for prefix, (kind, count) in _RENUMBERED.items():
@@ -80,11 +82,12 @@ class EpisodeWorlds:
 
     def begin(self, world: int, episode: Episode) -> None:
         """Gives a world the model of an episode, and resets its sensors."""
-        sim, fields = self.sim, _model_fields(episode)
+        sim, fields = self.sim, playback.fields_of(episode, self._recorded)
         stored = playback.inputs_of(episode).state.shape[1]
         if stored != sim.state.shape[1]:
             raise ValueError(f"{playback.where(episode)}: the recorded state has {stored} numbers, that of the model has {sim.state.shape[1]}. "
                              "An edit must not add joints, actuators or bodies.")  # fmt: skip
+        check_inputs(playback.inputs_of(episode), self._recorded, stored, playback.substeps_of(episode, self._recorded), playback.where(episode))
         for name in self._changed[world] - fields.keys():
             self._write(world, name, np.array(getattr(sim.model, name)))
         for name, values in fields.items():
@@ -100,9 +103,6 @@ class EpisodeWorlds:
     def _field(self, episode: Episode, name: str, values: np.ndarray) -> np.ndarray:
         """A field of the model of an episode, with the rows of this scene."""
         before, now = getattr(self._recorded, name), np.array(getattr(self.sim.model, name))
-        if before.size != values.size:
-            raise ValueError(f"{playback.where(episode)}: replay/model/{name} has {values.size} numbers, the field of the archived model {before.size}")
-        values = values.reshape(before.shape)
         if values.dtype.kind == "f":
             values = np.where(np.isnan(values), before, values)
         if name in _LIGHT:

@@ -5,18 +5,23 @@ from __future__ import annotations
 
 import io
 import json
+import math
+import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
-from mjsense._input_files import missing, read_json, read_text
+from mjsense._input_files import missing, read_text
 from mjsense._optional import optional
+from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.import_rows import OPTIONS, Rows, archive_of, compile_archive, unique_name
+from mjsense.dataset.model_fields import MAX_STATE
+from mjsense.dataset.model_sizes import image_size
 from mjsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -27,6 +32,9 @@ else:
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _RESULTS = ("next.reward", "next.success", "next.done")
 _STATE = "observation.state"
+_TYPES = ("float16", "float32", "float64", "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
+_BLOCK = 16  # pixels
+_MAX_VALUES, _MAX_TABLE = 1 << 27, 1 << 30  # numbers and bytes of one Parquet file; LeRobot writes files of 100 MB
 
 
 @checked
@@ -44,7 +52,8 @@ def import_lerobot(
 
     A data set has no simulator states. With ``scene``, the numbers of ``observation.state`` are set as positions of joints of this model,
     and everything else is at its initial position. Row t of the recording has observation t and action t - 1, so the last action of an
-    episode, whose result the data set does not contain, is left out. Images are encoded again, as H.264.
+    episode, whose result the data set does not contain, is left out, as are episodes without rows, with a warning. Images are encoded again,
+    as H.264. If an episode has several tasks, ``observation/task`` has the position of each row's task in the list ``tasks`` of ``obs_scene``.
 
     Args:
         root: Folder of the data set.
@@ -70,8 +79,9 @@ def import_lerobot(
         raise ValueError(f"episodes: {wrong[0]} is not in {root}, which has {len(source.episodes)} episodes")
     if joints is not None and scene is None:
         raise ValueError("joints needs scene (--scene), the model that has them")
+    wanted = _with_rows(source, wanted)
     pose = None if scene is None else _Pose(Path(scene), source, joints)
-    writer = _Writer(out, source, pose, len(wanted), crf)
+    writer = _Writer(out, source, pose, wanted, crf)
     for number, index in enumerate(wanted):
         writer.write(number, index)
         if progress is not None:
@@ -80,12 +90,23 @@ def import_lerobot(
     return Path(out)
 
 
+def _with_rows(source: _Source, wanted: list[int]) -> list[int]:
+    empty = [index for index in wanted if source.episodes[index]["length"] == 0]
+    if len(empty) == len(wanted):
+        raise ValueError(f"{source.root}: no episode has rows")
+    if empty:
+        warnings.warn(f"{source.root}: {len(empty)} of {len(wanted)} episodes have no rows and are left out: {empty[:10]}", stacklevel=4)
+    if short := [index for index in wanted if source.episodes[index]["length"] == 1]:
+        warnings.warn(f"{source.root}: {len(short)} of {len(wanted)} episodes have one row, whose action is left out: {short[:10]}", stacklevel=4)
+    return [index for index in wanted if index not in set(empty)]
+
+
 def _needs(module: str) -> Any:
     return optional(module, "export", "import lerobot")
 
 
 class _Source:
-    """The files of a data set."""
+    """The files of a data set. Everything that they state is checked here."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -93,85 +114,272 @@ class _Source:
             raise missing(root)
         if not (root / "meta/info.json").exists():
             raise FileNotFoundError(f"{root} is not a LeRobot data set: it has no meta/info.json")
-        self.info: dict[str, Any] = read_json(root / "meta/info.json")
-        if not isinstance(self.info, dict):
-            raise ValueError(f"{root / 'meta/info.json'}: must be a JSON object, not a {type(self.info).__name__}")
+        place = str(root / "meta/info.json")
+        content = foreign.read_bytes(foreign.file_inside(root, "meta/info.json", place), place, foreign.MAX_JSON)
+        self.info = foreign.json_object(content, place)
         if not str(self.info.get("codebase_version", "")).startswith("v3."):
-            raise ValueError(f"{root} has the version {self.info.get('codebase_version')!r}, expected v3.0; "
+            raise ValueError(f"{root} has the version {foreign.found(self.info.get('codebase_version'))}, expected v3.0; "
                              "python -m lerobot.datasets.v30.convert_dataset_v21_to_v30 converts v2.1")  # fmt: skip
         if absent := [key for key in ("features", "fps", "data_path") if key not in self.info]:
-            raise ValueError(f"{root / 'meta/info.json'} has no '{absent[0]}'")
-        self.features: dict[str, dict[str, Any]] = self.info["features"]
-        self.rate = Fraction(self.info["fps"]).limit_denominator(1000)
-        self.images = {key: about for key, about in self.features.items() if about["dtype"] in ("video", "image")}
-        self.numbers = {key: about for key, about in self.features.items() if key not in (*self.images, *_COUNTERS, *_RESULTS) and about["dtype"] != "string"}
-        tables = _needs("pyarrow.parquet")
+            raise ValueError(f"{place} has no '{absent[0]}'")
+        self.robot = foreign.text(self.info.get("robot_type") or "", f"{place}: robot_type")
+        features = foreign.mapping(self.info["features"], f"{place}: features")
+        self.features = {key: Feature(key, about, f"{place}: features: {foreign.found(key)}") for key, about in features.items()}
+        self.rate = foreign.rate(self.info["fps"], f"{place}: fps")
+        self.images = {key: one for key, one in self.features.items() if one.is_image}
+        self.numbers = {key: one for key, one in self.features.items() if key not in (*self.images, *_COUNTERS, *_RESULTS) and one.dtype != "string"}
+        self._tables = _needs("pyarrow.parquet")
         self.episodes: dict[int, dict[str, Any]] = {}
         for path in sorted(root.glob("meta/episodes/*/*.parquet")):
-            names = tables.read_schema(path).names
-            columns = [name for name in names if not name.startswith("stats/")]
-            self.episodes |= {row["episode_index"]: row for row in tables.read_table(path, columns=columns).to_pylist()}
-        self._tables = tables
-        self._read: tuple[str, Any] = "", None
+            names = self._names(path)
+            for row in self._table(path, [name for name in names if not name.startswith("stats/")]).to_pylist():
+                index = foreign.whole(row.get("episode_index"), f"{path}: episode_index", 0, 2**31)
+                if index in self.episodes:
+                    raise ValueError(f"{path}: episode_index {index} is there twice")
+                foreign.whole(row.get("length"), f"{path}: length of episode {index}", 0, foreign.MAX_ROWS)
+                tasks = row.get("tasks")
+                if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) and len(task) <= 10_000 for task in tasks)):
+                    raise ValueError(f"{path}: tasks of episode {index} is {foreign.found(tasks)}, expected a list of texts")
+                self.episodes[index] = row
+        self._read: tuple[Path, Any] = Path(), None
+
+    def _names(self, path: Path) -> list[str]:
+        try:
+            return self._tables.read_schema(foreign.regular_inside((self.root,), path, str(path))).names
+        except Exception as error:  # pyarrow's errors have no common base class
+            raise self._damaged(path, error) from None
+
+    def _table(self, path: Path, columns: list[str]) -> Any:
+        """Columns of a Parquet file."""
+        place = foreign.regular_inside((self.root,), path, str(path))
+        try:
+            about = self._tables.read_metadata(place)
+            groups = [about.row_group(i) for i in range(about.num_row_groups)]
+            count = sum(group.column(i).num_values for group in groups for i in range(group.num_columns))
+            size = sum(group.total_byte_size for group in groups)
+            if about.num_rows > foreign.MAX_ROWS or count > _MAX_VALUES or size > _MAX_TABLE:
+                raise ValueError(f"{path}: has {about.num_rows} rows, {count} values and {size} bytes, "
+                                 f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}")  # fmt: skip
+            return self._tables.read_table(place, columns=columns)
+        except Exception as error:
+            raise self._damaged(path, error) from None
+
+    def _damaged(self, path: Path, error: Exception) -> Exception:
+        if isinstance(error, OSError) and not path.exists():
+            return missing(path)
+        text = " ".join(str(error).split())
+        return ValueError(text if text.startswith(str(path)) else f"{path}: cannot be read: {text[:300]}")
+
+    def _path(self, key: str, index: int, **values: Any) -> Path:
+        """A file of an episode, by its template in info.json."""
+        place = f"{self.root / 'meta/info.json'}: {key}"
+        template = foreign.text(self.info.get(key), place, 1000)
+        for name, value in values.items():
+            if name != "video_key":
+                values[name] = foreign.whole(value, f"{self.root / 'meta/episodes'}: {name} of episode {index}", 0, 10**6)
+
+        def fill(match: re.Match[str]) -> str:
+            value = values.get(match[1])
+            if value is None:
+                raise ValueError(f"{place}: is {foreign.found(template)}, expected only the fields {', '.join(values)}")
+            return f"{value:0{match[2]}d}" if match[2] else str(value)
+
+        name = re.sub(r"\{(\w+)(?::0?(\d)d)?\}", fill, template)
+        if "{" in name or "}" in name:
+            raise ValueError(f"{place}: is {foreign.found(template)}, expected fields such as {{chunk_index:03d}}")
+        return foreign.file_inside(self.root, name, place)
 
     def rows(self, index: int) -> dict[str, np.ndarray]:
-        """Columns of an episode, ``[T, ...]``; images as the bytes of their files."""
+        """Columns of an episode, ``[T, ...]``; images as the bytes of their files; ``task``: positions in its list of tasks."""
         episode = self.episodes[index]
-        path = self.info["data_path"].format(chunk_index=episode["data/chunk_index"], file_index=episode["data/file_index"])
+        path = self._path("data_path", index, chunk_index=episode.get("data/chunk_index"), file_index=episode.get("data/file_index"))
+        wanted = [*self.numbers, *_RESULTS, *(key for key, one in self.images.items() if one.dtype == "image"), "episode_index", "task_index"]
         if self._read[0] != path:
-            self._read = path, self._tables.read_table(self.root / path)
+            known = self._names(path)
+            self._read = path, self._table(path, [name for name in wanted if name in known])
         table = self._read[1]
+        if "episode_index" not in table.column_names:
+            raise ValueError(f"{path}: has no column episode_index")
         table = table.filter(_needs("pyarrow.compute").equal(table["episode_index"], index))
+        length = episode["length"]
+        if table.num_rows != length:
+            raise ValueError(f"{path}: has {table.num_rows} rows of episode {index}, whose length is {length}")
         found: dict[str, np.ndarray] = {}
-        for key in (*self.numbers, *_RESULTS, *(key for key, about in self.images.items() if about["dtype"] == "image")):
+        for key in wanted[:-2]:
             if key in table.column_names:
                 values = table[key].to_pylist()
-                found[key] = np.array([value["bytes"] for value in values], object) if key in self.images else np.array(values)
+                place = f"{path}: episode {index}: {key}"
+                if key not in self.features:
+                    found[key] = _numbers(values, "float64", (), place)
+                elif key in self.images:
+                    found[key] = np.array([_file_of(value, place) for value in values], object)
+                else:
+                    one = self.features[key]
+                    found[key] = _numbers(values, one.dtype if key in self.numbers else "float64", one.shape, place)
+            elif key in self.features and key not in _RESULTS:
+                raise ValueError(f"{path}: has no column {key}, which info.json states")
+        if "task_index" in table.column_names:
+            found["task"] = self._positions_of_tasks(table["task_index"].to_pylist(), episode, f"{path}: episode {index}")
         return found
 
-    def shape(self, key: str) -> tuple[int, ...]:
-        """Height and width of the images of a camera, or the shape of other values."""
-        shape, names = self.features[key]["shape"], self.features[key].get("names") or []
-        if key not in self.images:
-            return () if list(shape) == [1] else tuple(shape)
-        return tuple(shape[1:]) if list(names)[:1] in (["channels"], ["channel"]) else tuple(shape[:2])
-
-    def is_depth(self, key: str) -> bool:
-        about = self.features[key]
-        info = about.get("info") or about.get("video_info") or {}
-        return bool(info.get("is_depth_map") or info.get("video.is_depth_map"))
+    def _positions_of_tasks(self, numbers: list[Any], episode: dict[str, Any], place: str) -> np.ndarray:
+        """For each row the position of its task in the episode's list."""
+        tasks = episode.get("tasks") or []
+        if len(tasks) < 2:
+            return np.zeros(len(numbers), np.int64)
+        path = self.root / "meta/tasks.parquet"
+        if not path.exists():
+            raise ValueError(f"{place} has {len(tasks)} tasks, and {path} is missing")
+        table = self._table(path, self._names(path)).to_pydict()
+        texts = next((values for key, values in table.items() if key in ("task", "__index_level_0__")), None)
+        if texts is None or "task_index" not in table:
+            raise ValueError(f"{path}: has the columns {', '.join(table)}, expected task and task_index")
+        text_of = dict(zip(table["task_index"], texts))
+        positions = [tasks.index(text_of[number]) if text_of.get(number) in tasks else -1 for number in numbers]
+        if -1 in positions:
+            number = numbers[positions.index(-1)]
+            raise ValueError(f"{place}: task_index is {foreign.found(number)}, expected that of a task of the episode: {foreign.found(tasks)}")
+        return np.array(positions, np.int64)
 
     def frames(self, index: int, key: str, rows: dict[str, np.ndarray]) -> Iterator[np.ndarray]:
         """Images of an episode: uint8 ``[H, W, 3]``, or depth float32 ``[H, W]``. [m]"""
-        av = _needs("av")
-        if self.features[key]["dtype"] == "image":
-            for content in rows[key]:
-                with av.open(io.BytesIO(content)) as file:
-                    yield next(file.decode(video=0)).to_ndarray(format="rgb24")
+        feature = self.features[key]
+        if feature.dtype == "image":
+            for t, content in enumerate(rows[key]):
+                yield _image(content, feature, f"{self.root}: image {t} of {key} in episode {index}")
             return
         episode = self.episodes[index]
-        place = {name: episode[f"videos/{key}/{name}"] for name in ("chunk_index", "file_index")}
-        first, length = episode[f"videos/{key}/from_timestamp"], episode["length"]
-        with av.open(str(self.root / self.info["video_path"].format(video_key=key, **place))) as file:
-            stream = file.streams.video[0]
-            file.seek(int(max(0.0, first) / stream.time_base), stream=stream)
-            count = 0
-            for frame in file.decode(stream):
-                if float(frame.pts * stream.time_base) < first - 0.5 / float(self.rate):
-                    continue
-                yield self._depth(key, frame.to_ndarray(format="gray12le")) if self.is_depth(key) else frame.to_ndarray(format="rgb24")
-                count += 1
-                if count == length:
-                    return
+        places = {name: episode.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index")}
+        path = self._path("video_path", index, video_key=foreign.plain_name(key, f"{self.root}: features"), **places)
+        first = foreign.number(episode.get(f"videos/{key}/from_timestamp"), f"{self.root}: from_timestamp of {key} in episode {index}", -1, 1e7)
+        length, count = episode["length"], 0
+        av = _needs("av")
+        try:
+            with path.open("rb") as content, av.open(content, format=_container(content, path)) as file:
+                if not file.streams.video:
+                    raise ValueError(f"{path}: has no video")
+                stream = file.streams.video[0]
+                feature.check_size(stream.codec_context.height, stream.codec_context.width, str(path))
+                file.seek(int(max(0.0, first) / stream.time_base), stream=stream)
+                for frame in file.decode(stream):
+                    if float(frame.pts * stream.time_base) < first - 0.5 / float(self.rate):
+                        continue
+                    feature.check_size(frame.height, frame.width, str(path))
+                    yield feature.depth(frame.to_ndarray(format="gray12le")) if feature.is_depth else frame.to_ndarray(format="rgb24")
+                    count += 1
+                    if count == length:
+                        return
+        except av.error.FFmpegError as error:
+            raise ValueError(f"{path}: cannot be decoded: {' '.join(str(error).split())}") from None
         raise ValueError(f"{self.root}: the video of {key} has {count} frames of episode {index}, whose length is {length}")
 
-    def _depth(self, key: str, codes: np.ndarray) -> np.ndarray:
-        info = self.features[key]["info"]
-        near, far, shift = (info[f"video.{name}"] for name in ("depth_min", "depth_max", "shift"))
+
+class Feature:
+    """One entry of ``features``."""
+
+    def __init__(self, key: str, about: Any, place: str) -> None:
+        about = foreign.mapping(about, place)
+        foreign.text(key, place, 200)
+        self.dtype = foreign.text(about.get("dtype"), f"{place}: dtype", 40)
+        if self.dtype not in (*_TYPES, "video", "image", "string"):
+            raise ValueError(f"{place}: dtype is {foreign.found(self.dtype)}, expected one of {', '.join(_TYPES)}, video, image, string")
+        self.is_image = self.dtype in ("video", "image")
+        shape = about.get("shape")
+        if not isinstance(shape, list) or not 1 <= len(shape) <= 8:
+            raise ValueError(f"{place}: shape is {foreign.found(shape)}, expected a list of whole numbers")
+        sizes = [foreign.whole(size, f"{place}: shape", 1, 10**6) for size in shape]
+        if (count := math.prod(sizes)) > foreign.MAX_ROW_NUMBERS and not self.is_image:
+            raise ValueError(f"{place}: shape has {count} numbers, the limit is {foreign.MAX_ROW_NUMBERS}")
+        names = about.get("names")
+        names = [name for part in names.values() for name in (part if isinstance(part, list) else [part])] if isinstance(names, dict) else names
+        if names is not None and not (isinstance(names, list) and all(isinstance(name, (str, int)) for name in names)):
+            raise ValueError(f"{place}: names is {foreign.found(names)}, expected a list of texts")
+        self.names = [str(name)[:200] for name in names or []]
+        info = foreign.mapping(about.get("info") or about.get("video_info") or {}, f"{place}: info")
+        self.is_depth = bool(info.get("is_depth_map") or info.get("video.is_depth_map"))
+        self._info, self._place = info, place
+        self.shape = self._image_shape(sizes) if self.is_image else () if sizes == [1] else tuple(sizes)
+        """Height and width of images, or the shape of other values."""
+        if self.is_depth:
+            self._depth = [foreign.number(info.get(f"video.{name}"), f"{place}: video.{name}", 0, 1e6) for name in ("depth_min", "depth_max", "shift")]
+            if not self._depth[0] + self._depth[2] > 0 or not self._depth[0] < self._depth[1]:
+                raise ValueError(f"{place}: depths from {self._depth[0]} to {self._depth[1]} m with a shift of {self._depth[2]} m, expected rising values above 0")
+
+    def _image_shape(self, sizes: list[int]) -> tuple[int, int]:
+        """Height and width, wherever the channels are: by their name, or else by their number."""
+        if len(sizes) not in (2, 3):
+            raise ValueError(f"{self._place}: shape is {sizes}, expected height, width and channels")
+        if len(sizes) == 2:
+            return foreign.image_shape(*sizes, f"{self._place}: shape")
+        named = [i for i, name in enumerate(self.names[:3]) if name.lower() in ("channel", "channels", "c")] if len(self.names) == 3 else []
+        last = named[0] == 2 if named else sizes[2] in (1, 3, 4)
+        if sizes[2 if last else 0] not in (1, 3, 4):
+            raise ValueError(f"{self._place}: shape is {sizes} with the names {self.names}, expected 1, 3 or 4 channels at its start or end")
+        return foreign.image_shape(*(sizes[:2] if last else sizes[1:]), f"{self._place}: shape")
+
+    def check_size(self, height: int, width: int, place: str) -> None:
+        """Encoders may add rows and columns, up to their block size."""
+        if not (0 <= height - self.shape[0] < _BLOCK and 0 <= width - self.shape[1] < _BLOCK):
+            raise ValueError(f"{place}: has images of {height} x {width} pixels, and info.json states {self.shape[0]} x {self.shape[1]}")
+
+    def depth(self, codes: np.ndarray) -> np.ndarray:
+        near, far, shift = self._depth
         part = codes.astype(np.float64) / 4095
-        if not info.get("video.use_log", True):
+        if not self._info.get("video.use_log", True):
             return (near + part * (far - near)).astype(np.float32)
         return (np.exp(np.log(near + shift) + part * np.log((far + shift) / (near + shift))) - shift).astype(np.float32)
+
+
+def _numbers(values: list[Any], dtype: str, shape: tuple[int, ...], place: str) -> np.ndarray:
+    """Rows of this shape. Single numbers may be lists of one."""
+    try:
+        array = np.array(values, dtype)
+        return array.reshape(len(values), *shape)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    size = math.prod(shape)
+    for t, value in enumerate(values):
+        try:
+            if np.array(value, dtype).size == size:
+                continue
+        except (TypeError, ValueError, OverflowError):
+            pass
+        raise ValueError(f"{place}: row {t} is {foreign.found(value)}, expected {size} numbers of the type {dtype}")
+    raise ValueError(f"{place}: the rows are not arrays of {[*shape]} numbers of the type {dtype}")
+
+
+def _file_of(value: Any, place: str) -> bytes:
+    content = value.get("bytes") if isinstance(value, dict) else None
+    if not isinstance(content, bytes):
+        raise ValueError(f"{place}: is {foreign.found(value)}, expected the bytes of a PNG or JPEG file")
+    return content
+
+
+def _image(content: bytes, feature: Feature, place: str) -> np.ndarray:
+    av = _needs("av")
+    kind = "png_pipe" if content.startswith(b"\x89PNG") else "jpeg_pipe" if content.startswith(b"\xff\xd8") else None
+    if kind is None:
+        raise ValueError(f"{place}: is neither a PNG nor a JPEG file")
+    if kind == "png_pipe":
+        width, height = image_size(content)
+        feature.check_size(height, width, place)
+    try:
+        with av.open(io.BytesIO(content), format=kind) as file:
+            feature.check_size(file.streams.video[0].codec_context.height, file.streams.video[0].codec_context.width, place)
+            return next(file.decode(video=0)).to_ndarray(format="rgb24")
+    except (av.error.FFmpegError, StopIteration) as error:
+        raise ValueError(f"{place}: cannot be decoded: {' '.join(str(error).split())}") from None
+
+
+def _container(file: IO[bytes], path: Path) -> str:
+    """FFmpeg's name of the format. It must not choose one by itself: a playlist names other files and addresses."""
+    start = file.read(12)
+    file.seek(0)
+    if start[4:8] == b"ftyp":
+        return "mp4"
+    if start[:4] == b"\x1a\x45\xdf\xa3":
+        return "matroska"
+    raise ValueError(f"{path}: is neither an MP4 nor a Matroska file")
 
 
 class _Pose:
@@ -194,15 +402,14 @@ class _Pose:
             content = path.read_bytes()
             return unique_name(file, content), content
 
-        self.archive = archive_of(spec.to_xml(), read)
+        self.archive = archive_of(spec.to_xml(), read, str(scene))
         self.model = compile_archive(self.archive[1], str(scene))
         self._data = mujoco.MjData(self.model)
         if _STATE not in source.numbers:
             raise ValueError(f"{source.root} has no {_STATE}, which scene needs")
-        about = source.features[_STATE]
-        names = joints if joints is not None else about.get("names") or []
-        names = [name for part in names.values() for name in part] if isinstance(names, dict) else list(names)
-        size = int(np.prod(about["shape"]))
+        feature = source.features[_STATE]
+        names = list(joints) if joints is not None else feature.names
+        size = math.prod(feature.shape)
         scalar = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
         known = {self.model.joint(i).name: int(self.model.jnt_qposadr[i]) for i in range(self.model.njnt) if self.model.jnt_type[i] in scalar}
         if len(names) != size:
@@ -213,8 +420,10 @@ class _Pose:
         self._from = [i for i, name in enumerate(names) if name]
         self._to = [known[names[i]] for i in self._from]
 
-    def state(self, values: np.ndarray, time: float) -> np.ndarray:
+    def state(self, values: np.ndarray, time: float, about: str) -> np.ndarray:
         """MuJoCo's state with these numbers of ``observation.state``."""
+        if not np.all(np.abs(values) <= MAX_STATE):
+            raise ValueError(f"{about}: {_STATE} is {foreign.found(values.tolist())}, expected numbers of at most {MAX_STATE:g}")
         state = np.empty(mujoco.mj_stateSize(self.model, mujoco.mjtState.mjSTATE_INTEGRATION))
         self._data.time = time
         self._data.qpos[self._to] = values.ravel()[self._from]
@@ -223,27 +432,38 @@ class _Pose:
 
 
 class _Writer:
-    def __init__(self, out: str | Path, source: _Source, pose: _Pose | None, episodes: int, crf: int) -> None:
+    def __init__(self, out: str | Path, source: _Source, pose: _Pose | None, episodes: Sequence[int], crf: int) -> None:
         self._source, self._pose = source, pose
         streams = Rows()
         self._cameras: dict[str, np.ndarray] = {}
-        for key in source.images:
-            name, shape = key.removeprefix("observation.images.").removeprefix("observation."), source.shape(key)
-            if source.is_depth(key):
-                name = name if name.endswith("_depth") else f"{name}_depth"
-                self._cameras[key] = streams.add(name, "float32", shape, "Depth image of the camera; 0.01 m: no measurement.", video=True, unit="m")
+        names: dict[str, str] = {}
+        for key, feature in source.images.items():
+            name = foreign.plain_name(key.removeprefix("observation.images.").removeprefix("observation."), f"{source.root}: features: {foreign.found(key)}")
+            name = f"{name}_depth" if feature.is_depth and not name.endswith("_depth") else name
+            if name in names:
+                raise ValueError(f"{source.root}: the features {names[name]} and {key} are the same camera '{name}'")
+            names[name] = key
+            if feature.is_depth:
+                self._cameras[key] = streams.add(name, "float32", feature.shape, "Depth image of the camera; 0.01 m: no measurement.", video=True, unit="m")
             else:
-                self._cameras[key] = streams.add(name, "uint8", (*shape, 3), "Image of the camera.", video=True)
+                self._cameras[key] = streams.add(name, "uint8", (*feature.shape, 3), "Image of the camera.", video=True)
         self._numbers: dict[str, np.ndarray] = {}
-        for key, about in source.numbers.items():
-            place = "actions/action" if key == "action" else f"observation/{key.removeprefix('observation.')}"
+        for key, feature in source.numbers.items():
+            name = key.removeprefix("observation.")
+            place = "actions/action" if key == "action" else f"observation/{foreign.plain_name(name, f'{source.root}: features: {foreign.found(key)}')}"
+            if place in names:
+                raise ValueError(f"{source.root}: the features {names[place]} and {key} are the same stream '{place}'")
+            names[place] = key
             what = "Action that led to this row; 0 in the first row." if key == "action" else f"Feature {key} of the data set."
-            names = about.get("names")
-            what += f" Numbers: {', '.join(map(str, names))}." if isinstance(names, list) and len(names) > 1 else ""
-            self._numbers[key] = streams.add(place, about["dtype"], source.shape(key), what)
+            what += f" Numbers: {', '.join(feature.names)}." if len(feature.names) > 1 else ""
+            self._numbers[key] = streams.add(place, "float32" if feature.dtype == "float16" else feature.dtype, feature.shape, what)
+        self._task = None
+        if any(len(source.episodes[i].get("tasks") or []) > 1 for i in episodes):
+            what = "Task of this row: its position in the list 'tasks' of obs_scene, from 0."
+            self._task = streams.add("observation/task", "int64", (), what)
         self._state = None if pose is None else streams.add_state(pose.model)
-        settings = {"source": source.root.name, "robot": source.info.get("robot_type") or "", "format": "lerobot"}
-        options = {**OPTIONS, "episodes": episodes, "crf": crf} | ({"archive": pose.archive} if pose else {})
+        settings = {"source": source.root.name, "robot": source.robot, "format": "lerobot"}
+        options = {**OPTIONS, "episodes": len(episodes), "crf": crf} | ({"archive": pose.archive} if pose else {})
         self._recorder = streams.recorder(out, source.rate, settings, options)
 
     def write(self, number: int, index: int) -> None:
@@ -251,7 +471,9 @@ class _Writer:
         rows, length = source.rows(index), int(episode["length"])
         frames = {key: source.frames(index, key, rows) for key in self._cameras}
         reward, success, done = (rows.get(key) for key in _RESULTS)
-        task = (episode.get("tasks") or [""])[0]
+        if reward is not None and not np.isfinite(reward).all():
+            raise ValueError(f"{source.root}: next.reward of episode {index} is not finite, expected numbers")
+        tasks = episode.get("tasks") or [""]
         self._recorder.begin_episode(0, number, 0)
         for t in range(length):
             for key, row in self._cameras.items():
@@ -262,15 +484,18 @@ class _Writer:
                     row[0] = rows[key][t - 1].reshape(row[0].shape) if t else 0
                 else:
                     row[0] = rows[key][t].reshape(row[0].shape)
+            if self._task is not None:
+                self._task[0] = rows["task"][t] if "task" in rows else 0
             if self._pose is not None and self._state is not None:
-                self._state[0] = self._pose.state(rows[_STATE][t], float(t / source.rate))
+                self._state[0] = self._pose.state(rows[_STATE][t], float(t / source.rate), f"{source.root}: episode {index}, row {t}")
             before = t - 1  # the results of this step's action
             self._recorder.append(
                 [0], [float(reward[before]) if t and reward is not None else 0.0], [bool(t and done is not None and done[before])],
                 [t == length - 1], [bool(t and success is not None and success[before])])  # fmt: skip
         outcome = "no success: the data set has no next.success" if success is None else "success" if np.any(success[-1:]) else "no success"
+        task = ", then ".join(tasks)
         scene = {"task_description": task, "text": task, "policy_dt_ms": float(1000 / source.rate), "episode_index": index}
-        self._recorder.finish_episode(0, json.dumps(scene), outcome)
+        self._recorder.finish_episode(0, json.dumps(scene | ({"tasks": tasks} if len(tasks) > 1 else {})), outcome)
 
     def complete(self) -> None:
         self._recorder.complete()

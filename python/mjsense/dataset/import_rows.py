@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
+import re
 import zlib
 from collections.abc import Callable
 from fractions import Fraction
@@ -17,6 +17,9 @@ import numpy as np
 
 from mjsense import _core, _libmujoco
 from mjsense._written_rows import WrittenRows
+from mjsense.dataset.archive import MAX_BYTES, MODEL_FILE, archive_bytes, files_of
+from mjsense.dataset.closed_model import check_member, close_names, compile_closed, parsed
+from mjsense.dataset.model_sizes import check_sizes
 from mjsense.recorder import FILE_OPTIONS, VIDEO_OPTIONS
 
 if TYPE_CHECKING:
@@ -44,49 +47,41 @@ class Rows(WrittenRows):
         return _core.Recorder(None, 1, self.handles, str(out), rate.numerator, rate.denominator, text, options)
 
 
-def archive_of(text: str, read: Callable[[str, str], tuple[str, bytes]]) -> tuple[str, bytes]:
-    """File name and bytes of the archive of a model.
+def archive_of(text: str, read: Callable[[str, str], tuple[str, bytes]], about: str) -> tuple[str, bytes]:
+    """File name and bytes of the archive of a model, with the files that MuJoCo reads when it compiles it.
 
     Args:
         text: The model as MJCF.
         read: Name in the archive and content of a file, given its name in the MJCF and the folder that the MJCF states for its kind.
+        about: The file with the model, for errors.
     """
     from xml.etree import ElementTree  # slow to import
 
-    tree = ElementTree.fromstring(text)
-    folders: dict[str, str] = {}
-    for compiler in tree.iter("compiler"):
-        for kind in ("assetdir", "meshdir", "texturedir"):
-            folders[kind] = compiler.attrib.pop(kind, folders.get(kind, ""))
+    root = parsed(text, about)
     files: dict[str, bytes] = {}
-    for element in tree.iter():
-        folder = folders.get({"mesh": "meshdir", "texture": "texturedir"}.get(element.tag, ""), "") or folders.get("assetdir", "")
-        for key in [key for key in element.attrib if key.startswith("file")]:
-            file = element.attrib[key]
-            if "name" not in element.attrib and element.tag in ("mesh", "texture", "hfield"):
-                element.set("name", PurePosixPath(file).stem)  # the name that it has without one
-            new, content = read(file, folder)
-            element.set(key, new)
-            files[new] = content
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in {"model.xml": ElementTree.tostring(tree), **dict(sorted(files.items()))}.items():
-            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
-    return f"model_{hashlib.sha256(buffer.getvalue()).hexdigest()[:12]}.zip", buffer.getvalue()
+
+    def find(element: ElementTree.Element, key: str, file: str, folder: str) -> str:
+        name, content = read(file, folder)
+        check_member(element, name, about)
+        files[name] = content
+        if sum(map(len, files.values())) > MAX_BYTES:
+            raise ValueError(f"{about}: the files of the model have more than {MAX_BYTES} bytes, which is the limit")
+        return name
+
+    close_names(root, find, about)
+    check_sizes(root, files, about)
+    content = archive_bytes({MODEL_FILE: ElementTree.tostring(root), **dict(sorted(files.items()))})
+    return f"model_{hashlib.sha256(content).hexdigest()[:12]}.zip", content
 
 
 def unique_name(file: str, content: bytes) -> str:
     """Name of a file in an archive: files of different folders may have one name."""
-    return f"{zlib.crc32(content):08x}_{PurePosixPath(file).name}"
+    name = re.sub(r"[^\w.\-]", "_", PurePosixPath(file.replace("\\", "/")).name)
+    return f"{zlib.crc32(content):08x}_{name[-100:]}"
 
 
 def compile_archive(archive: bytes, about: str) -> mujoco.MjModel:
     """The model of an archive."""
     if mujoco is None:
         raise RuntimeError(f"import needs the series of MuJoCo that mjsense uses: {_libmujoco.explain()}")
-    with zipfile.ZipFile(io.BytesIO(archive)) as files:
-        contents = {name: files.read(name) for name in files.namelist()}
-    try:
-        return mujoco.MjModel.from_xml_string(contents.pop("model.xml").decode(), contents)
-    except ValueError as error:
-        raise ValueError(f"{about}: MuJoCo {mujoco.__version__} cannot compile its model: {error}") from error
+    return compile_closed(files_of(io.BytesIO(archive), about), about)

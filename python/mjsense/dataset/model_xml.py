@@ -10,6 +10,8 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense.dataset import playback
+from mjsense.dataset.archive import MODEL_FILE, read_archive
+from mjsense.dataset.closed_model import closed_model
 
 if TYPE_CHECKING:
     import mujoco
@@ -48,8 +50,9 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
         ValueError: The recording has no data for replay, or a changed field of the model cannot be written as MJCF.
     """
     model = playback.model_of(episode)
-    assets = playback.read_archive(playback.archive_of(episode))
-    text = assets.pop(playback.MODEL_FILE).decode()
+    archive = playback.archive_of(episode)
+    assets = read_archive(archive)
+    text = closed_model(assets.pop(MODEL_FILE), assets, f"{archive}: {MODEL_FILE}")
     spec = mujoco.MjSpec.from_string(text, assets=assets)
     archived = spec.compile()  # also gives the elements their ids
     changed = [field for field in playback.changed_fields(episode) if field not in _DERIVED]

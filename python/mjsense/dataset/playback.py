@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import copy
-import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _libmujoco
+from mjsense.dataset.archive import read_archive
+from mjsense.dataset.closed_model import compile_closed
 from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.model_fields import INPUTS, check_inputs, check_model_fields, read_input
 
 if TYPE_CHECKING:
     import mujoco
@@ -24,8 +25,6 @@ else:
     mujoco = _libmujoco.shared
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if _libmujoco.shared else 0
-MODEL_FILE = "model.xml"
-
 
 @dataclass(frozen=True)
 class ReplayInputs:
@@ -56,7 +55,12 @@ def inputs_of(episode: Episode) -> ReplayInputs:
                 f"{where(episode)} has no data for replay. Record it again without --no-replay (replay=False); "
                 "recordings of versions without replay lack parts of the state."
             )
-        arrays: dict[str, Any] = {name: group[name][:] if name in group else None for name in ("state", "written", "ctrl", "mocap", "held")}
+        arrays = {name: read_input(group, name, episode._entry.length, where(episode)) for name in INPUTS}
+    for name in ("state", "written"):
+        if arrays[name] is None:
+            raise ValueError(f"{where(episode)}: replay/{name} is missing")
+    if arrays["written"].shape != arrays["state"].shape:
+        raise ValueError(f"{where(episode)}: replay/written has the shape {[*arrays['written'].shape]}, expected {[*arrays['state'].shape]}")
     if arrays["held"] is None:
         arrays["held"] = np.zeros(0, np.int32)
     result = ReplayInputs(**arrays)
@@ -81,30 +85,10 @@ def archive_of(episode: Episode) -> Path:
     return path
 
 
-def read_archive(path: Path) -> dict[str, bytes]:
-    """The files of a model archive."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            files = {name: archive.read(name) for name in archive.namelist()}
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-        raise ValueError(f"the model archive {path} cannot be read: {error}; copy it from the original recording") from error
-    if MODEL_FILE not in files or any(Path(name).is_absolute() or ".." in Path(name).parts for name in files):
-        raise ValueError(f"the model archive {path} cannot be read: it contains no {MODEL_FILE}, or names outside of its folder")
-    return files
-
-
 def archived_model(episode: Episode) -> mujoco.MjModel:
     path = archive_of(episode)
 
-    def compile_model() -> tuple[mujoco.MjModel, int]:
-        assets = read_archive(path)
-        text = assets.pop(MODEL_FILE).decode()
-        try:
-            return mujoco.MjModel.from_xml_string(text, assets), 1
-        except ValueError as error:
-            raise ValueError(f"MuJoCo {mujoco.__version__} cannot compile {path}: {error}") from error
-
-    return episode._store.models.get(path, compile_model)
+    return episode._store.models.get(path, lambda: (compile_closed(read_archive(path), str(path)), 1))
 
 
 def changed_fields(episode: Episode) -> list[str]:
@@ -116,18 +100,28 @@ def changed_fields(episode: Episode) -> list[str]:
 def model_of(episode: Episode) -> mujoco.MjModel:
     _require_mujoco()
     model = copy.deepcopy(archived_model(episode))
-    with open_h5(episode.path) as file:
-        for name, dataset in file[episode.trajectory].get("replay/model", {}).items():
-            field = getattr(model, name)
-            values = dataset[:].reshape(field.shape)
-            field[:] = np.where(np.isnan(values), field, values) if values.dtype.kind == "f" else values
-    size, stored = mujoco.mj_stateSize(model, STATE), inputs_of(episode).state.shape[1]
-    if size != stored:
-        raise ValueError(
-            f"{where(episode)}: the recorded state has {stored} numbers, that of MuJoCo {mujoco.__version__} has {size}. "
-            "Replay needs a MuJoCo of the series that recorded."
-        )
+    for name, values in fields_of(episode, model).items():
+        field = getattr(model, name)
+        field[...] = np.where(np.isnan(values), field, values) if values.dtype.kind == "f" else values
+    check_inputs(inputs_of(episode), model, mujoco.mj_stateSize(model, STATE), substeps_of(episode, model), where(episode))
     return model
+
+
+def fields_of(episode: Episode, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """The checked fields in which the episode differs from the archived model; NaN in floats: the archive's value."""
+    with open_h5(episode.path) as file:
+        group = file[episode.trajectory].get("replay/model", {})
+        if not hasattr(group, "items"):
+            raise ValueError(f"{where(episode)}: replay/model is an array, expected a group")
+        return check_model_fields(group, model, where(episode))
+
+
+def substeps_of(episode: Episode, model: mujoco.MjModel) -> float:
+    """Physics steps of one row."""
+    period = episode.settings.get("policy_dt_ms") or float(1000 / episode.fps)
+    if isinstance(period, bool) or not isinstance(period, (int, float)) or not 0 < period < 1e9:
+        raise ValueError(f"{where(episode)}: policy_dt_ms is {period!r:.60}, expected a number of milliseconds")
+    return period / 1000 / model.opt.timestep
 
 
 def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray) -> None:
@@ -141,8 +135,7 @@ class Stepper:
 
     def __init__(self, episode: Episode, model: mujoco.MjModel, data: Any) -> None:
         self.model, self._data, self._inputs = model, data, inputs_of(episode)
-        period = episode.settings.get("policy_dt_ms") or float(1000 / episode.fps)
-        self._substeps = round(period / 1000 / model.opt.timestep)
+        self._substeps = round(substeps_of(episode, model))
         ctrl = self._inputs.ctrl
         self._per_tick = self._substeps // ctrl.shape[1] if ctrl is not None else 0
         self._held = [(model.jnt_qposadr[j], model.jnt_dofadr[j]) for j in self._inputs.held]

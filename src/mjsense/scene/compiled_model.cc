@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_indices.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/model_check.h"
@@ -260,6 +261,7 @@ ModelPtr copy_fields(mjModel fields) {
 }
 
 CompiledModel::CompiledModel(const mjModel* model, mjSpec* spec) : model_(model), spec_(spec) {
+  check_model_indices(*model);
   outline_tree(model, spec);
   name_unnamed(spec);
   outline_rest(model, spec);

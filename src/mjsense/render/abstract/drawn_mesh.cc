@@ -3,10 +3,13 @@
 
 #include <cmath>
 
+#include "mjsense/core/model_indices.h"
+
 namespace mjsense::render {
 
 DrawnMesh::DrawnMesh(const mjModel* m, int id, bool& improved)
     : model_(m), mesh_(id / 2), hull_(id % 2 != 0), improved_(improved) {
+  check_mesh_indices(*m, mesh_);
   const auto part = [](auto* all, int begin, int count) {
     return std::span(all + 3 * static_cast<std::size_t>(begin),
                      3 * static_cast<std::size_t>(count));
@@ -28,7 +31,10 @@ void DrawnMesh::begin_image() {
 }
 
 const rays::MeshArrays& DrawnMesh::arrays() {
-  if (!arrays_) arrays_.emplace(vertices_, faces_);
+  if (!arrays_) {
+    check_mesh_indices(*model_, mesh_);  // the program may have written them since the last image
+    arrays_.emplace(vertices_, faces_);
+  }
   return *arrays_;
 }
 
@@ -60,6 +66,7 @@ bool DrawnMesh::has_coordinates() const { return model_->mesh_texcoordadr[mesh_]
 
 void DrawnMesh::prepare_surface(bool coordinates) {
   if (tables_ && (surface_.uvs || !coordinates || !has_coordinates())) return;
+  check_mesh_indices(*model_, mesh_);
   tables_ = hull_ ? hull_tables(coordinates) : mesh_tables(model_, mesh_, coordinates);
   surface_ = tables_->surface();
 }

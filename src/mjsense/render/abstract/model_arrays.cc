@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_indices.h"
 
 namespace mjsense::render {
 namespace {
@@ -49,7 +50,59 @@ class FieldReader {
   mjModel* model_;
 };
 
+// Arrays with a row for each element that are not ids.
+struct ElementField {
+  const char* name;
+  int* mjModel::*field;
+  mjtSize mjModel::*rows;
+};
+#define MJSENSE_ELEMENT(name, rows) {#name, &mjModel::name, &mjModel::rows},
+constexpr ElementField kElementFields[] = {
+    // clang-format off
+    MJSENSE_ELEMENT(body_jntadr, nbody)
+    MJSENSE_ELEMENT(body_jntnum, nbody)
+    MJSENSE_ELEMENT(body_geomadr, nbody)
+    MJSENSE_ELEMENT(body_geomnum, nbody)
+    MJSENSE_ELEMENT(jnt_type, njnt)
+    MJSENSE_ELEMENT(geom_type, ngeom)
+    MJSENSE_ELEMENT(geom_dataid, ngeom)
+    MJSENSE_ELEMENT(site_type, nsite)
+    MJSENSE_ELEMENT(cam_mode, ncam)
+    MJSENSE_ELEMENT(light_mode, nlight)
+    MJSENSE_ELEMENT(light_type, nlight)
+    MJSENSE_ELEMENT(skin_boneadr, nskin)
+    MJSENSE_ELEMENT(skin_bonenum, nskin)
+    // clang-format on
+};
+#undef MJSENSE_ELEMENT
+
 }  // namespace
+
+// An array of another type is left out: it belongs to a version of MuJoCo that uses it for something
+// else.
+std::unique_ptr<mjModel> indices_of_arrays(const NamedArrays& arrays, const mjModel& drawn) {
+  auto model = std::make_unique<mjModel>(drawn);
+  FieldReader fields(arrays, model.get());
+  mjModel& m = *model;
+  m.ncam = 0;
+  const auto usable = [&](const std::string& name) {
+    const auto found = arrays.find(name);
+    return found != arrays.end() && found->second.kind == 'i' && found->second.bytes == sizeof(int);
+  };
+  for (const ElementField& f : kElementFields)
+    if (usable(f.name)) m.*f.rows = fields.read(f.name, f.field, 0);
+  for (const IdField& f : drawn_id_fields())
+    if (!(m.*f.ids) && usable(f.name)) m.*f.rows = fields.read(f.name.c_str(), f.ids, 0);
+  check_element_indices(m);
+  return model;
+}
+
+std::vector<std::string> scene_index_fields() {
+  std::vector<std::string> names;
+  for (const ElementField& f : kElementFields) names.emplace_back(f.name);
+  for (const IdField& f : drawn_id_fields()) names.push_back(f.name);
+  return names;
+}
 
 #define MJSENSE_READ(name, ...) fields.read(#name, &mjModel::name, __VA_ARGS__)
 
@@ -68,28 +121,28 @@ std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays) {
   MJSENSE_READ(mesh_texcoordadr, 0, m.nmesh);
   MJSENSE_READ(mesh_texcoordnum, 0, m.nmesh);
   MJSENSE_READ(mesh_graphadr, 0, m.nmesh);
-  MJSENSE_READ(mesh_vert, 3);
-  MJSENSE_READ(mesh_normal, 3);
-  MJSENSE_READ(mesh_texcoord, 2);
-  const std::int64_t faces = MJSENSE_READ(mesh_face, 3);
+  m.nmeshvert = MJSENSE_READ(mesh_vert, 3);
+  m.nmeshnormal = MJSENSE_READ(mesh_normal, 3);
+  m.nmeshtexcoord = MJSENSE_READ(mesh_texcoord, 2);
+  const std::int64_t faces = m.nmeshface = MJSENSE_READ(mesh_face, 3);
   MJSENSE_READ(mesh_facenormal, 3, faces);
   MJSENSE_READ(mesh_facetexcoord, 3, faces);
-  MJSENSE_READ(mesh_graph, 0);
+  m.nmeshgraph = MJSENSE_READ(mesh_graph, 0);
 
   m.nhfield = MJSENSE_READ(hfield_adr, 0);
   MJSENSE_READ(hfield_nrow, 0, m.nhfield);
   MJSENSE_READ(hfield_ncol, 0, m.nhfield);
   MJSENSE_READ(hfield_size, 4, m.nhfield);
-  MJSENSE_READ(hfield_data, 0);
+  m.nhfielddata = MJSENSE_READ(hfield_data, 0);
 
   m.nskin = MJSENSE_READ(skin_vertadr, 0);
   MJSENSE_READ(skin_vertnum, 0, m.nskin);
   MJSENSE_READ(skin_texcoordadr, 0, m.nskin);
   MJSENSE_READ(skin_faceadr, 0, m.nskin);
   MJSENSE_READ(skin_facenum, 0, m.nskin);
-  MJSENSE_READ(skin_vert, 3);
-  MJSENSE_READ(skin_texcoord, 2);
-  MJSENSE_READ(skin_face, 3);
+  m.nskinvert = MJSENSE_READ(skin_vert, 3);
+  m.nskintexvert = MJSENSE_READ(skin_texcoord, 2);
+  m.nskinface = MJSENSE_READ(skin_face, 3);
 
   m.ntex = MJSENSE_READ(tex_adr, 0);
   MJSENSE_READ(tex_type, 0, m.ntex);
@@ -97,7 +150,7 @@ std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays) {
   MJSENSE_READ(tex_height, 0, m.ntex);
   MJSENSE_READ(tex_nchannel, 0, m.ntex);
   if (fields.has("tex_colorspace")) MJSENSE_READ(tex_colorspace, 0, m.ntex);
-  MJSENSE_READ(tex_data, 0);
+  m.ntexdata = MJSENSE_READ(tex_data, 0);
 
   m.nmat = MJSENSE_READ(mat_texid, mjNTEXROLE);
   MJSENSE_READ(mat_texuniform, 0, m.nmat);

@@ -29,4 +29,10 @@ using NamedArrays = std::map<std::string, NamedArray>;
 // is missing or has another type or shape than expected.
 std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays);
 
+// Names of further arrays of integers that MuJoCo reads when it updates an abstract scene.
+std::vector<std::string> scene_index_fields();
+// `drawn`, the result of model_of_arrays(), with those of these arrays that there are, for
+// check_element_indices(), which this function calls too.
+std::unique_ptr<mjModel> indices_of_arrays(const NamedArrays& arrays, const mjModel& drawn);
+
 }  // namespace mjsense::render

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <utility>
 
+#include "mjsense/core/model_indices.h"
+
 namespace mjsense::render {
 namespace {
 
@@ -140,6 +142,7 @@ const rays::HeightField& SceneAssets::height_field(int id) {
 
 const MeshSurface& SceneAssets::skin(int id) {
   if (!skins_) {
+    for (int i = 0; i < model_->nskin; ++i) check_skin_indices(*model_, i);
     const mjModel part = part_of(model_, false);
     skins_ = std::make_unique<SurfaceAssets>(&part, false, true);
   }

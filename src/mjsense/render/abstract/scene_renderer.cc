@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/model_indices.h"
 
 namespace mjsense::render {
 namespace {
@@ -71,6 +72,7 @@ SceneRenderer::SceneRenderer(const NamedArrays& arrays, const SceneSettings& set
                              StructReader geoms, StructReader lights, StructReader cameras,
                              const SoftArrays& soft)
     : model_(model_of_arrays(arrays)),
+      indices_(indices_of_arrays(arrays, *model_)),
       settings_(settings),
       geom_reader_(std::move(geoms)),
       light_reader_(std::move(lights)),
@@ -81,8 +83,11 @@ SceneRenderer::SceneRenderer(const NamedArrays& arrays, const SceneSettings& set
 
 SceneRenderer::~SceneRenderer() = default;
 
+void SceneRenderer::check_indices() const { check_element_indices(*indices_); }
+
 void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                            const ImageTargets& targets) {
+  check_indices();
   if (assets_.begin_image()) kept_.clear();
   read_camera(scene, width, height);
   read_lights(scene);

@@ -65,6 +65,9 @@ class SceneRenderer {
   // finite and for what cannot be drawn.
   void render(const SceneMemory& scene, int width, int height, const ImageTargets& targets);
 
+  // Throws ValueError if the program has written an id or address into the model that is out of range.
+  void check_indices() const;
+
   // Makes the next image show the current contents of meshes, height fields and textures.
   void reload() {
     assets_.reload();
@@ -86,6 +89,7 @@ class SceneRenderer {
   void read_camera(const SceneMemory& scene, int width, int height);
 
   std::unique_ptr<mjModel> model_;
+  std::unique_ptr<mjModel> indices_;  // model_ with what only MuJoCo reads
   SceneSettings settings_;
   StructReader geom_reader_, light_reader_, camera_reader_;
   SoftArrays soft_;

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values that the files of other programs state, checked where they are read: each function returns a value of the promised type, or raises
+ValueError with one line that names the file, the place, what was found and what is expected."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import stat
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjsense._input_files import unreadable
+
+MAX_JSON = 16 << 20  # bytes
+MAX_BYTES = 1 << 30  # of one array, or of one file that is read as a whole
+MAX_CHUNK = 256 << 20  # bytes of a part of an array that HDF5 decompresses at once
+MAX_ROWS = 10_000_000
+MAX_SIDE, MAX_PIXELS = 16_384, 1 << 25
+"""Of an image; 8K video has 2^25 pixels."""
+MAX_ROW_NUMBERS = 1_000_000
+RATES = (Fraction(1, 1000), Fraction(100_000))
+
+
+def found(value: Any) -> str:
+    """A value as messages show it."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def json_object(text: str | bytes, about: str) -> dict[str, Any]:
+    """The object of a JSON text."""
+    if len(text) > MAX_JSON:
+        raise ValueError(f"{about}: has {len(text)} bytes, the limit is {MAX_JSON}")
+    try:
+        value = json.loads(text)
+    except RecursionError:
+        raise ValueError(f"{about}: not valid JSON: it is nested too deeply") from None
+    except ValueError as error:
+        raise ValueError(f"{about}: not valid JSON: {' '.join(str(error).split())}") from None
+    return mapping(value, about)
+
+
+def mapping(value: Any, about: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"{about}: is {found(value)}, expected a JSON object")
+    return value
+
+
+def text(value: Any, about: str, limit: int = 10_000) -> str:
+    if not isinstance(value, str) or len(value) > limit:
+        raise ValueError(f"{about}: is {found(value)}, expected a text of at most {limit} characters")
+    return value
+
+
+def whole(value: Any, about: str, lowest: int, highest: int) -> int:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or not lowest <= value <= highest:
+        raise ValueError(f"{about}: is {found(value)}, expected a whole number from {lowest} to {highest}")
+    return int(value)
+
+
+def number(value: Any, about: str, lowest: float, highest: float) -> float:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.number)) or not lowest <= value <= highest:
+        raise ValueError(f"{about}: is {found(value)}, expected a number from {lowest:g} to {highest:g}")
+    return float(value)
+
+
+def rate(value: Any, about: str) -> Fraction:
+    """Rows per second."""
+    low, high = (float(limit) for limit in RATES)
+    return Fraction(number(value, about, low, high)).limit_denominator(10**6)
+
+
+def plain_name(name: str, about: str, nested: bool = False) -> str:
+    """A name that becomes part of a file name or a stream. ``nested``: may have several parts with ``/`` between them."""
+    for part in name.split("/") if nested else [name]:
+        if not re.fullmatch(r"\w[\w .+\-]*", part) or len(part.encode()) > 100 or ".." in part:
+            raise ValueError(f"{about}: the name {found(name)} cannot be used, expected letters, digits, '_', '-' and '.', at most 100")
+    return name
+
+
+def image_shape(height: Any, width: Any, about: str) -> tuple[int, int]:
+    h, w = (whole(side, about, 1, MAX_SIDE) for side in (height, width))
+    if h * w > MAX_PIXELS:
+        raise ValueError(f"{about}: has {h} x {w} pixels, the limit is {MAX_PIXELS} pixels")
+    return h, w
+
+
+# ---------------------------------------------------------------------------------------------- files
+
+
+def file_inside(root: Path, name: Any, about: str) -> Path:
+    """A regular file in the folder ``root``. Raises ValueError for other names, and for links that lead out of it."""
+    text(name, about, 1000)
+    parts = name.split("/")
+    if any(part in ("", ".", "..") for part in parts) or re.search(r"[\\:\x00-\x1f]", name):
+        raise ValueError(f"{about}: is {found(name)}, expected the name of a file inside of {root}")
+    return regular_inside((root,), root.joinpath(*parts), about)
+
+
+def regular_inside(roots: tuple[Path, ...], path: Path, about: str) -> Path:
+    """``path``, if it is a regular file in one of these folders after all links."""
+    try:
+        place = path.resolve()
+        kind = place.stat().st_mode
+    except (OSError, RuntimeError) as error:
+        raise unreadable(path, error if isinstance(error, OSError) else OSError(str(error))) from None
+    inside = [root.resolve() for root in roots]
+    # Data sets in the cache of the Hugging Face Hub are links from snapshots/REVISION to blobs.
+    inside += [root.parents[1] / "blobs" for root in inside if root.parent.name == "snapshots"]
+    if not any(place.is_relative_to(root) for root in inside):
+        raise ValueError(f"{about}: {path} is a link to {place}, which is outside of {roots[0]}")
+    if not stat.S_ISREG(kind):
+        raise ValueError(f"{about}: {path} is not a regular file")
+    return place
+
+
+def read_bytes(path: Path, about: str, limit: int = MAX_BYTES) -> bytes:
+    """The contents of a regular file."""
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    with os.fdopen(handle, "rb") as file:
+        status = os.fstat(handle)
+        if not stat.S_ISREG(status.st_mode) or status.st_size > limit:
+            raise ValueError(f"{about}: {path} has {status.st_size} bytes, expected a regular file of at most {limit}")
+        return file.read(limit + 1)
+
+
+# ---------------------------------------------------------------------------------------------- HDF5
+
+
+def attribute(owner: Any, name: str, about: str, otherwise: str = "") -> str:
+    """A text attribute of a group."""
+    if name not in owner.attrs:
+        return otherwise
+    value = owner.attrs[name]
+    if isinstance(value, np.ndarray) and value.dtype == np.uint8 and value.ndim == 1:
+        value = value.tobytes()
+    if isinstance(value, bytes):
+        try:
+            return value.split(b"\0", 1)[0].decode()
+        except UnicodeDecodeError:
+            raise ValueError(f"{about}: the attribute '{name}' is not text in UTF-8") from None
+    if not isinstance(value, str):
+        raise ValueError(f"{about}: the attribute '{name}' is {found(value)}, expected a text")
+    return value
+
+
+def group_at(parent: Any, name: str, about: str) -> Any:
+    """A group of the same file; None if there is none."""
+    value = _own(parent, name, about)
+    if value is not None and hasattr(value, "dtype"):
+        raise ValueError(f"{about}: '{name}' is an array, expected a group")
+    return value
+
+
+def dataset_at(parent: Any, name: str, about: str) -> Any:
+    """An array of numbers that is stored in the same file, with at most ``MAX_ROWS`` rows of a bounded size; None if there is none."""
+    value = _own(parent, name, about)
+    if value is None:
+        return None
+    place = f"{about}: '{name}'"
+    if not hasattr(value, "dtype") or value.dtype.kind not in "biuf" or value.ndim < 1:
+        raise ValueError(f"{place} is {getattr(value, 'dtype', 'a group')}, expected an array of numbers")
+    if value.external or value.is_virtual:
+        raise ValueError(f"{place} is stored in another file, expected an array in this file")
+    row, chunk = math.prod(value.shape[1:]) * value.dtype.itemsize, math.prod(value.chunks or ()) * value.dtype.itemsize
+    if len(value) > MAX_ROWS or row > MAX_CHUNK or chunk > MAX_CHUNK:
+        raise ValueError(f"{place} has {len(value)} rows of {row} bytes in chunks of {chunk}, the limits are {MAX_ROWS} rows and {MAX_CHUNK} bytes")
+    return value
+
+
+def all_of(dataset: Any, about: str) -> np.ndarray:
+    """The values of an array that is small enough to be read as a whole."""
+    if dataset.size * dataset.dtype.itemsize > MAX_BYTES:
+        raise ValueError(f"{about}: '{dataset.name}' has {dataset.size} numbers, the limit is {MAX_BYTES} bytes")
+    try:
+        return dataset[()]
+    except OSError as error:
+        raise ValueError(f"{about}: '{dataset.name}' cannot be read: {' '.join(str(error).split())}") from None
+
+
+def _own(parent: Any, name: str, about: str) -> Any:
+    import h5py
+
+    link = parent.get(name, getlink=True)
+    if link is None:
+        return None
+    if not isinstance(link, h5py.HardLink):
+        raise ValueError(f"{about}: '{name}' is a link to {found(getattr(link, 'path', ''))}, expected an object of this file")
+    try:
+        return parent[name]
+    except (KeyError, OSError) as error:
+        raise ValueError(f"{about}: '{name}' cannot be read: {' '.join(str(error).split())}") from None
