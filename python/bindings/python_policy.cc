@@ -141,12 +141,13 @@ std::string PythonPolicy::failure(int world) const {
 void PythonPolicy::reset_all(episode::ActiveWorlds& worlds) {
   for (int w : worlds.ids()) chunk_.left[w] = 0;
   host_->call(place("reset"), [&] {
-    nb::list ids, episodes;
+    nb::list ids, episodes, instructions;
     for (int w : worlds.ids()) {
       ids.append(w);
       episodes.append(task_->episode(w));
+      instructions.append(task_->instruction(w));
     }
-    policy_.get().attr("_mjs_reset")(ids, episodes, task_->cfg().seed);
+    policy_.get().attr("_mjs_reset")(ids, episodes, task_->cfg().seed, instructions);
     read_phases();
   });
 }

@@ -45,6 +45,19 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
+def plain(text: object, limit: int = 300) -> str:
+    """A text of a file, a model or an error as one line or more of plain text for a page: printable, and shortened to ``limit`` characters."""
+    shown = printable(str(text)[: limit + 1])
+    return shown if len(shown) <= limit else shown[: limit - 1] + "\N{HORIZONTAL ELLIPSIS}"
+
+
+def escaped(text: object, limit: int = 10_000) -> str:
+    """The same as HTML that displays exactly this text."""
+    import html  # slow to import, and needed in notebooks and viewers only
+
+    return html.escape(plain(text, limit))
+
+
 def line(head: str, rows: list[Row]) -> str:
     """``<contact sensor 'feet': found float32 [64, 4]; force float32 [64, 4, 3] N>``."""
     return printable(f"<{head}: {'; '.join(row.text() for row in rows)}>" if rows else f"<{head}>")
@@ -73,28 +86,22 @@ def help_text(cls: type, rows: list[Row]) -> str:
 
 def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
     """The same as HTML, with those images ``[H, W, C]`` that can be displayed."""
-    import html  # slow to import, and needed in notebooks only
-
     fields = grid(("field", "dtype", "shape", "unit", "frame", ""), [_cells(row) for row in rows]) if rows else ""
-    return f"<div><b>{html.escape(head)}</b>{fields}{figures(images)}</div>"
+    return f"<div><b>{escaped(head)}</b>{fields}{figures(images)}</div>"
 
 
 def grid(header: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
     """An HTML table."""
-    import html
-
     def line_of(tag: str, cells: Sequence[Any]) -> str:
-        return "<tr>" + "".join(f"<{tag} style='text-align:left'>{html.escape(printable(str(cell)))}</{tag}>" for cell in cells) + "</tr>"
+        return "<tr>" + "".join(f"<{tag} style='text-align:left'>{escaped(cell)}</{tag}>" for cell in cells) + "</tr>"
 
     return f"<table>{line_of('th', header)}{''.join(line_of('td', row) for row in rows)}</table>"
 
 
 def figures(images: Mapping[str, np.ndarray]) -> str:
     """Those images ``[H, W, C]`` that can be displayed, with their names, as HTML."""
-    import html
-
     return "".join(
-        f"<figure style='display:inline-block;margin:4px'><img src='{source}'/><figcaption>{html.escape(name)}</figcaption></figure>"
+        f"<figure style='display:inline-block;margin:4px'><img src='{source}'/><figcaption>{escaped(name)}</figcaption></figure>"
         for name, image in images.items()
         if (source := thumbnail(image))
     )
@@ -102,10 +109,8 @@ def figures(images: Mapping[str, np.ndarray]) -> str:
 
 def block(head: str, content: str, folded: Mapping[str, str] | None = None) -> str:
     """HTML with a bold first line, its content, and parts that open at a click."""
-    import html
-
-    parts = "".join(f"<details><summary>{html.escape(name)}</summary>{inner}</details>" for name, inner in (folded or {}).items() if inner)
-    return f"<div><b>{html.escape(printable(head))}</b>{content}{parts}</div>"
+    parts = "".join(f"<details><summary>{escaped(name)}</summary>{inner}</details>" for name, inner in (folded or {}).items() if inner)
+    return f"<div><b>{escaped(head)}</b>{content}{parts}</div>"
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -45,6 +45,8 @@ class Policy:
     """Upper bounds of commands, float64 ``[n]``."""
     wanted: np.ndarray
     """Worlds for which ``act`` must return actions, bool ``[B]``: active worlds without remaining actions of their chunk."""
+    instructions: list[str]
+    """The instruction of each world's episode, such as "Pick up the mug"; known from ``reset`` on."""
     phase: np.ndarray
     num_retries: np.ndarray
 
@@ -116,16 +118,17 @@ class Policy:
         self._mjs_rngs: list[np.random.Generator | None] = [None] * self.num_worlds
         self._mjs_episodes = np.zeros(self.num_worlds, np.int64)
         self._mjs_seed = 0
+        self.instructions = [""] * self.num_worlds
         rows = {spec.name: (sensor, spec, array) for sensor, spec, array in streams}
         names = choose_streams(self.observation, rows)
         obs = nest({name: stream_path(rows[name][0], name) for name in names}, {name: rows[name][2] for name in names})
         self.initialize()
         return obs, self.wanted
 
-    def _mjs_reset(self, ids: list[int], episodes: list[int], seed: int) -> None:
+    def _mjs_reset(self, ids: list[int], episodes: list[int], seed: int, instructions: list[str]) -> None:
         self._mjs_seed = seed
-        for world, episode in zip(ids, episodes):
-            self._mjs_episodes[world], self._mjs_rngs[world] = episode, None
+        for world, episode, instruction in zip(ids, episodes, instructions):
+            self._mjs_episodes[world], self._mjs_rngs[world], self.instructions[world] = episode, None, instruction
         self.reset(np.array(ids))
 
 

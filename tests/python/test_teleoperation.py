@@ -2,6 +2,7 @@
 """A person drives a robot in the browser: here a script that presses keys in headless Chromium."""
 
 import json
+import re
 import subprocess
 import sys
 import time
@@ -90,7 +91,7 @@ def test_a_block_is_picked_with_keys(tmp_path, port):
         while "Drive the robot at" not in said.read_text():
             assert player.poll() is None, said.read_text()
             time.sleep(0.1)
-        page = Page(f"http://127.0.0.1:{port}")
+        page = Page(re.search(r"Drive the robot at (\S+)", said.read_text())[1])
         limit = time.monotonic() + 60
         while not page.run("document.body.innerText.includes('Close gripper')"):
             assert time.monotonic() < limit, "the page shows no controls"

@@ -131,8 +131,7 @@ def test_ctrl_c_while_a_page_plays(port):
     command = [sys.executable, "-m", "mjsense", "view", "pick", "--port", str(port), "--no-open", "--world", "1"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
         try:
-            process.stdout.readline()
-            with devtools.Page(f"http://127.0.0.1:{port}") as page:
+            with devtools.Page(process.stdout.readline().split()[1]) as page:
                 page.click("button", "Play")
                 eventually(lambda: re.search(r"World 1 of 2, t = (0\.[1-9]|[1-9])", page.run("document.body.textContent")))
                 process.send_signal(signal.SIGINT)

@@ -49,6 +49,7 @@ class SpaceMouse:
     def read(self, dt: float) -> Motion:
         state = self._library.read()
         values = np.array([state.y, -state.x, state.z, state.roll, state.pitch, state.yaw], np.float64)
+        values = np.clip(np.nan_to_num(values, nan=0.0), -1, 1)
         values[np.abs(values) < self.DEAD_ZONE] = 0
         pressed = any(state.buttons)
         toggle, self._pressed = pressed and not self._pressed, pressed

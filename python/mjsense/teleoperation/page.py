@@ -13,10 +13,14 @@ from mjsense.simulation import Simulation
 from mjsense.teleoperation.pose import Pose
 from mjsense.view.pictures import Pictures
 from mjsense.view.source import LiveSource
+from mjsense.view.text import panel_text
 from mjsense.view.viewer import Viewer
 
+REACH = 3.0
+"""Maximum distance of the target from the robot's base along each axis, m."""
 STEP = 0.01  # m per press of a key
 TURN = 0.1  # rad per press of a key
+_MAX_PRESSES = 100  # that wait; a person makes a few between two steps
 
 # Key: what it does, translation and rotation in steps, in the axes of the robot's base.
 MOVES: dict[str, tuple[str, tuple[float, ...]]] = {
@@ -49,7 +53,7 @@ class DrivePage(Viewer):
         """Whether the user has ended the episode."""
         gui = self._server.gui
         with gui.add_folder("Drive"):
-            self._text = gui.add_markdown("")
+            self._text = gui.add_html("")
             self._closed_box = gui.add_checkbox("Close gripper", initial_value=False, hint="Key: space")
             self._paused = gui.add_checkbox("Pause", initial_value=False, hint="The world waits. Moving the target ends the pause.")
             self._later(gui.add_button("End episode", hint="It counts as failed unless the task has succeeded. Key: enter"), self._finish)
@@ -68,9 +72,10 @@ class DrivePage(Viewer):
     def _key(self, key: str, label: str, action: Callable[[], None]) -> None:
         command = self._server.gui.add_command(label, hotkey=key)
 
-        def pressed(_: Any) -> None:
+        async def pressed(_: Any) -> None:
             with self._lock:
-                self._presses.append(action)
+                if len(self._presses) < _MAX_PRESSES:
+                    self._presses.append(action)
 
         command.on_trigger(pressed)
 
@@ -79,7 +84,12 @@ class DrivePage(Viewer):
 
     def _dragged(self) -> None:
         self._paused.value = False
-        self.target = Pose(self._handle.position, self._handle.wxyz).seen_from(self.base)
+        self._aim(Pose(self._handle.position, self._handle.wxyz).seen_from(self.base))
+
+    def _aim(self, target: Pose) -> None:
+        self.target = Pose(np.clip(target.position, -REACH, REACH), target.quaternion)
+        if not np.array_equal(self.target.position, target.position):
+            self._place_handle()
 
     @property
     def gripper_closed(self) -> bool:
@@ -97,15 +107,16 @@ class DrivePage(Viewer):
         """Displaces the target, and the handle with it."""
         if translation.any() or rotation.any():
             self._paused.value = False
-            self.target = self.target.moved(translation, rotation)
+            self._aim(self.target.moved(translation, rotation))
             self._place_handle()
 
-    def begin_episode(self, base: Pose, target: Pose, text: str) -> None:
-        """Shows the world of a new episode, with the target at the tool. It waits until the user moves the target or ends the pause."""
+    def begin_episode(self, base: Pose, target: Pose, instruction: str) -> None:
+        """Shows the world of a new episode and what is to be done, with the target at the tool. It waits until the user moves the target or ends
+        the pause."""
         self._paused.value = True
         self.base, self.target, self.finished = base, target, False
         self._closed_box.value = False
-        self._text.content = text
+        self._text.content = panel_text(instruction, self._source.title)
         self._stage.set_model(self._source.model(0))
         self._look(*self._source.camera(0))
         self._place_handle()
@@ -119,7 +130,7 @@ class DrivePage(Viewer):
         with self._lock:
             presses, self._presses = self._presses, []
         for action in presses:
-            action()
+            self._do(action)
         return super()._handle_events() or bool(presses)
 
     def _show(self) -> None:

@@ -79,7 +79,7 @@ class Teleoperation(Policy):
         if self._new:
             self._new = False
             row = np.asarray(obs["actions/ee_pose"][self._arm])[0]
-            page.begin_episode(Pose.of_row(obs["robot_base_pose"][0]), Pose.of_row(row), f"**{self._title}**")
+            page.begin_episode(Pose.of_row(obs["robot_base_pose"][0]), Pose.of_row(row), self.instructions[0])
             # Grippers start open: the closed command is the bound that is farther away.
             low, high = (bounds[self.action_groups[self._gripper]] for bounds in (self.action_low, self.action_high))
             self._open = np.array(obs["actions/joint_pos"][self._gripper][0], np.float64)
@@ -100,7 +100,14 @@ class Teleoperation(Policy):
                 page.toggle_gripper()
         page._handle_events()
         grip = self._closed if page.gripper_closed else self._open
-        return {self._arm: page.target.row[None], self._gripper: grip[None], "done": np.array([page.finished])}
+        return {self._arm: self._possible(self._arm, page.target.row), self._gripper: self._possible(self._gripper, grip), "done": np.array([page.finished])}
+
+    def _possible(self, group: str, command: np.ndarray) -> np.ndarray:
+        """Commands [1, n] within the bounds of the group's controller."""
+        if not np.isfinite(command).all():
+            raise ValueError(f"teleoperation: a command of move group '{group}' is not finite: {command}")
+        columns = self.action_groups[group]
+        return np.clip(command, self.action_low[columns], self.action_high[columns])[None]
 
     def close(self) -> None:
         """Stops the page's server."""

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mjsense.view.text import label, labels
+
 MAX_CURVES = 32
 """Maximum number of components of a stream that is shown as curves."""
 COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f", "#bcbd22", "#17becf")
@@ -38,17 +40,18 @@ class Curves:
         self._gui, self._streams, self._rows, self._now = gui, streams, rows, now
         self._charts: list[tuple[str, Any] | None] = [None] * _CHARTS
         self._history: dict[str, list[tuple[float, np.ndarray]]] = {}
+        self._names = labels(streams)
         self._choices = []
         self._folders = []
         for slot in range(_CHARTS):
-            choice = gui.add_dropdown(f"Stream {slot + 1}", [_NONE, *streams], initial_value=_NONE)
+            choice = gui.add_dropdown(f"Stream {slot + 1}", [_NONE, *self._names], initial_value=_NONE)
             self._folders.append(gui.add_folder(f"Curves {slot + 1}", visible=False))
             later(choice, lambda slot=slot: self._choose(slot))
             self._choices.append(choice)
 
     def choose(self, name: str) -> None:
         """Shows a stream in the first chart."""
-        self._choices[0].value = name
+        self._choices[0].value = next(shown for shown, one in self._names.items() if one == name)
         self._choose(0)
 
     @property
@@ -83,7 +86,7 @@ class Curves:
                 chart[1].data = self._data(chart[0])
 
     def _choose(self, slot: int) -> None:
-        name = self._choices[slot].value
+        name = self._names.get(self._choices[slot].value, _NONE)
         if old := self._charts[slot]:
             old[1].remove()
             self._charts[slot] = None
@@ -92,11 +95,11 @@ class Curves:
         if name == _NONE:
             return
         info = self._streams[name]
-        series: list[dict[str, Any]] = [{"label": "s"}] + [{"label": f"{i}" if info.width > 1 else name.rsplit("/", 1)[-1], "stroke": COLOURS[i % len(COLOURS)], "width": 1.5}
+        series: list[dict[str, Any]] = [{"label": "s"}] + [{"label": f"{i}" if info.width > 1 else label(name.rsplit("/", 1)[-1]), "stroke": COLOURS[i % len(COLOURS)], "width": 1.5}
                                      for i in range(info.width)]  # fmt: skip
         if self._now is not None:
             series.append({"label": "now", "stroke": "#000000", "width": 0, "points": {"show": True, "size": 8, "fill": "#000000"}})
-        self._folders[slot].label = f"{name} [{info.unit}]" if info.unit else name
+        self._folders[slot].label = label(f"{name} [{info.unit}]" if info.unit else name)
         with self._folders[slot]:
             data = self._data(name)
             scales = {"x": {"time": False, "auto": True}, "y": {"auto": True} if self._rows is None else {"range": _range(data[1:])}}

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,10 +15,10 @@ from mjsense.dataset import Dataset, Episode
 from mjsense.view import surfaces
 from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES
+from mjsense.view.server import serve, stop
 from mjsense.view.soft import fields_of
 from mjsense.view.source import LiveSource
 from mjsense.view.stage import MIN_REACH, VISIBLE_GROUPS, Stage, node
-from mjsense.view.viewer import serve, stop
 
 
 class Moment(NamedTuple):
@@ -85,10 +84,7 @@ def _recorded(dataset: Dataset, episode: Episode, full: bool) -> Iterator[Moment
 
 
 def _write_viser(moments: Iterator[Moment], period: float, path: Path) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    server = serve("export", "127.0.0.1", port)
+    server, _, _ = serve("export", "127.0.0.1", 0)
     try:
         stage, serializer = Stage(server), None
         for moment in moments:

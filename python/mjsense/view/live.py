@@ -9,6 +9,7 @@ from typing import Any
 from mjsense.view.curves import Curves
 from mjsense.view.pictures import Pictures
 from mjsense.view.source import LiveSource
+from mjsense.view.text import label, panel_text
 from mjsense.view.viewer import Viewer
 
 _PANELS = 0.15  # s between two updates of images and curves
@@ -29,7 +30,7 @@ class LiveViewer(Viewer):
         gui = self._server.gui
         tabs = gui.add_tab_group()
         with tabs.add_tab("Play"):
-            self._clock = gui.add_markdown("")
+            self._clock = gui.add_html("")
             self._add_play(gui)
             self._later(gui.add_button("Step", hint="One control step."), self._step_once)
             self._speed = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
@@ -43,7 +44,7 @@ class LiveViewer(Viewer):
                 self._later(self._policy, self._switch)
         with tabs.add_tab("Show"):
             self._add_groups(gui)
-            self._drawn = {name: gui.add_checkbox(name, initial_value=False) for name in source.shape_names()}
+            self._drawn = {name: gui.add_checkbox(label(name), initial_value=False) for name in source.shape_names()}
             for box in self._drawn.values():
                 self._later(box, self._draw)
         with tabs.add_tab("Cameras"):
@@ -72,7 +73,7 @@ class LiveViewer(Viewer):
                 for i, control in enumerate(controls[:_MAX_SLIDERS]):
                     low, high = control.low, max(control.high, control.low + 1e-6)
                     value = float(min(max(present[i], low), high))
-                    slider = gui.add_slider(control.name, min=low, max=high, step=(high - low) / 1000, initial_value=value)
+                    slider = gui.add_slider(label(control.name), min=low, max=high, step=(high - low) / 1000, initial_value=value)
                     self._later(slider, lambda i=i, slider=slider, write=write: self._write(write, i, slider))
                     made.append(slider)
 
@@ -143,7 +144,8 @@ class LiveViewer(Viewer):
         if now < self._panels_due and self._playing:
             return
         self._panels_due = now + _PANELS
-        self._clock.content = "\n\n".join([f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s", *source.notes(world)])
+        clock = f"World {world} of {source.num_worlds}, t = {source.time(world):.2f} s"
+        self._clock.content = panel_text(source.instruction(world), clock, *source.notes(world))
         self._pictures.refresh(lambda name: source.picture(name, world))
         self._curves.append(source.time(world), lambda name: source.value(name, world))
         self._curves.refresh()

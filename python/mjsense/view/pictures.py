@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mjsense._show import coloured
+from mjsense.view.text import label, panel_text
 
 _MAX_WIDTH = 320  # pixels; larger images are thinned out
 _POINT = np.array((255, 0, 255), np.uint8)
@@ -47,9 +48,10 @@ class Pictures:
         """
         self._gui, self._chosen = gui, chosen
         self._panels: dict[str, Any] = {}
+        self._errors: dict[str, Any] = {}  # texts, by the name of the image
         self._boxes = {}
         for i, name in enumerate(names):
-            box = gui.add_checkbox(name, initial_value=i < shown)
+            box = gui.add_checkbox(label(name), initial_value=i < shown)
             later(box, self._choose)
             self._boxes[name] = box
         self._points, self._points_box = points, None
@@ -75,9 +77,9 @@ class Pictures:
                 image = read(name)
             except (OSError, RuntimeError) as error:  # a video that is missing or damaged
                 box.value = False
-                if self._folder is not None:
+                if self._folder is not None and name not in self._errors:
                     with self._folder:
-                        self._gui.add_markdown(f"{name}: {error}")
+                        self._errors[name] = self._gui.add_html(panel_text("", f"{name}: {error}"))
                 continue
             step = -(-image.shape[1] // _MAX_WIDTH)
             pixels = coloured((image[..., None] if image.ndim == 2 else image)[::step, ::step])
@@ -90,4 +92,4 @@ class Pictures:
                 self._panels[name].image = pixels
             elif self._folder is not None:
                 with self._folder:
-                    self._panels[name] = self._gui.add_image(pixels, label=name, format="jpeg", jpeg_quality=85)
+                    self._panels[name] = self._gui.add_image(pixels, label=label(name), format="jpeg", jpeg_quality=85)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._show import plain
 from mjsense.dataset import Dataset, Episode
 from mjsense.dataset.episode import VIDEOS
 from mjsense.drawing import DebugShapes
@@ -14,6 +15,7 @@ from mjsense.view.camera import first_view
 from mjsense.view.curves import MAX_CURVES, Curves, StreamInfo
 from mjsense.view.pictures import Pictures, point_streams
 from mjsense.view.poses import POSE, PoseStream
+from mjsense.view.text import label, labels, panel_text
 from mjsense.view.viewer import Viewer
 
 _LISTED = 200  # episodes in the list; the filters find the others
@@ -48,11 +50,11 @@ class RecordingViewer(Viewer):
         gui = self._server.gui
         tabs = gui.add_tab_group()
         with tabs.add_tab("Episodes"):
-            outcomes = sorted({one.outcome for one in dataset.episodes})
-            self._outcome = gui.add_dropdown("Outcome", [_ALL, *outcomes], initial_value=_ALL, visible=len(outcomes) > 1)
+            self._outcomes = labels(sorted({one.outcome for one in dataset.episodes}))
+            self._outcome = gui.add_dropdown("Outcome", [_ALL, *self._outcomes], initial_value=_ALL, visible=len(self._outcomes) > 1)
             self._text = gui.add_text("Task contains", "", hint="Only episodes whose instruction contains this text.")
             self._choice = gui.add_dropdown("Episode", ["0"])
-            self._about = gui.add_markdown("")
+            self._about = gui.add_html("")
             self._add_play(gui)
             self._time = gui.add_slider("Step", min=0, max=1, step=1, initial_value=0)
             self._speed = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
@@ -61,7 +63,7 @@ class RecordingViewer(Viewer):
                 self._later(handle, action)
         with tabs.add_tab("Show"):
             self._add_groups(gui)
-            self._poses = {name: gui.add_checkbox(name.removeprefix("obs/extra/"), initial_value=False)
+            self._poses = {name: gui.add_checkbox(label(name.removeprefix("obs/extra/")), initial_value=False)
                            for name, stream in dataset.streams.items() if stream.unit == POSE and PoseStream.can_draw(stream.frame)}  # fmt: skip
             for box in self._poses.values():
                 self._later(box, self._draw)
@@ -77,10 +79,10 @@ class RecordingViewer(Viewer):
 
     def _filter(self, position: int = 0) -> None:
         """Lists the episodes that the filters leave, and shows one of them."""
-        outcome, text = self._outcome.value, self._text.value.strip().lower()
+        outcome, text = self._outcomes.get(self._outcome.value), self._text.value.strip().lower()
         found = []
         for k, episode in enumerate(self._dataset.episodes):
-            if outcome in (_ALL, episode.outcome) and (not text or text in episode.task.lower()):
+            if outcome in (None, episode.outcome) and (not text or text in episode.task.lower()):
                 found.append(k)
             if len(found) == _LISTED:
                 break
@@ -94,7 +96,7 @@ class RecordingViewer(Viewer):
 
     def _label(self, position: int) -> str:
         episode = self._dataset.episodes[position]
-        return f"{episode.index}: {episode.outcome}, {episode.task}"
+        return label(f"{episode.index}: {episode.outcome}, {episode.task}")
 
     def _choose(self) -> None:
         position = self._listed.get(self._choice.value)
@@ -108,7 +110,7 @@ class RecordingViewer(Viewer):
         try:
             self._model = episode.model()
         except (ValueError, RuntimeError, OSError) as error:
-            self._model, missing = None, f"\n\nThere is no 3D scene, only videos and curves: {error}"
+            self._model, missing = None, f"There is no 3D scene, only videos and curves: {error}"
         else:
             import mujoco  # present, or there would be no model
 
@@ -118,8 +120,8 @@ class RecordingViewer(Viewer):
             if self._shown < 0:
                 self._look(*first_view(self._model, self._data.xpos, self._data.xmat))
         if missing and self._shown < 0:
-            print(missing.strip(), flush=True)
-        self._about.content = f"**{episode.task}**\n\n{episode.outcome}, {episode.length} observations, seed {episode.seed}{missing}"
+            print(plain(missing, 1000), flush=True)
+        self._about.content = panel_text(episode.task, f"{episode.outcome}, {episode.length} observations, seed {episode.seed}", missing)
         self._time.max = max(episode.length - 1, 1)
         self._time.value = 0
         self._curves.reload()

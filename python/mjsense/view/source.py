@@ -61,6 +61,10 @@ class LiveSource:
         """Simulation time of a world, s."""
         return float(self.sim.time[world])
 
+    def instruction(self, world: int) -> str:
+        """What is to be done in the world's episode; empty: nothing in particular."""
+        return ""
+
     def notes(self, world: int) -> list[str]:
         """MuJoCo's warnings in a world, and how often they were raised."""
         return [f"{name}: {counts[world]}" for name, counts in self.sim.warning_counts.items() if counts[world]]
@@ -252,6 +256,9 @@ class TaskSource(LiveSource):
         if not env._started:
             env.reset(seed=env._seed)
         self._action = self._held()
+
+    def instruction(self, world: int) -> str:
+        return self._env.instructions[world]
 
     def step(self) -> None:
         env = self._env

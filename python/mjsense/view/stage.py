@@ -9,6 +9,7 @@ import numpy as np
 
 from mjsense.view import surfaces
 from mjsense.view.soft import Read, SoftParts
+from mjsense.view.text import label
 
 VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups that MuJoCo shows by default."""
@@ -20,9 +21,10 @@ _MIN_CHANGE = 1e-6  # m, or of a quaternion's components: smaller changes of a p
 
 
 def node(model: Any, kind: str, index: int) -> str:
-    """Name of an element without slashes, which separate levels of the browser's scene tree."""
+    """Name of an element without slashes, which separate levels of the browser's scene tree. Names that are too long get the element's number."""
     name = getattr(model, kind)(index).name
-    return name.replace("/", "|") if name else f"{kind}_{index}"
+    shown = label(name)
+    return f"{kind}_{index}" if not name else name.replace("/", "|") if shown == name else f"{shown} {index}".replace("/", "|")
 
 
 class Stage:

@@ -3,65 +3,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 import threading
 import time
-import warnings
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from mjsense._arguments import checked
-from mjsense._optional import optional
+from mjsense._show import plain
 from mjsense.view.layer import ShapeLayer
 from mjsense.view.stage import Stage
 
 _FRAME = 1 / 30  # s between two frames
 _IDLE = 0.1  # s between two looks for a browser or for events while nothing moves
-
-
-def import_viser() -> Any:
-    """viser, or an error that says how to install it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return optional("viser", "view", "The viewer")
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Without the messages that viser prints."""
-    import rich  # pyright: ignore[reportMissingImports]  # a dependency of viser
-
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        console.quiet = before
-
-
-def serve(title: str, host: str, port: int) -> Any:
-    """A viser server without its own lights. It prints nothing."""
-    viser = import_viser()
-    with _quiet():
-        server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
-    server.request_share_url = lambda *_: None  # a page may not ask for a public address
-    server.scene.set_up_direction("+z")
-    server.scene.configure_default_lights(False)
-    server.scene.configure_environment_map(None)
-    return server
-
-
-def stop(server: Any) -> None:
-    """Stops a server without a message."""
-    with _quiet():
-        server.stop()
 
 
 @checked
@@ -72,13 +30,19 @@ class Viewer:
     """
 
     def __init__(self, title: str, host: str, port: int) -> None:
-        self._server = serve(title, host, port)
-        self.port: int = self._server.get_port()
+        from mjsense.view.server import serve, stop  # with asyncio, which is slow to import
+
+        self._stop = stop
+        self._server, gate, listening = serve(title, host, port)
+        self.port: int = listening.port
         """The port of the server."""
-        self.url: str = f"http://{'127.0.0.1' if host in ('', '0.0.0.0') else host}:{self.port}"
-        """The address of the page."""
-        if self.port != port:
+        self.url: str = gate.url
+        """The address of the page, with the token that the server asks for."""
+        if self.port != port and port:
             print(f"Port {port} is taken: the viewer uses port {self.port}.", flush=True)
+        if not listening.local:
+            print(f"The viewer listens at {listening.address}: anybody on the network who has its address, with this computer's name in it, can watch "
+                  "and drive, and the connection is not encrypted.", flush=True)  # fmt: skip
         self._server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         self._stage, self._layer = Stage(self._server), ShapeLayer(self._server)
         self._events: dict[int, Callable[[], None]] = {}
@@ -89,7 +53,7 @@ class Viewer:
     def _later(self, handle: Any, action: Callable[[], None]) -> None:
         """Runs ``action`` in the viewer's thread after the user has changed or clicked a control; of several changes the last counts."""
 
-        def note(event: Any) -> None:
+        async def note(event: Any) -> None:  # runs in the server's thread: messages that come faster do not pile up
             if event.client is not None:  # None: the program has set the value
                 with self._lock:
                     self._events[id(handle)] = action
@@ -131,8 +95,15 @@ class Viewer:
         with self._lock:
             events, self._events = self._events, {}
         for action in events.values():
-            action()
+            self._do(action)
         return bool(events)
+
+    def _do(self, action: Callable[[], None]) -> None:
+        """Does what the user wants. What is not possible, such as showing a damaged episode, does not end the viewer."""
+        try:
+            action()
+        except (ValueError, RuntimeError, OSError, KeyError) as error:
+            print(f"The viewer cannot do this: {plain(error)}", flush=True)
 
     @property
     def watched(self) -> bool:
@@ -174,7 +145,7 @@ class Viewer:
         if not self._closed:
             self._closed = True
             self._wake.set()
-            stop(self._server)
+            self._stop(self._server)
 
     def __enter__(self) -> Viewer:
         return self
