@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import shutil
-import subprocess
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -19,7 +17,7 @@ import numpy as np
 from mjsense._arguments import checked
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.video_decoder import Decoder, Packets, have_av, to_array
-from mjsense.ffmpeg import use_installed_ffmpeg
+from mjsense.ffmpeg import frames_of
 
 _CHUNK = 64  # frames that one start of ffmpeg decodes; a start costs as much as about 50 frames of 640x368
 _OPEN_DECODERS = 16
@@ -145,25 +143,20 @@ class FrameReader:
         return self._tables.get(info.path, read)
 
     def _decode_program(self, info: VideoInfo, index: int) -> Any:
-        use_installed_ffmpeg()
-        program = os.environ.get("MJSENSE_FFMPEG") or shutil.which("ffmpeg")
-        if not program:
-            raise RuntimeError(f"Reading the video {info.path} needs PyAV or ffmpeg: pip install 'mjsense[dataset]'")
         depth = info.encoding == "depth16"
         odd = 1 if info.encoding == "rgb" else 0
         shape = (info.height + (info.height & odd), info.width + (info.width & odd)) + (() if depth else (3,))
         first = index - index % _CHUNK
         # A tenth of a frame early: ffmpeg drops the frames before this time, and the file's times are rounded.
         at = ["-ss", f"{float((first - Fraction(1, 10)) / info.fps):.6f}"] if first else []
-        command = [program, "-nostdin", "-v", "error", *at, "-i", f"file:{info.path}", "-frames:v", str(_CHUNK), "-f", "rawvideo",
-                   "-pix_fmt", info.pixel_format, "-"]  # fmt: skip
-        done = subprocess.run(command, capture_output=True)
         size = int(np.prod(shape)) * (2 if depth else 1)
-        if done.returncode or len(done.stdout) % size:
-            raise RuntimeError(f"{info.path}: ffmpeg cannot decode it: {done.stderr.decode(errors='replace').strip()}")
+        output = ["-frames:v", str(_CHUNK), "-f", "rawvideo", "-pix_fmt", info.pixel_format]
+        raw = frames_of(info.path, at, output, _CHUNK * size)
+        if len(raw) % size:
+            raise RuntimeError(f"{info.path}: its frames are not of {info.width} x {info.height} pixels; `mjsense verify` checks the files")
         found = None
-        for i in range(len(done.stdout) // size):
-            pixels = np.frombuffer(done.stdout, "<u2" if depth else np.uint8, int(np.prod(shape)), i * size).reshape(shape).copy()
+        for i in range(len(raw) // size):
+            pixels = np.frombuffer(raw, "<u2" if depth else np.uint8, int(np.prod(shape)), i * size).reshape(shape).copy()
             self._cache.add((info.path, first + i), pixels, size)
             found = pixels if first + i == index else found
         if found is None:
