@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of images of abstract scenes. python/mjsense/renderer.py defines the public class.
+// Bindings of images of abstract scenes. python/mjsense/renderer.py defines the public class, which
+// lets only one thread at a time call a renderer.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -8,7 +9,6 @@
 
 #include <bit>
 #include <cstdint>
-#include <mutex>
 #include <string>
 
 #include "mjsense/core/error.h"
@@ -110,7 +110,6 @@ render::SceneMemory memory_of(const nb::dict& scene) {
 struct BoundRenderer {
   render::SceneRenderer renderer;
   render::SceneMemory memory;
-  std::mutex mutex;  // held while rendering
 
   BoundRenderer(const nb::dict& model, const nb::dict& settings, const nb::dict& layouts,
                 const nb::dict& scene, const nb::dict& soft)
@@ -156,10 +155,6 @@ struct BoundRenderer {
     targets.depth = reinterpret_cast<float*>(depth);
     targets.segmentation = reinterpret_cast<std::int32_t*>(segmentation);
     const nb::gil_scoped_release release;
-    const std::unique_lock lock(mutex, std::try_to_lock);
-    if (!lock)
-      throw RuntimeError(
-          "Renderer: another thread is rendering with it; use one renderer per thread");
     renderer.render(scene, width, height, targets);
   }
 };

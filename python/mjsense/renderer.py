@@ -6,7 +6,8 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from concurrent.futures import ThreadPoolExecutor
+import warnings
+from concurrent.futures import ThreadPoolExecutor, wait
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from mjsense import _core, _scene_layout
 from mjsense._arguments import OutputArray, checked
+from mjsense._one_thread import OneThread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -52,6 +54,13 @@ _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "segmentation": (np.int32, (2,)),
 }
 """Element type and channels by kind of image."""
+
+_NO_POSES = "`data` has no poses yet, and no geoms are drawn: call mujoco.mj_forward(model, data)"
+_NO_CAMERA = "the image is empty, because its camera has no pose: call mujoco.mj_forward(model, data) and update_scene(data) before"
+
+
+def _has_poses(data: mujoco.MjData) -> bool:
+    return bool(data.xmat[0].any())  # otherwise MuJoCo has not even computed that of the world
 
 
 class _Pool:
@@ -97,6 +106,9 @@ class Renderer:
         renderer.update_scene(data, camera="front")
         image = renderer.render()  # uint8 [240, 320, 3]
 
+    One thread at a time can use a renderer: a call during that of another thread is an error, and ``close()`` waits for it. Use one
+    renderer per thread, or ``render_batch``, which several threads may call at the same time.
+
     Args:
         model: the ``mujoco.MjModel``.
         height: height of the images in pixels; not limited by ``offheight``.
@@ -114,8 +126,6 @@ class Renderer:
     ) -> None:
         import mujoco
 
-        self._native: Any = None
-        self._batch: _Pool | None = None
         self._checked_size(height, width)
         self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
 
@@ -126,13 +136,16 @@ class Renderer:
         `scene` must have room for at least two geoms.
         """
         made = cls.__new__(cls)
-        made._native = made._batch = None
         made._set_up(model, height, width, scene)
         return made
 
     def _set_up(self, model: mujoco.MjModel, height: int, width: int, scene: mujoco.MjvScene) -> None:
         import mujoco
 
+        self._guard = OneThread("Renderer: another thread is using it; use one renderer per thread")
+        self._batch: _Pool | None = None
+        self._batch_guard = OneThread("")
+        self._warned: set[str] = set()
         self._mujoco = mujoco
         self._model = model
         self._height, self._width = int(height), int(width)
@@ -145,7 +158,7 @@ class Renderer:
         flag = mujoco.mjtRndFlag
         self._flags = {name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)}
         """Indices into the scene's flags."""
-        self._native = self._make_native()
+        self._native: Any = self._make_native()
 
     def _make_native(self) -> Any:
         model, scene = self._model, self._scene
@@ -205,26 +218,44 @@ class Renderer:
         return self._width
 
     def enable_depth_rendering(self) -> None:
-        self._segmentation = False
-        self._depth = True
+        with self._guard:
+            self._segmentation = False
+            self._depth = True
 
     def disable_depth_rendering(self) -> None:
-        self._depth = False
+        with self._guard:
+            self._depth = False
 
     def enable_segmentation_rendering(self) -> None:
-        self._segmentation = True
-        self._depth = False
+        with self._guard:
+            self._segmentation = True
+            self._depth = False
 
     def disable_segmentation_rendering(self) -> None:
-        self._segmentation = False
+        with self._guard:
+            self._segmentation = False
 
     @staticmethod
     def _sizes_of(model: mujoco.MjModel) -> tuple[int, ...]:
         return tuple(getattr(model, name) for name in _SIZES)
 
-    def _check_open(self) -> None:
-        if self._native is None:
+    def _opened(self) -> Any:
+        native = self._native
+        if native is None:
             raise RuntimeError("Renderer: used after close(); make a new one")
+        return native
+
+    def _warn(self, text: str) -> None:
+        """Warns once, at the line that calls the public method that calls this."""
+        if text not in self._warned:
+            self._warned.add(text)
+            warnings.warn(f"Renderer: {text}", stacklevel=4)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            gl = "; there is no OpenGL. Call reload() after a change of the model's textures, meshes or height fields (mjr_uploadTexture ...)"
+            raise AttributeError(f"Renderer has no attribute '{name}'{gl if name in ('_mjr_context', '_gl_context') else ''}")
 
     def _check_sizes(self, model: mujoco.MjModel, what: str) -> None:
         sizes = self._sizes_of(model)
@@ -259,17 +290,23 @@ class Renderer:
             camera: id or name of a camera of the model, -1 for the default free camera, or an ``MjvCamera`` (free, fixed or tracking).
             scene_option: visibility of groups and elements; None for MuJoCo's defaults.
 
+        MuJoCo draws no geoms of a `data` for which ``mj_forward`` was never called; the first such call warns.
+
         Raises:
-            ValueError: if the camera does not exist, `data` belongs to a model of another size, or ``mj_forward`` was never called for it.
-            RuntimeError: after ``close()``.
+            ValueError: if the camera does not exist, or `data` belongs to a model of another size.
+            RuntimeError: after ``close()``, or if another thread is using the renderer.
         """
-        self._check_open()
+        with self._guard:
+            self._update(data, camera, scene_option)
+        if not _has_poses(data):
+            self._warn(f"{_NO_POSES} before update_scene()")
+
+    def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
+        self._opened()
         self._check_sizes(self._model, "the model has changed")
         owner = getattr(data, "model", self._model)
         if owner is not self._model:
             self._check_sizes(owner, "`data` belongs to another model")
-        if not data.xmat[0].any():  # MuJoCo has not computed any pose, not even that of the world
-            raise ValueError("Renderer: `data` has no poses yet: call mujoco.mj_forward(model, data) before update_scene()")
         self._native.check_indices()
         mujoco, view = self._mujoco, self._camera(camera)
         self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
@@ -293,23 +330,27 @@ class Renderer:
             A new array, or `out`: rgb uint8 [H, W, 3]; with depth rendering float32 [H, W], distance to the camera plane in m, the far
             plane's where nothing is seen; with segmentation rendering int32 [H, W, 2], object id and type, (-1, -1) where nothing is seen.
 
+        Before the first ``update_scene`` the image is black, as MuJoCo's, and the first call warns.
+
         Raises:
-            RuntimeError: after ``close()``.
+            RuntimeError: after ``close()``, or if another thread is using the renderer.
             ValueError: if the shape of `out` is wrong, if a pose is not finite, or if the scene contains something that cannot be drawn.
         """
-        self._check_open()
-        kind = "depth" if self._depth else "segmentation" if self._segmentation else "rgb"
-        dtype, channels = _KINDS[kind]
-        shape = (self._height, self._width, *channels)
-        if out is not None and out.shape != shape:
-            raise ValueError(f"Expected `out.shape == {shape}` for {kind} rendering. Got `out.shape={out.shape}` instead.")
-        direct = out is not None and out.dtype == dtype and out.flags.c_contiguous and out.flags.writeable
-        image = out if out is not None and direct else np.empty(shape, dtype)
-        self._draw(**{kind: image})
-        if out is None or direct:
-            return image
-        np.copyto(out, image, casting="unsafe")
-        return out
+        with self._guard:
+            self._opened()
+            kind = "depth" if self._depth else "segmentation" if self._segmentation else "rgb"
+            dtype, channels = _KINDS[kind]
+            shape = (self._height, self._width, *channels)
+            if out is not None and out.shape != shape:
+                raise ValueError(f"Expected `out.shape == {shape}` for {kind} rendering. Got `out.shape={out.shape}` instead.")
+            direct = out is not None and out.dtype == dtype and out.flags.c_contiguous and out.flags.writeable
+            image = out if out is not None and direct else np.empty(shape, dtype)
+            drawn = self._draw(**{kind: image})
+            if out is not None and not direct:
+                np.copyto(out, image, casting="unsafe")
+        if not drawn:
+            self._warn(_NO_CAMERA)
+        return image if out is None else out
 
     def render_images(
         self, kinds: Sequence[str] = ("rgb", "depth", "segmentation"), *, height: int | None = None, width: int | None = None
@@ -324,10 +365,13 @@ class Renderer:
         Returns:
             New arrays by kind.
         """
-        self._check_open()
-        size = self._checked_size(self._height if height is None else height, self._width if width is None else width)
-        images = {kind: self._empty(kind, *size) for kind in kinds}
-        self._draw(**images)
+        with self._guard:
+            self._opened()
+            size = self._checked_size(self._height if height is None else height, self._width if width is None else width)
+            images = {kind: self._empty(kind, *size) for kind in kinds}
+            drawn = self._draw(**images)
+        if not drawn:
+            self._warn(_NO_CAMERA)
         return images
 
     def render_batch(
@@ -338,7 +382,7 @@ class Renderer:
         *,
         out: OutputArray | None = None,
     ) -> np.ndarray:
-        """Renders one rgb image of each `data` on all CPU cores. ``scene`` does not change.
+        """Renders one rgb image of each `data` on all CPU cores. ``scene`` does not change. Several threads may call this.
 
         Args:
             datas: data of the renderer's model.
@@ -349,7 +393,7 @@ class Renderer:
         Returns:
             uint8 [B, H, W, 3]: `out` or a new array.
         """
-        self._check_open()
+        self._opened()
         datas = list(datas)
         for index, data in enumerate(datas):
             if not isinstance(data, self._mujoco.MjData):
@@ -361,20 +405,31 @@ class Renderer:
         images = np.empty(shape, np.uint8) if out is None else out
         if images.shape != shape or images.dtype != np.uint8 or not images.flags.c_contiguous or not images.flags.writeable:
             raise ValueError(f"Renderer.render_batch: out must be a contiguous, writable uint8 array of shape {shape}")
-        pool = self._pool()
-
-        def draw(index: int) -> None:
+        def draw(pool: _Pool, index: int) -> None:
             renderer = pool.take()
             try:
-                renderer.update_scene(datas[index], each[index], scene_option)
+                renderer._update(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
             except ValueError as error:
                 raise ValueError(f"{error} (datas[{index}])") from None
             finally:
                 pool.free.put(renderer)
 
-        for _ in pool.threads.map(draw, range(len(datas))):
-            pass
+        with self._batch_guard.lock:  # close() comes before all images or after them
+            self._opened()
+            pool = self._pool()
+            running = [pool.threads.submit(draw, pool, index) for index in range(len(datas))]
+        try:
+            wait(running)
+        finally:  # Ctrl-C
+            for one in running:
+                one.cancel()
+        for one in running:
+            one.result()
+        for index, data in enumerate(datas):
+            if not _has_poses(data):
+                self._warn(f"{_NO_POSES} before render_batch() (datas[{index}])")
+                break
         return images
 
     def _pool(self) -> _Pool:
@@ -388,8 +443,8 @@ class Renderer:
         Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a large one
         may be missed.
         """
-        self._check_open()
-        self._native.reload()
+        with self._guard:
+            self._opened().reload()
 
     def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
         if kind not in _KINDS:
@@ -399,8 +454,9 @@ class Renderer:
 
     def _draw(
         self, rgb: np.ndarray | None = None, depth: np.ndarray | None = None, segmentation: np.ndarray | None = None
-    ) -> None:
-        scene = self._scene
+    ) -> bool:
+        """Returns False if the scene has no camera, so that nothing can be seen."""
+        native, scene = self._opened(), self._scene
         if not 0 <= scene.ngeom <= scene.maxgeom:
             raise ValueError(f"Renderer: scene.ngeom is {scene.ngeom}: must be in [0, {scene.maxgeom}], which max_geom has set")
         values = scene.flags.tolist()
@@ -413,9 +469,15 @@ class Renderer:
         height, width = images[0].shape[:2] if images else (self._height, self._width)
         memory = [0 if image is None else _scene_layout.address(image) for image in (rgb, depth, segmentation)]
         try:
-            self._native.render(scene.ngeom, scene.nlight, tuple(shown), width, height, *memory)
+            native.render(scene.ngeom, scene.nlight, tuple(shown), width, height, *memory)
         except ValueError as error:
-            raise ValueError(f"Renderer: {self._with_names(str(error))}") from None
+            if any(eye.forward.any() and eye.up.any() for eye in scene.camera):
+                raise ValueError(f"Renderer: {self._with_names(str(error))}") from None
+            for image, nothing in ((rgb, 0), (depth, self._model.vis.map.zfar * self._model.stat.extent), (segmentation, -1)):
+                if image is not None:
+                    image.fill(nothing)
+            return False
+        return True
 
     def _with_names(self, message: str) -> str:
         """The message with names instead of MuJoCo's object types and ids."""
@@ -451,11 +513,13 @@ class Renderer:
                 raise ValueError(f"Renderer: scene.{name} = {getattr(scene, name)} is not supported")
 
     def close(self) -> None:
-        """Frees the renderer's memory. The renderer is also a context manager that does this at its end."""
-        self._native = None
-        if self._batch is not None and self._batch.process == os.getpid():
-            self._batch.threads.shutdown()
-        self._batch = None
+        """Frees the renderer's memory, after the calls of other threads. The renderer is also a context manager that does this at its end."""
+        with self._guard.lock:
+            self._native = None
+        with self._batch_guard.lock:
+            batch, self._batch = self._batch, None
+        if batch is not None and batch.process == os.getpid():
+            batch.threads.shutdown()
 
     def __reduce__(self) -> Any:
         raise TypeError("Renderer: cannot be copied or pickled; make one in each process, from the model")

@@ -481,12 +481,29 @@ ENCODERS = {
     "stops": "kill -STOP $$",
     "never reads": "sleep 1000",
     "never ends": 'cat > /dev/null; sleep 1000',
+    "floods stderr": "head -c 50000000 /dev/zero >&2; stat -L -c %F /dev/stderr > $0.kind; sleep 1000",
+    "leaves a process": "cat > /dev/null; sleep 1000 & exit 3",
+    "waits for a process": "sleep 1000 & wait",
+    "opens files": "cat > /dev/null; exec python3 -c 'all = [open(\"/dev/null\") for _ in range(2000)]'",
+    "takes memory": "cat > /dev/null; exec python3 -c 'x = bytearray(3 << 30)'",
 }
+
+
+def processes_with(name: str, value: str) -> list[int]:
+    """Processes that have an environment variable with this value."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if f"{name}={value}" in (folder / "environ").read_text(errors="replace").split("\0"):
+                found.append(int(folder.name))
+        except OSError:  # it has ended, or belongs to somebody else
+            continue
+    return found
 
 
 def encoders(lab: Lab, names=None) -> Row:
     """Records with faulty replacements of ffmpeg: the program ends with an error message and publishes no broken video."""
-    row = Row("ffmpeg that lies, dies or hangs")
+    row = Row("ffmpeg that lies, dies, hangs or floods")
     real = shutil.which("ffmpeg")
     for name, body in ENCODERS.items():
         if names is not None and name not in names:
@@ -507,8 +524,16 @@ def encoders(lab: Lab, names=None) -> Row:
             continue
         if done.returncode == 0:
             row.wrong("unnoticed", name)
-        elif done.returncode != 2 or "ffmpeg" not in done.stderr:
+        elif done.returncode != 2 or "ffmpeg" not in done.stderr or len(done.stderr) > 2000:
             row.wrong("crashed", f"{name}: {done.returncode} {done.stderr}")
+        end = time.monotonic() + 10
+        while (left := processes_with("MJSENSE_FFMPEG", str(script))) and time.monotonic() < end:
+            time.sleep(0.05)  # they were killed, but may not have run since
+        if left:
+            row.wrong("hung", f"{name}: processes {left} are left")
+        kind = script.with_name("ffmpeg.kind")
+        if kind.exists() and kind.read_text() != "fifo\n":
+            row.wrong("crashed", f"{name}: all of stderr is kept in a {kind.read_text()}")
         if list(out.rglob("*.mp4")) and any(".part." not in str(p) for p in out.rglob("*.mp4")):
             row.wrong("lost", f"{name}: published {list(out.rglob('*.mp4'))}")
     script = lab.fresh("tools") / "ffmpeg"

@@ -72,7 +72,7 @@ def _array(rng: random.Random, shape: tuple[int, ...]) -> np.ndarray:
         shape, length = (3,), 3
     if dtype.kind in "fiu" and rng.random() < 0.7:
         with np.errstate(all="ignore"):
-            number = rng.choice([v for v in _numbers() if dtype.kind == "f" or v == v and abs(v) < 2**62])
+            number = rng.choice([v for v in _numbers() if dtype.kind == "f" or (v == v and abs(v) < 2**62)])
             return np.full(shape, number, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
     return np.frombuffer(rng.randbytes(length * dtype.itemsize), dtype).reshape(shape)
 
@@ -170,7 +170,7 @@ def dataset(house: Path, rng: random.Random, secret: Path) -> str:
             values = old[...].copy()
             flat = values.reshape(-1)
             with np.errstate(all="ignore"):
-                choices = [v for v in _numbers() if values.dtype.kind == "f" or v == v and 0 <= v < 2 ** (8 * values.dtype.itemsize - 1)]
+                choices = [v for v in _numbers() if values.dtype.kind == "f" or (v == v and 0 <= v < 2 ** (8 * values.dtype.itemsize - 1))]
                 flat[rng.randrange(flat.size)] = rng.choice(choices)
             _replace(file, name, data=values)
             return f"one number of {name} changed"
@@ -280,7 +280,7 @@ def model_field(house: Path, rng: random.Random, secret: Path) -> str:
     flat = values.reshape(-1)
     with np.errstate(all="ignore"):
         for _ in range(rng.choice([1, 5])):
-            value = rng.choice([v for v in _numbers() if values.dtype.kind == "f" or v == v and abs(v) < 2**31])
+            value = rng.choice([v for v in _numbers() if values.dtype.kind == "f" or (v == v and abs(v) < 2**31)])
             flat[rng.randrange(flat.size)] = np.float64(value) if values.dtype.kind == "f" else np.int64(value).astype(values.dtype)
     with h5py.File(_file(house), "r+") as file:
         fields = file["traj_0"].require_group("replay/model")

@@ -87,8 +87,6 @@ def test_errors():
     _, other = load(SHAPES)
     with pytest.raises(ValueError, match=r"`data` belongs to another model: nq is .*, but the renderer's model had 7"):
         renderer.update_scene(other)
-    with pytest.raises(ValueError, match="call update_scene"):
-        renderer.render()
     with pytest.raises(ValueError, match="unknown kind of image 'normals'; expected one of rgb, depth, segmentation"):
         renderer.render_images(("normals",))
     renderer.close()
@@ -155,19 +153,6 @@ def test_a_camera_that_is_not_set_is_an_error():
     camera.type = mujoco.mjtCamera.mjCAMERA_USER
     with pytest.raises(ValueError, match="the near plane of the scene's camera is at 0"):  # otherwise MuJoCo ends the process
         renderer.update_scene(data, camera)
-    with pytest.raises(ValueError, match=r"the scene's camera is not set: .*mj_forward"):
-        mjs.Renderer(model, 20, 30).render()
-
-
-@pytest.mark.parametrize("camera", [-1, "front"])
-def test_data_without_poses_is_an_error(camera):
-    model, data = load(BALL)
-    renderer = mjs.Renderer(model, 20, 30)
-    mujoco.mj_resetData(model, data)
-    with pytest.raises(ValueError, match=r"`data` has no poses yet: call mujoco.mj_forward\(model, data\)"):
-        renderer.update_scene(data, camera)
-    with pytest.raises(ValueError, match=r"has no poses yet.*\(datas\[0\]\)"):
-        renderer.render_batch([data], camera)
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])

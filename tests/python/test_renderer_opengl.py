@@ -48,6 +48,38 @@ def compare(images, psnr):
     assert (segmentation[0] == segmentation[1]).all(-1).mean() > 0.998
 
 
+def enable(renderer, kind):
+    if kind == "depth":
+        renderer.enable_depth_rendering()
+    if kind == "segmentation":
+        renderer.enable_segmentation_rendering()
+
+
+@pytest.mark.parametrize("kind", ["rgb", "depth", "segmentation"])
+def test_before_the_first_update_as_in_opengl(opengl, kind):
+    model, _ = load(SHAPES)
+    with mujoco.Renderer(model, 20, 30) as renderer:
+        enable(renderer, kind)
+        expected = renderer.render()
+    with mjs.Renderer(model, 20, 30) as renderer, pytest.warns(UserWarning):
+        enable(renderer, kind)
+        image = renderer.render()
+    assert image.dtype == expected.dtype
+    np.testing.assert_allclose(image, expected, rtol=1e-4)
+
+
+@pytest.mark.parametrize("scene", [BALL, SHAPES, SOFT])
+def test_data_without_poses_as_in_opengl(opengl, scene):
+    model, data = load(scene)
+    mujoco.mj_resetData(model, data)
+    with pytest.warns(UserWarning, match="has no poses yet, and no geoms are drawn"):
+        rgb, depth, segmentation = both(model, data, -1)
+    error = np.mean((rgb[0].astype(float) - rgb[1]) ** 2)
+    assert 10 * np.log10(255**2 / max(error, 1e-9)) > 34
+    np.testing.assert_allclose(depth[1], depth[0], rtol=1e-4)
+    np.testing.assert_array_equal(segmentation[1], segmentation[0])
+
+
 @pytest.mark.parametrize("camera", ["view", "below", "flat", "sensor", -1])
 def test_shapes_look_as_in_opengl(opengl, camera):
     images = both(*load(SHAPES, 60), camera)

@@ -14,7 +14,6 @@ from mjsense.configs import SceneCfg
 from mjsense.dataset import playback
 from mjsense.dataset.archive import MODEL_FILE, read_archive
 from mjsense.dataset.closed_model import check_compiled, closed_model
-from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.model_fields import check_inputs
 from mjsense.scene import Scene
 from mjsense.simulation import Simulation

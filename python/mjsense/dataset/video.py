@@ -3,13 +3,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
 import os
-import resource
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -21,13 +16,11 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.dataset.cache import Cache
-from mjsense.dataset.places import PlainFile, open_plain, printable
-from mjsense.dataset.video_decoder import CODECS, Decoder, Packets, check_sum, container_format, have_av, to_array
-from mjsense.ffmpeg import use_installed_ffmpeg
+from mjsense.dataset.places import open_plain
+from mjsense.dataset.video_decoder import Decoder, Packets, check_sum, have_av, to_array
+from mjsense.ffmpeg import frames_of
 
 _CHUNK_BYTES = 1 << 28  # of the frames that one start of ffmpeg decodes, at most
-_CPU_S, _BYTES_PER_S, _MEMORY = 60, 50_000, 4 << 30  # limits of ffmpeg; it needs a tenth of this time for a real video
-_MESSAGES = 1 << 16  # bytes that ffmpeg may write to stderr
 _CHUNK = 64  # frames that one start of ffmpeg decodes; a start costs as much as about 50 frames of 640x368
 _OPEN_DECODERS = 16
 _LARGE_IMAGE = 100_000  # pixels; with smaller images, starting threads costs more than they save
@@ -107,24 +100,6 @@ def _no_frame(info: VideoInfo, index: int) -> Exception:
     return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
 
 
-def _run_limited(command: list[str], file: PlainFile) -> tuple[bytes, str | None]:
-    """Output of ffmpeg on an open file, and its messages if it fails; its time, memory and messages are limited."""
-    seconds = _CPU_S + file.size // _BYTES_PER_S
-    with tempfile.TemporaryFile() as messages, subprocess.Popen(command, stdout=subprocess.PIPE, stderr=messages, pass_fds=[file.fileno()]) as process:
-        for what, most in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, _MEMORY), (resource.RLIMIT_FSIZE, _MESSAGES)):
-            with contextlib.suppress(ProcessLookupError):
-                resource.prlimit(process.pid, what, (most, most))
-        try:
-            output, _ = process.communicate(timeout=10 * seconds)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
-            return b"", f"it has not finished after {10 * seconds} s"
-        messages.seek(0)
-        text = printable(" ".join(messages.read(_MESSAGES).decode(errors="replace").split())[:500])
-        return output, (text or f"it ended with {process.returncode}") if process.returncode else None
-
-
 class FrameReader:
     """Frames of all videos of a data set, with a cache of decoded ones."""
 
@@ -174,10 +149,6 @@ class FrameReader:
         return self._tables.get(info.path, read)
 
     def _decode_program(self, info: VideoInfo, index: int) -> Any:
-        use_installed_ffmpeg()
-        program = os.environ.get("MJSENSE_FFMPEG") or shutil.which("ffmpeg")
-        if not program:
-            raise RuntimeError(f"Reading the video {info.path} needs PyAV or ffmpeg: pip install 'mjsense[dataset]'")
         depth = info.encoding == "depth16"
         odd = 1 if info.encoding == "rgb" else 0
         shape = (info.height + (info.height & odd), info.width + (info.width & odd)) + (() if depth else (3,))
@@ -186,18 +157,15 @@ class FrameReader:
         at = ["-ss", f"{float((first - Fraction(1, 10)) / info.fps):.6f}"] if first else []
         size = int(np.prod(shape)) * (2 if depth else 1)
         count = max(1, min(_CHUNK, _CHUNK_BYTES // size))
+        at += ["-max_pixels", str((info.width + 64) * (info.height + 64))]
         with open_plain(info.path) as file:
             self._tables.get((info.path, "sum"), lambda: (check_sum(file, info.crc, str(info.path)) or True, 1))
-            # The file is named by its descriptor, so its name is neither an option nor a protocol.
-            command = [program, "-nostdin", "-v", "error", "-protocol_whitelist", "file", "-f", container_format(info.path), "-codec_whitelist", CODECS,
-                       "-max_pixels", str((info.width + 64) * (info.height + 64)), "-threads", "1", *at, "-i", f"/proc/self/fd/{file.fileno()}", "-an", "-sn", "-dn",
-                       "-frames:v", str(count), "-f", "rawvideo", "-pix_fmt", info.pixel_format, "-"]  # fmt: skip
-            output, message = _run_limited(command, file)
-        if message is not None or len(output) % size:
-            raise RuntimeError(f"{info.path}: ffmpeg cannot decode it: {message or 'its images have another size than the recording states'}")
+            raw = frames_of(info.path, file.fileno(), at, ["-frames:v", str(count), "-f", "rawvideo", "-pix_fmt", info.pixel_format], count * size)
+        if len(raw) % size:
+            raise RuntimeError(f"{info.path}: ffmpeg cannot decode it: its images have another size than the recording states")
         found = None
-        for i in range(len(output) // size):
-            pixels = np.frombuffer(output, "<u2" if depth else np.uint8, int(np.prod(shape)), i * size).reshape(shape).copy()
+        for i in range(len(raw) // size):
+            pixels = np.frombuffer(raw, "<u2" if depth else np.uint8, int(np.prod(shape)), i * size).reshape(shape).copy()
             self._cache.add((info.path, first + i), pixels, size)
             found = pixels if first + i == index else found
         if found is None:

@@ -135,18 +135,22 @@ struct EncoderPool::Impl {
     while (true) {
       polled.assign(1, {wake_fd.get(), POLLIN, 0});
       ready.assign(1, nullptr);
-      bool ending = false;
+      bool ending = false, waiting = false;
       {
         const std::lock_guard lock(mutex);
         if (stop) return;
         for (const auto& stream : streams) {
           ending |= stream->child.pid >= 0 && !stream->child.in;
+          if (stream->child.log) {
+            polled.push_back({stream->child.log.get(), POLLIN, 0});
+            ready.push_back(stream.get());
+          }
           if (stream->failed() || !stream->has_frames()) continue;
           polled.push_back({stream->sink(), POLLOUT, 0});
           ready.push_back(stream.get());
+          waiting = true;
         }
       }
-      const bool waiting = polled.size() > 1;
       poll(polled.data(), polled.size(), ending ? kReapPeriodMs : waiting ? kWatchPeriodMs : -1);
       // A pause of this process (Ctrl-Z, a suspended machine) must not count as idle time of an
       // encoder.
@@ -156,7 +160,12 @@ struct EncoderPool::Impl {
       while (read(wake_fd.get(), &drained, sizeof drained) > 0) {
       }
       for (std::size_t i = 1; i < polled.size(); ++i) {
-        if (polled[i].revents != 0) feed(*ready[i]);
+        if (polled[i].revents == 0) continue;
+        if (polled[i].events == POLLIN) {
+          read_log(ready[i]->child);
+        } else {
+          feed(*ready[i]);
+        }
       }
       watch(elapsed);
       look_after();
@@ -263,7 +272,8 @@ struct EncoderPool::Impl {
         if (!stream.spool_file)
           throw_file("read", stream.folder->display_path(stream.spool), errno);
         stream.child = start_process(encoder_command(cfg, fps, *stream.video, stream.output),
-                                     stream.spool_file, stream.folder->fd());
+                                     stream.spool_file, stream.folder->fd(),
+                                     encoder_limits(cfg, *stream.video));
         ++running;
       } catch (const Error& error) {
         stream.failure = error.what();
@@ -275,16 +285,16 @@ struct EncoderPool::Impl {
   // still runs.
   bool finish(Stream& stream, bool now) {
     Exit exit;
-    bool ended = wait_process(stream.child, false, exit);
+    bool ended = process_ended(stream.child, exit);
     if (!ended && now && !stream.failure.empty()) {
       // It stopped reading and is about to exit: give it time to write its error message.
       usleep(50000);
-      ended = wait_process(stream.child, false, exit);
+      ended = process_ended(stream.child, exit);
     }
     if (ended && !exit.ok) stream.failure = "ffmpeg: " + exit.why;
     if (!ended && now) {
-      kill(stream.child.pid, SIGKILL);
-      ended = wait_process(stream.child, true, exit);
+      exit = kill_process(stream.child);
+      ended = true;
     }
     if (!ended) return false;
     --running;
@@ -341,7 +351,7 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
   stream->direct = slot_free();
   if (stream->direct) {
     stream->child = start_process(encoder_command(impl_->cfg, impl_->fps, video, output), true,
-                                  false, stream->folder->fd());
+                                  false, stream->folder->fd(), encoder_limits(impl_->cfg, video));
     ++impl_->running;
   } else {
     stream->spool = output + ".raw";

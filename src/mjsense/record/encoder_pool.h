@@ -21,6 +21,7 @@
 #include "mjsense/record/folder.h"
 #include "mjsense/record/recording.h"
 #include "mjsense/record/recording_plan.h"
+#include "mjsense/record/spawn.h"
 
 namespace mjsense::record {
 
@@ -28,6 +29,10 @@ namespace mjsense::record {
 // working directory.
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video, const std::string& output);
+
+// Its limits: several times the memory that encoding takes. Its CPU time is not limited, because an
+// episode may have any length; VideoCfg::ffmpeg_timeout ends an encoder without progress.
+SystemLimits encoder_limits(const VideoCfg& cfg, const VideoStream& video);
 
 // Throws RuntimeError unless the ffmpeg program runs and has the encoders that the videos need.
 void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos);
@@ -46,7 +51,7 @@ class EncoderPool {
   // `streams_at_once`: maximum number of streams that are open at the same time.
   EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once,
               const std::atomic<int>* stop = nullptr);
-  ~EncoderPool();  // kills the processes that still run
+  ~EncoderPool();  // kills the processes that still run, and what they have started
 
   // Waits for a free encoder or, with spool files, until few enough of them are pending. `video`
   // must outlive the stream, which writes the file `output` of `folder`. Throws RuntimeError if

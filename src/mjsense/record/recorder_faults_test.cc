@@ -123,6 +123,54 @@ TEST(RecorderFaults, FfmpegHangs) {
   }
 }
 
+// An encoder never waits for its stderr to be read, however much it writes there.
+TEST(RecorderFaults, FfmpegFloodsStderr) {
+  for (const bool works : {true, false}) {
+    TempDir dir, tools;
+    const std::string error = error_of([&] {
+      write_recording(dir.path, 1, {.worlds = 1}, true, [&](RecordingCfg& c) {
+        c.video.ffmpeg = fake_ffmpeg(
+            tools.path,
+            std::string("head -c 50000000 /dev/zero | tr '\\0' 'x' >&2\n"
+                        "stat -L -c %F /dev/stderr > $0.kind\n") +
+                (works ? "exec ffmpeg \"$@\"" : "cat > /dev/null; echo no more >&2; exit 1"));
+      });
+    });
+    EXPECT_EQ(read_file(tools.path / "ffmpeg.kind"), "fifo\n");
+    if (works) {
+      EXPECT_EQ(error, "");
+      EXPECT_THAT(tree(dir.path), ::testing::Contains(HasSubstr("batch_1_of_1.h5")));
+    } else {
+      EXPECT_THAT(error, AllOf(HasSubstr("exit code 1: xxx"), HasSubstr("xxxno more")));
+      EXPECT_LT(error.size(), 1000U);
+    }
+  }
+}
+
+// Processes that an encoder has started end with it, whether it finishes or hangs.
+TEST(RecorderFaults, FfmpegLeavesProcesses) {
+  for (const bool hangs : {false, true}) {
+    TempDir dir, tools;
+    const std::string error = error_of([&] {
+      write_recording(dir.path, 1, {.worlds = 1}, true, [&](RecordingCfg& c) {
+        c.video.ffmpeg_timeout = 2;
+        c.video.ffmpeg =
+            fake_ffmpeg(tools.path, std::string("sleep 1000 > /dev/null & echo $! > $0.left\n") +
+                                        (hangs ? "sleep 1000" : "ffmpeg \"$@\""));
+      });
+    });
+    EXPECT_THAT(error, hangs ? HasSubstr("did not finish for 2 s") : HasSubstr(""));
+    EXPECT_EQ(error.empty(), !hangs) << error;
+    const std::string left = read_file(tools.path / "ffmpeg.left");
+    const auto ended = [file = "/proc/" + left.substr(0, left.find('\n')) + "/stat"] {
+      const std::string state = read_file(file);
+      return state.empty() || state.find(") Z ") != state.npos;  // it may stay as a zombie
+    };
+    for (int i = 0; i < 1000 && !ended(); ++i) usleep(5000);
+    EXPECT_TRUE(ended()) << hangs;
+  }
+}
+
 // In a process that ignores SIGCHLD the system keeps no exit status of child processes.
 TEST(RecorderFaults, SigchldIsIgnored) {
   for (const bool fails : {false, true}) {

@@ -4,9 +4,11 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -23,9 +25,20 @@ struct Plan {
   char* const* argv;
   int streams[3];
   int folder;
+  SystemLimits limits;
   const std::vector<int>* open;  // open descriptors, for kernels before 5.9
   volatile int error = 0;        // set by the child, which shares this memory
 };
+
+// A lower limit that the user has set stays in force. At the first limit of the CPU time the program
+// receives SIGXCPU, and `beyond` seconds later SIGKILL.
+void limit(decltype(RLIMIT_CPU) what, rlim_t maximum, rlim_t beyond = 0) {
+  rlimit now = {};
+  getrlimit(what, &now);
+  now.rlim_cur = std::min(now.rlim_cur, maximum);
+  now.rlim_max = std::min(now.rlim_max, maximum + beyond);
+  setrlimit(what, &now);
+}
 
 // The child of vfork() shares memory with the suspended parent, so it may only make system calls.
 // All signals are blocked.
@@ -49,6 +62,10 @@ struct Plan {
     for (const int fd : *plan.open) close(fd);
     for (const int fd : moved) close(fd);
   }
+  limit(RLIMIT_NOFILE, kMaxOpenFiles);
+  limit(RLIMIT_CORE, 0);
+  if (plan.limits.cpu_s > 0) limit(RLIMIT_CPU, plan.limits.cpu_s, 1);
+  if (plan.limits.memory > 0) limit(RLIMIT_DATA, plan.limits.memory);
   // ...and pending ones are discarded by ignoring each signal once.
   for (int signal = 1; signal < NSIG; ++signal) {
     struct sigaction action = {};
@@ -67,7 +84,8 @@ struct Plan {
 
 }  // namespace
 
-pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int folder) {
+pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int folder,
+            const SystemLimits& limits) {
   std::vector<char*> args;
   for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
   std::string program = argv[0];
@@ -79,7 +97,7 @@ pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int 
   }
   args.push_back(nullptr);
   const std::vector<int> open = os::open_files(kFirstOther);
-  Plan plan{args.data(), {in, out, log}, folder, &open};
+  Plan plan{args.data(), {in, out, log}, folder, limits, &open};
 
   sigset_t all, before;
   sigfillset(&all);

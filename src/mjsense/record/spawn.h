@@ -6,6 +6,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -18,10 +19,19 @@ struct CannotStart : RuntimeError {
   using RuntimeError::RuntimeError;
 };
 
+// Limits of a program that the system enforces; 0: unlimited.
+struct SystemLimits {
+  std::uint64_t cpu_s = 0;   // CPU time in seconds
+  std::uint64_t memory = 0;  // bytes of data: heap, stacks of threads, private mappings
+};
+inline constexpr int kMaxOpenFiles = 256;  // of each program
+
 // Starts argv[0], searched in PATH, with these descriptors as stdin, stdout and stderr and no
 // others. The program leads a new process group and receives no signal that was sent to this
 // process' group, even one sent before it ran. Its signals have their default actions. `folder`:
-// open directory used as its working directory; -1: the current one. Throws CannotStart.
-pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int folder = -1);
+// open directory used as its working directory; -1: the current one. It and the programs that it
+// starts are limited by `limits` and kMaxOpenFiles, and leave no core file. Throws CannotStart.
+pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int folder = -1,
+            const SystemLimits& limits = {});
 
 }  // namespace mjsense::record

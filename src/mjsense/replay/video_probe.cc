@@ -25,7 +25,7 @@ record::ProcessLimits process_limits(const std::filesystem::path& path, double s
                                      std::size_t max_bytes) {
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(path, ignored);
-  return {silence_s, kMinSeconds + (ignored ? 0 : bytes / kBytesPerSecond), kMemory, max_bytes};
+  return {silence_s, {kMinSeconds + (ignored ? 0 : bytes / kBytesPerSecond), kMemory}, max_bytes};
 }
 
 // "-f mov -c:v h264 -i file:/data/x.mp4"

@@ -5,7 +5,6 @@
 #include <sched.h>
 #include <signal.h>
 #include <sys/eventfd.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -73,8 +72,6 @@ std::pair<Fd, Fd> make_pipe() {
   if (pipe2(ends, O_CLOEXEC) != 0) return {};
   return {Fd(ends[0]), Fd(ends[1])};
 }
-
-Fd memory_file(const char* name) { return Fd(memfd_create(name, MFD_CLOEXEC)); }
 
 Fd make_eventfd() { return Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); }
 

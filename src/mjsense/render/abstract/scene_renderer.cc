@@ -167,6 +167,8 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
 }
 
 void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool colored) {
+  // MuJoCo has not computed its pose: all its points are at one place.
+  if (std::all_of(geom.mat, geom.mat + 9, [](float x) { return x == 0; })) return;
   DrawnGeom out{};
   std::copy_n(geom.rgba, 4, out.rgba);
   // Some programs hide elements with a negative alpha. Depth and segmentation show all elements.
@@ -543,9 +545,7 @@ void SceneRenderer::read_camera(const SceneMemory& scene, int width, int height)
     if (!finite(camera.pos) || !finite(camera.forward) || !finite(camera.up) || !finite(frustum))
       throw ValueError("the scene's camera has a pose or field of view that is not finite");
   if (!(forward_length > 0) || !(up_length > 0) || !(near > 0))
-    throw ValueError(
-        "the scene's camera is not set: call update_scene() before render(), and "
-        "mujoco.mj_forward(model, data) before update_scene()");
+    throw ValueError("the scene's camera has no direction or near plane");
   if (half == 0)
     half = 0.5f * static_cast<float>(width) / static_cast<float>(height) * (top - bottom);
   for (int k = 0; k < 3; ++k) {
