@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _mujoco
+from mjsense._randomizable import check_randomizable, field_of
 from mjsense.configs import SceneCfg
 from mjsense.dataset import playback
 from mjsense.dataset.files import open_h5
@@ -86,7 +87,7 @@ class EpisodeWorlds:
             raise ValueError(f"{playback.where(episode)}: the recorded state has {stored} numbers, that of the model has {sim.state.shape[1]}. "
                              "An edit must not add joints, actuators or bodies.")  # fmt: skip
         for name in self._changed[world] - fields.keys():
-            self._write(world, name, np.array(getattr(sim.model, name)))
+            self._write(world, name, np.array(field_of(sim.model, name)))
         for name, values in fields.items():
             self._write(world, name, self._field(episode, name, values))
         self._changed[world] = set(fields)
@@ -94,12 +95,13 @@ class EpisodeWorlds:
         sim._core.model_changed([world], False)
 
     def _write(self, world: int, name: str, values: np.ndarray) -> None:
+        check_randomizable(self.sim.model, name)
         rows = self.sim._core.model_field(name).view(values.dtype)
         rows[world] = values.ravel()[: rows.shape[1]]  # of bvh_aabb a world has the boxes of bodies, not those of meshes
 
     def _field(self, episode: Episode, name: str, values: np.ndarray) -> np.ndarray:
         """A field of the model of an episode, with the rows of this scene."""
-        before, now = getattr(self._recorded, name), np.array(getattr(self.sim.model, name))
+        before, now = field_of(self._recorded, name), np.array(field_of(self.sim.model, name))
         if before.size != values.size:
             raise ValueError(f"{playback.where(episode)}: replay/model/{name} has {values.size} numbers, the field of the archived model {before.size}")
         values = values.reshape(before.shape)

@@ -113,11 +113,34 @@ def changed_fields(episode: Episode) -> list[str]:
         return list(file[episode.trajectory].get("replay/model", ()))
 
 
+def set_option(model: Any, name: str, values: np.ndarray) -> None:
+    """Sets ``opt.gravity``; NaN: the value that the model has."""
+    name = name.removeprefix("opt.")
+    now = np.atleast_1d(np.asarray(getattr(model.opt, name)))
+    values = np.where(np.isnan(values), now, values) if values.dtype.kind == "f" else values
+    setattr(model.opt, name, values if np.ndim(getattr(model.opt, name)) else values[0].item())
+
+
+def check_unchanged(episode: Episode) -> None:
+    """Raises ValueError if the model was written during the episode, which therefore cannot be simulated again."""
+    with open_h5(episode.path) as file:
+        group = file[episode.trajectory].get("replay", {})
+        names = group["changed"][:].tobytes().decode() if "changed" in group else ""
+    if names:
+        raise ValueError(
+            f"{where(episode)} cannot be simulated from its actions: {', '.join(names.split())} of the model changed during the episode, and the "
+            "recording has the values at its end"
+        )
+
+
 def model_of(episode: Episode) -> mujoco.MjModel:
     _require_mujoco()
     model = copy.deepcopy(archived_model(episode))
     with open_h5(episode.path) as file:
         for name, dataset in file[episode.trajectory].get("replay/model", {}).items():
+            if name.startswith("opt."):
+                set_option(model, name, dataset[:])
+                continue
             field = getattr(model, name)
             values = dataset[:].reshape(field.shape)
             field[:] = np.where(np.isnan(values), field, values) if values.dtype.kind == "f" else values
@@ -194,6 +217,8 @@ def replay_episode(
         raise ValueError(f"from_ is {from_!r}; it must be 'states' or 'actions'")
     if from_ == "actions" and episode._kept is not None:
         raise ValueError(f"{where(episode)} is trimmed; only the complete episode can be simulated from its actions")
+    if from_ == "actions":
+        check_unchanged(episode)
     states = episode.states
     model = model_of(episode) if model is None else model
     data = mujoco.MjData(model) if data is None else data
