@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from collections.abc import Sequence
 from functools import partial
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsense import _core, _mujoco, _show
+from mjsense import _core, _libmujoco, _mujoco, _show
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense._arrays import ids_of_worlds
 from mjsense._foreign_sensor import as_sensor
@@ -485,7 +484,19 @@ Simulation.__signature__ = inspect.Signature([*inspect.signature(Simulation.__in
 
 
 def warp_module(name: str) -> Any:
-    """A module of ``mjsense.warp``. Raises ImportError, with the extra, if mujoco_warp is not installed."""
+    """A module of ``mjsense.warp``. Raises ImportError, with the extra, if mujoco_warp is not installed or is of another series."""
+    import importlib.metadata  # slow to import
+
+    try:
+        found = importlib.metadata.version("mujoco-warp")
+    except importlib.metadata.PackageNotFoundError:
+        found = ""  # the import below says what is missing
+    series = ".".join(map(str, _libmujoco.SERIES))
+    if found and not found.startswith(f"{series}."):
+        raise ImportError(
+            f"backend='warp' needs mujoco-warp {series}, and {found} is installed, with {_libmujoco.installed()}: "
+            "pip install \"mjsense[warp]\" (in another environment if a package needs the installed one), or use backend='cpu'"
+        )
     try:
         return importlib.import_module(f"mjsense.warp.{name}")
     except ModuleNotFoundError as error:

@@ -11,11 +11,11 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from mjsense.dataset.model_xml import model_xml
 from tasks import Cart, Driver
 
 import mjsense as mjs
 from mjsense import _libmujoco, _mujoco_views, _options
-from mjsense.dataset.model_xml import model_xml
 
 WORLD = """
 <mujoco><option timestep=".002" density="1.2"/><worldbody><light name="l" pos="0 0 3"/><camera name="c" pos="0 -2 1" xyaxes="1 0 0 0 .4 .9"/>
@@ -317,7 +317,7 @@ def test_options_that_change_during_an_episode_are_named(tmp_path):
     report = mjs.check_replay(tmp_path)
     assert not report
     assert "cannot be simulated from its actions: opt.wind of the model changed during the episode" in repr(report)
-    with pytest.raises(ValueError, match="cannot be simulated from its actions: opt.wind of the model changed"):
+    with pytest.raises(ValueError, match=r"cannot be simulated from its actions: opt\.wind of the model changed"):
         list(mjs.Dataset(tmp_path).episodes[0].replay("actions"))
     assert len(list(mjs.Dataset(tmp_path).episodes[0].replay("states"))) == 13
 

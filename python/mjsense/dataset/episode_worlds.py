@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _mujoco
+from mjsense._options import PREFIX
 from mjsense._randomizable import check_randomizable, field_of
 from mjsense.configs import SceneCfg
 from mjsense.dataset import playback
@@ -95,7 +96,8 @@ class EpisodeWorlds:
         sim._core.model_changed([world], False)
 
     def _write(self, world: int, name: str, values: np.ndarray) -> None:
-        check_randomizable(self.sim.model, name)
+        if name.startswith(PREFIX):
+            check_randomizable(self.sim.model, name)
         rows = self.sim._core.model_field(name).view(values.dtype)
         rows[world] = values.ravel()[: rows.shape[1]]  # of bvh_aabb a world has the boxes of bodies, not those of meshes
 
