@@ -138,7 +138,7 @@ class Attached(KnownAttributes):
                 self._warned = True
                 warnings.warn(
                     f"attached sensors show data[{world}] at {before:g} s, and it is at {now:g} s: call update() after mj_step, or reset() when an "
-                    "episode has begun", RuntimeWarning, stacklevel=3,
+                    "episode has begun", RuntimeWarning, stacklevel=4,
                 )  # fmt: skip
                 return
 
