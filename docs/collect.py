@@ -2,9 +2,11 @@
 """MkDocs hook: adds the pages that live outside docs/ and expands `folder/*` in the navigation.
 
 The page of a sensor, task, policy or robot lies next to its code (src/mjsense/sensors/*/page.md and so on). CHANGELOG.md and
-CONTRIBUTING.md are read from the root of the repository.
+CONTRIBUTING.md are read from the root of the repository. Links in the sources lead to files of the repository, so that they work on a code
+host too; on the site they lead to its pages.
 """
 
+import os
 import pathlib
 import re
 
@@ -41,6 +43,39 @@ def with_site_links(text):
     return re.sub(r"\[([^\]]+)\]\((?!https?:)([\w./-]+/[\w./-]*|[A-Z]+\.md)\)", r"\1", text)
 
 
+def site_path(file):
+    """The page of the site that shows a file of the repository, given by its path in it; None: there is none."""
+    if file.startswith("docs/"):
+        return file.removeprefix("docs/")
+    for folder, root in FOLDERS.items():
+        inside = f"{(root / folder).relative_to(ROOT)}/"
+        if f"{file}/" == inside:
+            return f"{folder}/index.md"
+        if file.startswith(inside) and file.endswith("/page.md"):
+            return f"{folder}/{file.removeprefix(inside).removesuffix('/page.md')}.md"
+    for folder in SINGLE:
+        if file == f"{(SOURCE / folder).relative_to(ROOT)}/page.md":
+            return f"{folder}.md"
+    return None
+
+
+def linked(text, source):
+    """The text of a page, whose links to files lead to the pages of the site that show them."""
+    here = source.relative_to(ROOT)
+
+    def link(match):
+        target = os.path.normpath(here.parent / match[2])
+        page = site_path(target)
+        return match[0] if page is None else f"{match[1]}{os.path.relpath(page, os.path.dirname(site_path(str(here))))}"
+
+    return re.sub(r"""(\]\(|src=")(?!\w+:)([^)#\s"]+)""", link, text)
+
+
+def on_page_markdown(markdown, page, config, files):
+    source = ROOT / "docs" / page.file.src_uri
+    return linked(markdown, source) if source.exists() else markdown
+
+
 def expanded(nav, folders):
     """The navigation with `folder/*` replaced by the pages of the folder."""
     if isinstance(nav, list):
@@ -58,14 +93,14 @@ def on_files(files, config):
     for folder, root in FOLDERS.items():
         pages = sorted((root / folder).glob("*/page.md"))
         for page in pages:
-            add(f"{folder}/{page.parent.name}.md", page.read_text().replace("../../../../docs/", "../"))
+            add(f"{folder}/{page.parent.name}.md", linked(page.read_text(), page))
             for picture in sorted([*page.parent.glob("*.svg"), *page.parent.glob("*.png")]):
                 add(f"{folder}/{picture.name}", picture.read_bytes())
         rows = "".join(f"| [{title(page).split(':')[0]}]({page.parent.name}.md) | {description(page)} |\n" for page in pages)
         add(f"{folder}/index.md", f"# {folder.capitalize()}\n\n{INTRODUCTIONS[folder]}\n\n| page | summary |\n| --- | --- |\n{rows}")
         folders[folder] = [f"{folder}/index.md", *(f"{folder}/{page.parent.name}.md" for page in pages)]
     for folder in SINGLE:
-        add(f"{folder}.md", (SOURCE / folder / "page.md").read_text())
+        add(f"{folder}.md", linked((page := SOURCE / folder / "page.md").read_text(), page))
     for source, page in FROM_ROOT.items():
         add(page, with_site_links((ROOT / source).read_text()))
     config.nav = expanded(config.nav, folders)

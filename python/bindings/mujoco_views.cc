@@ -11,17 +11,21 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "mjsense/core/model_indices.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/compiled_model.h"
+#include "mjsense/scene/physics_options.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/mujoco_fields.h"
 
@@ -248,6 +252,29 @@ std::vector<std::string> setconst_inputs() {
   return names;
 }
 
+// Values of mjOption by name, in their order: of flags, the bits.
+nb::dict option_words() {
+  nb::dict words;
+  const auto add = [&](const char* option, const auto& names) {
+    nb::list list;
+    for (const std::string_view name : names) {
+      std::string word;
+      for (const char c : name) {
+        if (c != ' ') word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      }
+      list.append(word);
+    }
+    words[option] = nb::tuple(list);
+  };
+  add("integrator", kEnumNames<mjtIntegrator>);
+  add("cone", kEnumNames<mjtCone>);
+  add("solver", kEnumNames<mjtSolver>);
+  add("jacobian", kEnumNames<mjtJacobian>);
+  add("disableflags", std::span<const char* const>(mjDISABLESTRING, mjNDISABLE));
+  add("enableflags", std::span<const char* const>(mjENABLESTRING, mjNENABLE));
+  return words;
+}
+
 // Owns an mjModel or mjData that Python shows.
 template <class T, void (*destroy)(T*)>
 struct Owned {
@@ -297,6 +324,8 @@ void bind_mujoco_views(nb::module_& m) {
         "Fields of an mjData that every step moves.");
   m.def("setconst_inputs", &setconst_inputs,
         "Arrays of mjModel whose change requires mj_setConst.");
+  m.def("option_words", &option_words,
+        "Words of mjOption's enumerations and flags, by the name of the option.");
   m.def("name2id", [](std::uintptr_t model, int kind, const char* name) {
     return mj_name2id(reinterpret_cast<const mjModel*>(model), kind, name);
   });

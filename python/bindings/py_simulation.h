@@ -57,6 +57,8 @@ class SimulationLock {
     const Depth in(depth_);
     body();
   }
+  // From the body of a read(): whether it was called by code of a sensor, task or policy.
+  bool nested() const { return depth_ > 1; }
   // For code that runs inside the simulation. Must be called without the GIL.
   template <class Body>
   auto work(Body&& body) {
@@ -114,6 +116,8 @@ class PySimulation {
   void read(Body&& body) {
     sim_lock_->read([&] { body(open()); });
   }
+
+  bool nested() const { return sim_lock_->nested(); }
 
   sim::Simulation& open() const {
     if (!sim_) throw RuntimeError("the simulation is closed");

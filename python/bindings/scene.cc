@@ -16,6 +16,7 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/compiled_model.h"
+#include "mjsense/scene/resolve.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/mujoco_callbacks.h"
@@ -159,6 +160,9 @@ scene::SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors,
 }
 
 void bind_scene(nb::module_& m) {
+  m.def(
+      "check_obj_type", [](const std::string& type) { scene::obj_type(type, "ObjRef"); },
+      nb::arg("type"), "Raises if MuJoCo has no type of elements of this name.");
   m.def("check_cfg", &check_cfg, nb::arg("config"), "Raises if a configuration is wrong.");
   m.def(
       "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },

@@ -12,10 +12,14 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_indices.h"
+#include "mjsense/effects/effect_sensor.h"
 #include "mjsense/scene/mujoco_log.h"
+#include "mjsense/sensors/imu/imu_sensor.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/data_copies.h"
 #include "python/bindings/derived_field.h"
@@ -103,6 +107,47 @@ NumpyArray model_field(PySimulation& self, const std::string& name) {
   if (!data) throw ValueError("mjModel field '" + name + "' cannot have a value per world");
   const std::int64_t bytes = static_cast<std::int64_t>(size) * element;
   return to_numpy(ArrayView::dense(data, DType::kUint8, {worlds, bytes}), self.owner());
+}
+
+// Whether the sensor has resolved durations to physics steps when it was initialized.
+bool counts_steps(const Sensor& sensor) {
+  if (const auto* imu = dynamic_cast<const sensors::ImuSensor*>(&sensor)) return imu->has_errors();
+  return dynamic_cast<const effects::EffectSensor*>(&sensor) ||
+         (dynamic_cast<const sensors::RayCastSensor*>(&sensor) && sensor.wants_substep());
+}
+
+// Sets the duration of a physics step in all worlds, each of which must begin an episode.
+void set_timestep(PySimulation& self, double seconds) {
+  self.change("options.timestep", [&](sim::Simulation& sim) {
+    if (!(seconds > 0 && std::isfinite(seconds)))
+      throw ValueError(
+          fmt::format("timestep is {}: must be a positive number of seconds", seconds));
+    worlds::Worlds& worlds = sim.worlds();
+    for (int w = 0; w < sim.num_worlds(); ++w) {
+      if (worlds.substeps(w) != 0)
+        throw ValueError(fmt::format(
+            "timestep: world {} is at {:g} s of its episode, and the timestep can change only at "
+            "the beginning of an episode of all worlds: call reset() first",
+            w, worlds.time(w)));
+    }
+    for (const auto& sensor : sim.scene().sensors()) {
+      if (counts_steps(*sensor))
+        throw ValueError(fmt::format(
+            "timestep: the noise, delays or ray times of sensor '{}' are in steps of {:g} s: set "
+            "SceneCfg(options=MujocoCfg(timestep={:g})) before the scene is made",
+            sensor->name(), sim.model()->opt.timestep, seconds));
+    }
+    if (sim.model()->nhistory > 0)
+      throw ValueError(
+          "timestep: the model has sensors or actuators with a history, whose length is in steps");
+    auto* rows = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "opt.timestep", nullptr, nullptr));
+    if (!rows) throw RuntimeError("timestep: not enough memory");
+    std::fill_n(rows, sim.num_worlds(), seconds);
+    // The clocks of the worlds count steps of the batch's own copy of the model.
+    const_cast<mjModel*>(mjb_model(worlds.batch()))->opt.timestep = seconds;
+    worlds.model_changed();
+    for (const auto& sensor : self.python()) sensor->set_step_dt(sim.step_dt());
+  });
 }
 
 std::string_view kind_name(mjtGeom kind) {
@@ -231,6 +276,7 @@ void bind_simulation(nb::module_& m) {
           nb::arg("name"))
       .def("state", [](PySimulation& s) { return to_numpy(s.open().worlds().state(), s.owner()); })
       .def("model_field", &model_field, nb::arg("name"))
+      .def("set_timestep", &set_timestep, nb::arg("seconds"))
       .def(
           "derived_field",
           [](PySimulation& s, const std::string& name) {
@@ -254,6 +300,19 @@ void bind_simulation(nb::module_& m) {
             });
           },
           nb::arg("world_ids"), nb::arg("set_const"))
+      .def(
+          "options_changed",
+          [](PySimulation& s) {
+            bool nested = false;
+            s.read([&](sim::Simulation& sim) {
+              sim.worlds().model_changed();
+              nested = s.nested();
+            });
+            return !nested;
+          },
+          "Call after rows of mjOption were written. False if the simulation is running: the "
+          "values then take effect "
+          "at the next step.")
       .def(
           "copy_model",
           [](PySimulation& s) {

@@ -19,6 +19,8 @@ def main() -> int:
     # The program handles Ctrl-C itself, as it does outside of Python.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     words = sys.argv[1:]
+    if words[:1] == ["help"]:
+        words = [*words[1:], "--help"]
     if words and words[0] in commands.COMMANDS:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         return commands.run(words)

@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mjsense.errors import did_you_mean
+from mjsense.errors import did_you_mean, unexpected_keyword
 
 Seed = int
 """A non-negative int of 64 bits."""
@@ -154,7 +154,7 @@ def checked(target: T, owner: str = "", context: str = "") -> T:
                 check(value)
         for name, value in kwargs.items():
             if closed and name not in checks:
-                raise TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, checks)}")
+                raise unexpected_keyword(context, name, [one for one in checks if one != "self"])
             check = checks.get(name)
             if check is not None:
                 check(value)

@@ -29,8 +29,14 @@ class Config(KnownAttributes):
 
 
 class ObjRef(Config):
+    type: str
     name: str
     entity: str | None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.type:
+            _core.check_obj_type(self.type)
 
     @property
     def full_name(self) -> str:

@@ -7,8 +7,11 @@ The standard one compiles all methods at import. There are sixty configuration c
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any, TypeVar, dataclass_transform, overload
+
+from mjsense.errors import unexpected_keyword
 
 T = TypeVar("T", bound=type)
 
@@ -56,4 +59,19 @@ def _write(cls: type, frozen: bool) -> type:
     namespace.update(__annotations__={f.name: f.type for f in fields}, __module__=cls.__module__, __qualname__=cls.__qualname__, __doc__="-")
     if hasattr(cls, "__post_init__"):
         namespace["__post_init__"] = None  # the generated __init__ then calls __post_init__
-    return dataclasses.dataclass(frozen=frozen)(type(cls.__name__, (), namespace))
+    written = dataclasses.dataclass(frozen=frozen)(type(cls.__name__, (), namespace))
+    written.__init__ = _known_keywords(written.__init__, cls.__name__, [f.name for f in fields if f.init])
+    return written
+
+
+def _known_keywords(init: Callable[..., None], cls: str, names: list[str]) -> Callable[..., None]:
+    """An __init__ whose error for an unknown argument has the nearest names."""
+
+    @functools.wraps(init)
+    def __init__(self: Any, *args: Any, **kwargs: Any) -> None:
+        for name in kwargs:
+            if name not in names:
+                raise unexpected_keyword(f"{cls}()", name, names)
+        init(self, *args, **kwargs)
+
+    return __init__

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjsense import _mujoco
+from mjsense._options import PREFIX, check_option, check_option_values, option_values
 from mjsense._written_values import numbers
 
 _IDS = {"geom_matid": "nmat", "site_matid": "nmat", "flex_matid": "nmat", "skin_matid": "nmat", "tendon_matid": "nmat", "mat_texid": "ntex"}
@@ -32,23 +33,38 @@ _FIXED = {
 _NOT_NEGATIVE = {"body_mass", "body_inertia", "geom_size", "site_size"}
 
 
-def is_randomizable(like: np.ndarray, field: str) -> bool:
-    """Whether a field of the model, of this type, may differ between worlds."""
-    return field not in _FIXED if like.dtype.kind == "f" else field in _WHOLE
+def field_of(model: Any, field: str) -> Any:
+    """A field of the model, or an option, ``opt.gravity``, as an array; None if there is no such array."""
+    if not field.startswith(PREFIX):
+        return getattr(model, field, None)
+    value = getattr(model.opt, field.removeprefix(PREFIX), None)
+    return np.array(value, np.int32 if isinstance(value, int) else np.float64) if isinstance(value, (int, float, np.ndarray)) else None
+
+
+def is_randomizable(model: Any, field: str) -> bool:
+    """Whether worlds can have their own values of this field."""
+    try:
+        check_randomizable(model, field)
+    except ValueError:
+        return False
+    return isinstance(field_of(model, field), np.ndarray)
 
 
 def check_randomizable(model: Any, field: str) -> None:
     """Raises ValueError for a field that is the same in all worlds."""
+    if field.startswith(PREFIX):
+        return check_option(field.removeprefix(PREFIX))
     like = getattr(model, field, None)
     if not isinstance(like, np.ndarray):
         return  # Simulation.model_field() reports the available fields
-    if not is_randomizable(like, field):
+    if not (field not in _FIXED if like.dtype.kind == "f" else field in _WHOLE):
         raise ValueError(f"{field}: part of the model's structure, which is the same in all worlds")
 
 
 def valid_values(model: Any, field: str, values: Any, like: np.ndarray, worlds: np.ndarray) -> np.ndarray:
     """Values of a model field with the shape and dtype of `like`, a row for each of these worlds."""
-    given = numbers(field, values)
+    option = field.removeprefix(PREFIX) if field.startswith(PREFIX) else ""
+    given = numbers(field, option_values(option, values) if option else values)
     with np.errstate(invalid="ignore"):  # NaN has no integer
         typed = given.astype(like.dtype)
     if like.dtype.kind in "iu" and (different := typed != given).any():
@@ -60,6 +76,8 @@ def valid_values(model: Any, field: str, values: Any, like: np.ndarray, worlds: 
     if values.dtype.kind == "f" and not np.isfinite(values).all():
         place, value = _first(~np.isfinite(values), values, worlds)
         raise ValueError(f"{field}: values must be finite numbers; {place} is {value}")
+    if option:
+        check_option_values(option, values, field_of(model, field))
     if field in _NOT_NEGATIVE and (values < 0).any():
         place, value = _first(values < 0, values, worlds)
         raise ValueError(f"{field}: values must be at least 0; {place} is {value}")

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.errors import did_you_mean
+
 
 @dataclass(slots=True, frozen=True)
 class SensorData:
@@ -20,6 +22,10 @@ class SensorData:
             if getattr(self, f.name) is not None
         )
         return f"{type(self).__name__}({shown})"
+
+    def __getattr__(self, name: str) -> Any:  # names that are no fields
+        hint = "" if name[0] == "_" else did_you_mean(name, [f.name for f in fields(self)], "there are")
+        raise AttributeError(f"{type(self).__name__} has no attribute '{name}'{hint}")
 
 
 def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:

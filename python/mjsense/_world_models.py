@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core, _mujoco, _mujoco_views
-from mjsense._randomizable import bounds_of_meshes, check_randomizable, valid_values
+from mjsense import _core, _mujoco, _mujoco_views, _options
+from mjsense._randomizable import bounds_of_meshes, check_randomizable, field_of, valid_values
+from mjsense._read_only_model import read_only
 from mjsense.errors import did_you_mean
 
 if TYPE_CHECKING:
@@ -28,9 +29,9 @@ class WorldModels:
 
     @property
     def shared(self) -> mujoco.MjModel:
-        """A copy of the model that all worlds were made of."""
+        """A read-only copy of the model that all worlds were made of."""
         if self._shared is None:
-            self._shared = _mujoco_views.model_of(self._core.copy_model())
+            self._shared = read_only(_mujoco_views.model_of(self._core.copy_model()))
         return self._shared
 
     def of(self, world: int) -> mujoco.MjModel:
@@ -55,28 +56,43 @@ class WorldModels:
     def field(self, name: str) -> np.ndarray:
         """A field with one value per world, ``[B, ...]``, live."""
         if name not in self._fields or self._core.closed:
-            like = getattr(self.shared, name, None)
+            like = field_of(self.shared, name)
             if not isinstance(like, np.ndarray):
+                if name.startswith(_options.PREFIX):
+                    option = name.removeprefix(_options.PREFIX)
+                    raise AttributeError(f"MuJoCo has no option '{option}'{did_you_mean(option, _options.names(), 'there are')}")
                 arrays = [field for field in dir(self.shared) if isinstance(getattr(self.shared, field, None), np.ndarray)]
                 raise AttributeError(f"mjModel has no array '{name}'{did_you_mean(name, arrays)}")
             values = self._core.model_field(name)
             self._fields[name] = values.view(like.dtype).reshape(self._core.num_worlds, *like.shape)
         return self._fields[name]
 
+    def timestep_changed(self) -> None:
+        """Makes the copies have the new time step."""
+        self._shared = None
+        self.follow()
+
     def clear(self) -> None:
         """Forgets the live arrays."""
         self._fields.clear()
 
-    def randomize(self, field: str, values: Any, worlds: np.ndarray) -> None:
+    def randomize(self, field: str, values: Any, worlds: np.ndarray) -> bool:
         """Sets a field in these worlds, and what MuJoCo derives from it. If MuJoCo cannot use the values, nothing changes.
 
         Args:
             worlds: Ids of worlds, int ``[n]``.
+
+        Returns:
+            Whether derived quantities can be computed now: not while the simulation is running, when only options can be set.
         """
         check_randomizable(self.shared, field)
         target = self.field(field)
         before = target[worlds].copy()
         target[worlds] = valid_values(self.shared, field, values, before, worlds)
+        if field.startswith(_options.PREFIX):
+            ready = self._core.options_changed()
+            self.follow()
+            return ready
         if field == "geom_dataid":
             now = {name: self.field(name)[worlds] for name in ("geom_size", "geom_aabb", "geom_rbound")}
             for name, new in bounds_of_meshes(self.shared, target[worlds], now).items():
@@ -90,6 +106,7 @@ class WorldModels:
             named = re.sub(r"\bbody (\d+)", lambda match: f"body '{self.shared.body(int(match[1])).name}'", str(error))
             raise ValueError(f"{field}: {named}") from None
         self.follow()
+        return True
 
     def _changed(self, worlds: np.ndarray, has_derived: bool) -> None:
         """``has_derived``: MuJoCo derives values from what was written. It would give all meshes the radius that the shared model has."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -72,6 +73,7 @@ class Attached(KnownAttributes):
         self._seen = np.zeros_like(state)
         self._base = _foreign_model.values_of(self._sim.model, self._sim.model)
         self._edited = [{}] * len(self.datas)
+        self._warned = False
         self._complete = True
         if any(one is not self.models[0] for one in self.models):
             self._read_models("attach()")
@@ -113,6 +115,7 @@ class Attached(KnownAttributes):
     def __getitem__(self, name: str) -> Any:
         sensors = self.sensors
         if name in sensors:
+            self._warn_if_behind()
             return sensors[name]
         raise UnknownNameError(f"no sensor named '{name}' is attached{did_you_mean(str(name), sensors, 'there are')}")
 
@@ -127,6 +130,17 @@ class Attached(KnownAttributes):
 
     def _ipython_key_completions_(self) -> list[str]:
         return [*self.sensors]
+
+    def _warn_if_behind(self) -> None:
+        """Warns once if a sensor is asked for after a data was stepped, and before update()."""
+        for world, before in enumerate(self._times) if not self._warned else ():
+            if (now := self.datas[world].time) != before:
+                self._warned = True
+                warnings.warn(
+                    f"attached sensors show data[{world}] at {before:g} s, and it is at {now:g} s: call update() after mj_step, or reset() when an "
+                    "episode has begun", RuntimeWarning, stacklevel=4,
+                )  # fmt: skip
+                return
 
     @property
     def sensors(self) -> Mapping[str, Any]:
@@ -329,6 +343,8 @@ def attach(
             mujoco.mj_step(model, data)
             attached.update()
             attached["front"].data.rgb      # uint8 [1, H, W, 3]
+
+    Sensors show the states at the last update. The first ``attached["front"]`` after a step without an update warns.
 
     Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
     the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.

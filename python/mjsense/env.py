@@ -31,6 +31,7 @@ class TaskEnv(gymnasium.Env):
         self.action_space = worlds.single_action_space
         self.action_groups = worlds.action_groups
         """Columns of an action by move group."""
+        self._ended = ""
         self.sim = worlds.sim
         """The simulation, for reading only; the task writes its state."""
 
@@ -38,24 +39,31 @@ class TaskEnv(gymnasium.Env):
         """Starts the next episode; with a seed, the first episode of that seed."""
         super().reset(seed=seed)
         observation, _ = self.worlds.reset(seed=seed)
+        self._ended = ""
         return _row(observation, 0), {}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Performs one control step with the action ``[n]``: commands of the move groups; see :meth:`TaskVectorEnv.step`."""
+        self._check_running("step")
         return self._single(*self.worlds.step(numbers("action", action)[None]))
 
     def step_chunk(self, actions: Any, stop_on_success: bool = False) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Performs several control steps ``[steps, n]`` with one observation after the last; see
         :meth:`TaskVectorEnv.step_chunk`."""
+        self._check_running("step_chunk")
         return self._single(*self.worlds.step_chunk(numbers("actions", actions)[None], stop_on_success))
 
-    @staticmethod
+    def _check_running(self, call: str) -> None:
+        if self._ended:
+            raise gymnasium.error.ResetNeeded(f"{call}(): the episode has ended ({self._ended}): call reset() first")
+
     def _single(
-        observation: dict[str, Any], reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, infos: dict[str, Any]
+        self, observation: dict[str, Any], reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, infos: dict[str, Any]
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         info: dict[str, Any] = {"success": bool(infos["success"][0])}
         if "fault" in infos:
             info["fault"] = infos["fault"][0]
+        self._ended = "terminated" if terminated[0] else "truncated" if truncated[0] else ""
         return _row(observation, 0), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def expert_action(self) -> np.ndarray:

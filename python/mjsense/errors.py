@@ -17,6 +17,11 @@ class UnknownNameError(KeyError):
         return printable(str(self.args[0])) if self.args else ""
 
 
+def unexpected_keyword(context: str, name: str, known: Iterable[str]) -> TypeError:
+    """The error for an argument that ``context``, such as ``make_vec()``, does not have."""
+    return TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, [one for one in known if one[0] != '_'], 'it takes')}")
+
+
 def did_you_mean(name: str, known: Iterable[str], listing: str = "") -> str:
     """The end of a message about an unknown name: ``"; did you mean 'qpos' or 'qvel'?"``.
 
@@ -25,7 +30,10 @@ def did_you_mean(name: str, known: Iterable[str], listing: str = "") -> str:
             these words the result is then empty.
     """
     known = list(dict.fromkeys(known))
-    if near := difflib.get_close_matches(name, known, 3):
+    spellings: dict[str, list[str]] = {}  # the case of letters is the most frequent mistake
+    for one in known:
+        spellings.setdefault(one.lower(), []).append(one)
+    if near := [one for lower in difflib.get_close_matches(name.lower(), spellings, 3) for one in spellings[lower]][:3]:
         return f"; did you mean {' or '.join(map(repr, near))}?"
     names = [*known[:40], "..."] if len(known) > 40 else known or ["none"]
     return f"; {listing} {', '.join(names)}" if listing else ""

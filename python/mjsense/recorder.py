@@ -155,6 +155,8 @@ class Recorder(KnownAttributes):
             raise RuntimeError("append: the recorder is complete; it takes no more rows")
         worlds = self._num_worlds
         ids = [w for w in range(worlds) if self.recording(w)] if world_ids is None else ids_of_worlds(world_ids, worlds).tolist()
+        if world_ids is None and not ids:
+            raise RuntimeError("append: no world records an episode: call begin_episode(world, episode) first")
 
         def column(name: str, value: Any, dtype: Any) -> list[Any]:
             array = np.asarray(value, dtype)

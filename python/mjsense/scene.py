@@ -15,6 +15,7 @@ import numpy as np
 from mjsense import _core, _mujoco, _mujoco_views, _show
 from mjsense._arguments import KnownAttributes, checked
 from mjsense._foreign_sensor import as_sensor
+from mjsense._read_only_model import read_only
 from mjsense.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
@@ -249,8 +250,8 @@ class Scene(KnownAttributes):
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """A copy of the compiled model for look-ups. Changing it does not affect any simulation."""
-        return _mujoco_views.model_of(self._core.copy_model())
+        """A read-only copy of the compiled model, for look-ups and MuJoCo's functions. ``copy.copy(scene.model)`` can be changed."""
+        return read_only(_mujoco_views.model_of(self._core.copy_model()))
 
     def to_xml(self) -> str:
         """MJCF that compiles to the same model. If ``assets()`` is not empty, write its files to the same folder."""

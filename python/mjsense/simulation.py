@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from collections.abc import Sequence
 from functools import partial
@@ -12,10 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsense import _core, _mujoco, _show
+from mjsense import _core, _libmujoco, _mujoco, _show
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense._arrays import ids_of_worlds
 from mjsense._foreign_sensor import as_sensor
+from mjsense._options import Options
 from mjsense._world_models import WorldModels
 from mjsense._written_values import numbers, write_component
 from mjsense.derived_fields import DerivedFields
@@ -65,6 +65,8 @@ class Simulation(KnownAttributes):
         step_dt: Duration of a control step, s.
     """
 
+    _stepped_elsewhere = False
+
     def __new__(cls, *args: Any, backend: str = "cpu", **options: Any) -> Simulation:
         return _on_warp(*args, **options) if backend == "warp" else super().__new__(cls)
 
@@ -107,6 +109,7 @@ class Simulation(KnownAttributes):
         """
         self = cls.__new__(cls)
         self._core = core
+        self._stepped_elsewhere = True
         scene = Scene._of(core.scene(), prepared)
         scene._simulation = core
         self._adopt(scene, view)
@@ -299,9 +302,22 @@ class Simulation(KnownAttributes):
 
     @property
     def model(self) -> mujoco.MjModel:
-        """A copy of the simulated model for look-ups. It does not contain values that differ between worlds; see
-        :meth:`model_of`."""
+        """A read-only copy of the simulated model, for look-ups and MuJoCo's functions. It does not contain values that differ between
+        worlds: see :meth:`model_of`; and :attr:`options` and :meth:`randomize` for changes. ``copy.copy(sim.model)`` can be changed."""
         return self._models.shared
+
+    @property
+    def options(self) -> Options:
+        """Gravity, wind, flags and the other physics options of the running simulation: ``sim.options.gravity = (0, 0, -1.62)``."""
+        return Options(self)
+
+    def _set_timestep(self, seconds: float) -> None:
+        """See :attr:`Options.timestep`."""
+        if self._stepped_elsewhere:
+            raise ValueError("timestep: it cannot change in environments and recordings, whose control periods are multiples of it; set sim_dt_ms")
+        self._core.set_timestep(seconds)
+        self.physics_dt, self.step_dt = self._core.physics_dt, self._core.step_dt
+        self._models.timestep_changed()
 
     def model_of(self, world: int) -> mujoco.MjModel:
         """A copy of the model with the values of one world: those set by :meth:`randomize`, and the sizes, furniture, lights and
@@ -325,15 +341,15 @@ class Simulation(KnownAttributes):
         return self._core.seed
 
     def randomize(self, field: str, values: Any, world_ids: Sequence[int] | None = None) -> None:
-        """Sets a field of the model per world: ``randomize("geom_friction", values)``.
+        """Sets a field of the model per world: ``randomize("geom_friction", values)``, or an option, ``randomize("opt.gravity", values)``.
 
         Values have the shape ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field, rays and images
         follow. Raises ValueError for fields that cannot differ between worlds (meshes, height fields, texture pixels), for a
         wrong shape, for values that are not finite, and for those that MuJoCo cannot use.
         """
         worlds = np.arange(self.num_worlds)
-        self._models.randomize(field, values, worlds[self._rows(world_ids)])
-        self.forward(world_ids)
+        if self._models.randomize(field, values, worlds[self._rows(world_ids)]):
+            self.forward(world_ids)
 
     def model_field(self, name: str) -> np.ndarray:
         """A field of the model with one value per world, ``[B, ...]``, live; see :meth:`randomize`."""
@@ -468,7 +484,19 @@ Simulation.__signature__ = inspect.Signature([*inspect.signature(Simulation.__in
 
 
 def warp_module(name: str) -> Any:
-    """A module of ``mjsense.warp``. Raises ImportError, with the extra, if mujoco_warp is not installed."""
+    """A module of ``mjsense.warp``. Raises ImportError, with the extra, if mujoco_warp is not installed or is of another series."""
+    import importlib.metadata  # slow to import
+
+    try:
+        found = importlib.metadata.version("mujoco-warp")
+    except importlib.metadata.PackageNotFoundError:
+        found = ""  # the import below says what is missing
+    series = ".".join(map(str, _libmujoco.SERIES))
+    if found and not found.startswith(f"{series}."):
+        raise ImportError(
+            f"backend='warp' needs mujoco-warp {series}, and {found} is installed, with {_libmujoco.installed()}: "
+            "pip install \"mjsense[warp]\" (in another environment if a package needs the installed one), or use backend='cpu'"
+        )
     try:
         return importlib.import_module(f"mjsense.warp.{name}")
     except ModuleNotFoundError as error:

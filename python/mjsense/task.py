@@ -14,6 +14,7 @@ from mjsense._arguments import checked
 from mjsense._arrays import on_host
 from mjsense._foreign_sensor import list_of_sensors
 from mjsense._written_values import numbers, write_component
+from mjsense.errors import did_you_mean
 from mjsense.scene import prepared
 
 if TYPE_CHECKING:
@@ -407,4 +408,7 @@ def task_of(task: Any) -> tuple[str, Task | None]:
         task = task()
     if not isinstance(task, Task):
         raise TypeError(f"task must be a mjsense.Task or the name of one ({', '.join(task_names())}), not {task!r}")
+    if type(task).evaluate is Task.evaluate:
+        own = [name for name in dir(task) if name[0] != "_" and name not in dir(Task)]
+        raise TypeError(f"{type(task).__name__} has no method evaluate(sim), which returns reward and success{did_you_mean('evaluate', own)}")
     return task._mjs_name(), task

@@ -446,6 +446,8 @@ def make_vec(
         njmax: With warp: constraint rows for which each world has memory.
     """
     options = dict(locals())
+    if num_envs < 1:
+        raise ValueError(f"make_vec(): num_envs is {num_envs}: must be at least 1")
     _check_backend(options)
     for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space", "backend"):
         del options[name]

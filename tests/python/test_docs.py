@@ -45,6 +45,17 @@ def test_every_block_is_in_a_language_that_is_tested():
         assert page.read_text().count("\n```") == 2 * len(known), page
 
 
+def test_relative_links_lead_to_files_of_the_repository():
+    """As a code host shows the pages. docs/collect.py rewrites the links for the site, whose builder checks them."""
+    dead = []
+    for page in PAGES:
+        text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+        for target in re.findall(r"""(?:\]\(|src=")(?!\w+:)([^)#\s"]+)""", text):
+            if not (page.parent / target).exists():
+                dead.append(f"{page.relative_to(ROOT)}: {target}")
+    assert not dead, "\n".join(dead)
+
+
 class Viewer:
     """MuJoCo's viewer, closed by its user after two frames."""
 

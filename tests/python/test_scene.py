@@ -99,9 +99,10 @@ def test_env_origins():
     )
 
 
-def test_model_copy_is_independent():
+def test_a_write_to_the_model_is_refused():
     scene = ball_scene()
-    scene.model.opt.timestep = 1.0
+    with pytest.raises(AttributeError, match=r"the model is read-only.*SceneCfg\(options=MujocoCfg\(timestep=value\)\) before"):
+        scene.model.opt.timestep = 1.0
     assert mjs.Simulation(scene).physics_dt == 0.002
 
 

@@ -23,7 +23,7 @@ from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, g
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.places import printable
 from mjsense.dataset.remote import resolved
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
 
@@ -138,7 +138,7 @@ class Dataset:
         if not 0 <= i < len(self):
             raise IndexError(f"index {index} is out of range: {self.root} has {len(self)} observations")
         episode, t = self._place(i)
-        sample: dict[str, Any] = {}
+        sample: dict[str, Any] = Sample()
         arrays = episode._load_recorded(self._arrays)
         for name in self._arrays:
             rows, _ = self._rows(name, episode, t)
@@ -325,6 +325,23 @@ def _matches(outcome: str, wanted: str | Iterable[str] | Callable[[str], bool]) 
     return any(outcome == one or fnmatch.fnmatchcase(outcome, one) for one in ([wanted] if isinstance(wanted, str) else wanted))
 
 
+class Sample(dict[str, Any]):
+    """An observation of a data set: its values by stream. The error for a name that is missing has the nearest names."""
+
+    def __missing__(self, name: str) -> Any:
+        raise UnknownNameError(f"the observation has no '{name}'{_nearest(name, self)}")
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """The end of a message about an unknown stream: those with the same last part come first."""
+    known = list(known)
+    near = difflib.get_close_matches(name, known, 3)
+    same_end = [stream for stream in known if stream.endswith(f"/{name}")]
+    if not near and not same_end:
+        return did_you_mean(name, known, "it has")
+    return f"; did you mean {', '.join(repr(n) for n in dict.fromkeys([*same_end, *near]))}?"
+
+
 def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
     """The streams that a name, a group or a pattern stands for."""
     if name in known:
@@ -332,10 +349,7 @@ def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
     found = [stream for stream in known if stream.startswith(f"{name}/")] or fnmatch.filter(known, name)
     if not found:
         groups = {"/".join(stream.split("/")[:n]) for stream in known for n in range(1, stream.count("/") + 1)}
-        near = difflib.get_close_matches(name, [*known, *groups], 3)
-        same_end = [stream for stream in [*known, *groups] if stream.endswith(f"/{name}")]
-        hint = f"; did you mean {', '.join(repr(n) for n in dict.fromkeys([*same_end, *near]))}?" if near or same_end else ""
-        raise UnknownNameError(f"No stream, group or pattern '{name}'{hint}")
+        raise UnknownNameError(f"No stream, group or pattern '{name}'{_nearest(name, [*known, *groups])}")
     return found
 
 
@@ -343,6 +357,7 @@ def _steps(name: str, seconds: Sequence[float], fps: Fraction, tolerance_s: floa
     steps = [round(float(s) * float(fps)) for s in seconds]
     off = [s for s, n in zip(seconds, steps) if abs(float(s) - n / float(fps)) > tolerance_s]
     if off:
+        nearest = round(off[0] * float(fps)) or (1 if off[0] > 0 else -1)
         raise ValueError(f"delta_timestamps['{name}']: {off[0]} s is not a multiple of 1/fps = {float(1 / fps):.6f} s within {tolerance_s} s; "
-                         f"use n / dataset.fps, such as {float(round(off[0] * float(fps)) / fps):.6f}")  # fmt: skip
+                         f"use n / dataset.fps, such as {nearest} / dataset.fps = {float(nearest / fps):.6f} s")  # fmt: skip
     return steps

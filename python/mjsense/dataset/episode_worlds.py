@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _mujoco
+from mjsense._randomizable import field_of
 from mjsense.configs import SceneCfg
 from mjsense.dataset import playback
 from mjsense.dataset.archive import MODEL_FILE, read_archive
@@ -88,7 +89,7 @@ class EpisodeWorlds:
                              "An edit must not add joints, actuators or bodies.")  # fmt: skip
         check_inputs(playback.inputs_of(episode), self._recorded, stored, playback.substeps_of(episode, self._recorded), playback.where(episode))
         for name in self._changed[world] - fields.keys():
-            self._write(world, name, np.array(getattr(sim.model, name)))
+            self._write(world, name, np.array(field_of(sim.model, name)))
         for name, values in fields.items():
             self._write(world, name, self._field(episode, name, values))
         self._changed[world] = set(fields)
@@ -101,7 +102,7 @@ class EpisodeWorlds:
 
     def _field(self, episode: Episode, name: str, values: np.ndarray) -> np.ndarray:
         """A field of the model of an episode, with the rows of this scene."""
-        before, now = getattr(self._recorded, name), np.array(getattr(self.sim.model, name))
+        before, now = np.atleast_1d(field_of(self._recorded, name)), np.array(np.atleast_1d(field_of(self.sim.model, name)))
         if values.dtype.kind == "f":
             values = np.where(np.isnan(values), before, values)
         if name in _LIGHT:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense._mujoco import Joint
-from mjsense._randomizable import is_randomizable, valid_values
+from mjsense._options import PREFIX
+from mjsense._randomizable import field_of, is_randomizable, valid_values
 
 if TYPE_CHECKING:
     import mujoco
@@ -53,9 +54,10 @@ def check_model_fields(fields: Mapping[str, Any], model: mujoco.MjModel, about: 
 
 
 def _checked(name: str, dataset: Any, model: mujoco.MjModel, place: str) -> np.ndarray:
-    like = getattr(model, name, None) if name.startswith((*_PARTS, _BOXES)) else None
-    if not isinstance(like, np.ndarray) or (name != _BOXES and not is_randomizable(like, name)):
+    like = field_of(model, name) if name.startswith((*_PARTS, _BOXES, PREFIX)) else None
+    if not isinstance(like, np.ndarray) or (name != _BOXES and not is_randomizable(model, name)):
         raise ValueError(f"{place}: no field of a model that may differ between episodes")
+    like = np.atleast_1d(like)  # scalars of mjOption are stored as one number
     if not hasattr(dataset, "dtype"):
         raise ValueError(f"{place}: is a group, expected an array of {like.dtype}")
     shape = tuple(dataset.shape)

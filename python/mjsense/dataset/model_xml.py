@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _libmujoco
+from mjsense._randomizable import field_of
 from mjsense.dataset import playback
 from mjsense.dataset.archive import MODEL_FILE, read_archive
 from mjsense.dataset.closed_model import closed_model
@@ -61,6 +62,9 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
             if model.geom_type[geom.id] == _MESH:
                 _write_mesh_geom(geom, model)
     for field in changed:
+        if field.startswith("opt."):
+            setattr(spec.option, field.removeprefix("opt."), getattr(model.opt, field.removeprefix("opt.")))
+            continue
         prefix, _, name = field.partition("_")
         new, old = getattr(model, field), getattr(archived, field)
         for element in getattr(spec, _ELEMENTS.get(prefix, ""), ()):
@@ -78,7 +82,7 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
                 _set(element, _RENAMED.get(field, name), new[i])
     result = _exact_xml(spec)
     compiled = mujoco.MjModel.from_xml_string(result, assets)
-    if wrong := [field for field in changed if not np.allclose(getattr(compiled, field), getattr(model, field), rtol=1e-5, atol=1e-8)]:
+    if wrong := [field for field in changed if not np.allclose(field_of(compiled, field), field_of(model, field), rtol=1e-5, atol=1e-8)]:
         raise ValueError(f"episode {episode.index}: MJCF cannot express its {', '.join(wrong)}")
     return result, assets
 

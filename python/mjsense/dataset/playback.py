@@ -14,7 +14,7 @@ import numpy as np
 from mjsense import _libmujoco
 from mjsense.dataset.archive import read_archive
 from mjsense.dataset.closed_model import compile_closed
-from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.hdf5 import open_h5, text_of
 from mjsense.dataset.model_fields import INPUTS, check_inputs, check_model_fields, read_input
 
 if TYPE_CHECKING:
@@ -97,10 +97,33 @@ def changed_fields(episode: Episode) -> list[str]:
         return list(file[episode.trajectory].get("replay/model", ()))
 
 
+def set_option(model: Any, name: str, values: np.ndarray) -> None:
+    """Sets ``opt.gravity``; NaN: the value that the model has."""
+    name = name.removeprefix("opt.")
+    now = np.atleast_1d(np.asarray(getattr(model.opt, name)))
+    values = np.where(np.isnan(values), now, values) if values.dtype.kind == "f" else values
+    setattr(model.opt, name, values if np.ndim(getattr(model.opt, name)) else values[0].item())
+
+
+def check_unchanged(episode: Episode) -> None:
+    """Raises ValueError if the model was written during the episode, which therefore cannot be simulated again."""
+    with open_h5(episode.path) as file:
+        dataset = file[episode.trajectory].get("replay/changed")
+        names = "" if dataset is None else text_of(dataset[()])
+    if names:
+        raise ValueError(
+            f"{where(episode)} cannot be simulated from its actions: {', '.join(names.split())} of the model changed during the episode, and the "
+            "recording has the values at its end"
+        )
+
+
 def model_of(episode: Episode) -> mujoco.MjModel:
     _require_mujoco()
     model = copy.deepcopy(archived_model(episode))
     for name, values in fields_of(episode, model).items():
+        if name.startswith("opt."):
+            set_option(model, name, values)
+            continue
         field = getattr(model, name)
         field[...] = np.where(np.isnan(values), field, values) if values.dtype.kind == "f" else values
     check_inputs(inputs_of(episode), model, mujoco.mj_stateSize(model, STATE), substeps_of(episode, model), where(episode))
@@ -187,6 +210,8 @@ def replay_episode(
         raise ValueError(f"from_ is {from_!r}; it must be 'states' or 'actions'")
     if from_ == "actions" and episode._kept is not None:
         raise ValueError(f"{where(episode)} is trimmed; only the complete episode can be simulated from its actions")
+    if from_ == "actions":
+        check_unchanged(episode)
     states = episode.states
     model = model_of(episode) if model is None else model
     data = mujoco.MjData(model) if data is None else data

@@ -17,7 +17,7 @@ from mjsense._progress import counter
 from mjsense.dataset.dataset import Dataset, opened
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode_worlds import OwnStepper
-from mjsense.dataset.playback import Stepper, inputs_of, model_of
+from mjsense.dataset.playback import Stepper, check_unchanged, inputs_of, model_of
 from mjsense.dataset.sensor_check import SensorCheck, check_sensors
 
 if TYPE_CHECKING:
@@ -57,6 +57,8 @@ class EpisodeCheck:
     """The same if only the first state is set."""
     sensors: SensorCheck | None = None
     """Comparison of the sensors; None: not compared."""
+    refused: str = ""
+    """Why the episode cannot be simulated."""
 
     @property
     def deviations(self) -> dict[str, Deviation]:
@@ -66,8 +68,8 @@ class EpisodeCheck:
 
     @property
     def ok(self) -> bool:
-        """Whether everything that was compared is equal bit for bit."""
-        return not self.deviations
+        """Whether everything that was compared is equal bit for bit, and the episode can be simulated."""
+        return not self.deviations and not self.refused
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ class ReplayReport:
                     reasons.setdefault(reason, set()).add(name)
             lines += [f"not computed: {', '.join(sorted(names))}: {reason}" for reason, names in sorted(reasons.items())]
         for e in self.episodes:
-            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()]
+            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()] + [f"  {e.refused}"] * bool(e.refused)
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -150,7 +152,12 @@ def _stepper(episode: Episode) -> Stepper:
 
 
 def check_episode(episode: Episode) -> EpisodeCheck:
-    states, stepper = inputs_of(episode).state, _stepper(episode)
+    states = inputs_of(episode).state
+    try:
+        check_unchanged(episode)
+    except ValueError as error:
+        return EpisodeCheck(episode.index, episode.length - 1, refused=str(error))
+    stepper = _stepper(episode)
     found: dict[str, Any] = {"stepwise": None, "open_loop": None}
     for how in found:
         state = states[0]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ import warp as wp
 from mjsense import _mujoco
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense._arrays import ids_of_worlds, on_host
+from mjsense._options import PREFIX
 from mjsense._randomizable import check_randomizable, valid_values
 from mjsense.errors import did_you_mean
 from mjsense.sensor import Sensor
@@ -78,7 +80,7 @@ class WarpSimulation(KnownAttributes):
         with wp.ScopedDevice(self._device):
             builtin.check_types(model)
             try:
-                self._model = mjw.put_model(model)
+                self._model = mjw.put_model(copy.copy(model))  # that of the simulation is read-only
             except NotImplementedError as error:
                 raise ValueError(f"the model is not available with backend='warp': {error}") from None
             self._model.opt.warn_overflow = 0
@@ -348,6 +350,8 @@ class WarpSimulation(KnownAttributes):
         differ; for others the error lists them.
         """
         self._check_open()
+        if field.startswith(PREFIX):
+            raise NotImplementedError(f"randomize('{field}') is not available with backend='warp': set SceneCfg(options=...), or use backend='cpu'")
         check_randomizable(self._compiled.model, field)
         self._models.array(field)
         for sensor in self._sensors.by_name.values():

@@ -347,6 +347,11 @@ int run(int argc, char** argv, std::span<const OtherCommand> others) {
     print_stderr("{}", program.help());
     return kWrongInput;
   }
+  if (argv[1] == std::string_view("help")) {  // "help record" is "record --help"
+    static char option[] = "--help";
+    std::rotate(argv + 1, argv + 2, argv + argc);
+    argv[argc - 1] = option;
+  }
   const std::string word = argv[1];
   if (word.starts_with('-')) {
     // CLI11 would report a missing command first.

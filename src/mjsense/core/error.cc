@@ -29,6 +29,11 @@ int distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
+bool same_without_case(std::string_view a, std::string_view b) {
+  return std::ranges::equal(
+      a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
 }  // namespace
 
 std::vector<std::string> nearest_names(std::string_view name,
@@ -43,6 +48,7 @@ std::vector<std::string> nearest_names(std::string_view name,
     // A name with an additional prefix, or one without its prefix, also counts as near.
     if (!name.empty() && c.size() > name.size() && c.ends_with(name)) d = 2;
     if (!c.empty() && name.size() > c.size() && name.ends_with(c)) d = 2;
+    if (same_without_case(name, c)) d = std::min(d, 1);
     if (d <= static_cast<int>(std::max<std::size_t>(2, 2 * std::max(name.size(), c.size()) / 3))) {
       scored.emplace_back(d, c);
     }

@@ -51,6 +51,11 @@ std::vector<EpisodeArray> differing_fields(const mjModel& world, const mjModel& 
 #define X(type, name, rows, columns) add(#name, world.name, m->name, m->rows, columns, out);
   MJMODEL_POINTERS
 #undef X
+#define X(type, name, size) add("opt." #name, &world.opt.name, &m->opt.name, size, 1, out);
+#define XVEC(type, name, size) add("opt." #name, world.opt.name, m->opt.name, size, 1, out);
+  MJOPTION_FIELDS
+#undef XVEC
+#undef X
   return out;
 }
 

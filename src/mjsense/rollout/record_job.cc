@@ -65,6 +65,7 @@ class RecordJob {
         rollout_(rollout_cfg(cfg_)),
         recorder_(recording_cfg(cfg_, rollout_, stop)),
         lengths_(rollout_.num_worlds(), 0),
+        begun_(rollout_.num_worlds()),
         next_(recorder_.first_attempt()),
         end_(next_ + (cfg_.num_attempts > 0   ? cfg_.num_attempts
                       : cfg_.max_attempts > 0 ? cfg_.max_attempts
@@ -165,6 +166,7 @@ class RecordJob {
     if (worlds_.empty()) return false;
     rollout_.start(worlds_, episodes_);
     for (std::size_t k = 0; k < worlds_.size(); ++k) {
+      if (rollout_.replay_sensor()) begun_[worlds_[k]] = own_values(worlds_[k]);
       timed([&] {
         recorder_.begin_episode(worlds_[k], {.episode = episodes_[k], .seed = rollout_.cfg().seed});
       });
@@ -224,13 +226,55 @@ class RecordJob {
     --running_;
   }
 
+  // The values of the model that differ between worlds.
+  std::vector<record::EpisodeArray> own_values(int w) {
+    sim::Simulation& simulation = rollout_.simulation();
+    return record::differing_fields(simulation.model_of(w), *simulation.model());
+  }
+
+  // The fields of the model that were written during the episode of world w, "opt.wind geom_rgba".
+  std::string changed_fields(int w) {
+    const std::vector<record::EpisodeArray> now = own_values(w);
+    std::string names;
+    const auto missing = [&](const record::EpisodeArray& array,
+                             const std::vector<record::EpisodeArray>& others) {
+      return std::ranges::none_of(others, [&](const record::EpisodeArray& other) {
+        return other.path == array.path && other.values == array.values;
+      });
+    };
+    const auto add = [&](const record::EpisodeArray& array) {
+      const std::string name = array.path.substr(std::string_view("model/").size());
+      if ((" " + names + " ").find(" " + name + " ") == std::string::npos)
+        names += (names.empty() ? "" : " ") + name;
+    };
+    for (const record::EpisodeArray& array : now) {
+      if (missing(array, begun_[w])) add(array);
+    }
+    for (const record::EpisodeArray& array : begun_[w]) {
+      if (missing(array, now)) add(array);
+    }
+    return names;
+  }
+
   // Data for replay that does not depend on the step: the model's arrays of world w that differ from
-  // the archived model, and the free joints of absent objects, which are held at rest.
+  // the archived model, the names of those that were written during the episode, and the free joints
+  // of absent objects, which are held at rest.
   std::vector<record::EpisodeArray> replay_arrays(int w) {
     if (!rollout_.replay_sensor()) return {};
     sim::Simulation& simulation = rollout_.simulation();
     std::vector<record::EpisodeArray> arrays =
         record::differing_fields(simulation.model_of(w), *rollout_.task().model());
+    if (const std::string changed = changed_fields(w); !changed.empty()) {
+      const auto text = std::as_bytes(std::span(changed));
+      arrays.push_back({"changed",
+                        "Fields of the model that were written during the episode, which therefore "
+                        "cannot be simulated again. model/ has the values at its end.",
+                        "",
+                        "",
+                        DType::kUint8,
+                        {static_cast<std::int64_t>(changed.size())},
+                        {text.begin(), text.end()}});
+    }
     const std::vector<int> held = simulation.worlds().held(w);
     const auto bytes = std::as_bytes(std::span(held));
     if (!held.empty())
@@ -270,6 +314,7 @@ class RecordJob {
   RecordProgress progress_;
   RecordSummary summary_;
   std::vector<int> lengths_;  // observations recorded of each world's current episode
+  std::vector<std::vector<record::EpisodeArray>> begun_;  // own_values() at the beginning, by world
   std::vector<int> worlds_;
   std::vector<std::int64_t> episodes_;
   std::int64_t next_, end_;  // the next attempt, and the one after the last

@@ -22,10 +22,15 @@ void check_entity(const Scene* scene, std::string_view entity, std::string_view 
 mjtObj obj_type(std::string_view name, std::string_view context) {
   if (const int type = mju_str2Type(std::string(name).c_str()); type > 0)
     return static_cast<mjtObj>(type);
+  std::vector<std::string> known;
+  for (int type = 1; type < mjNOBJECT; ++type) {
+    if (const char* word = mju_type2Str(type)) known.emplace_back(word);
+  }
+  const bool near = !nearest_names(name, known, 1).empty();
   throw ValueError(fmt::format(
       "{}: unknown object type '{}'; known: body, xbody, joint, geom, site, camera, light, tendon, "
-      "actuator, sensor, mesh, hfield, ...",
-      context, name));
+      "actuator, sensor, mesh, hfield, ...{}",
+      context, name, near ? suggest(name, known) : ""));
 }
 
 std::string obj_type_name(mjtObj type) {

@@ -69,9 +69,9 @@ class Worlds {
   int size() const { return num_worlds_; }
   int threads() const;
   const mjModel* model() const;
-  // The model with the values of this world in the arrays that differ between worlds (options are
-  // those of the model). It owns no memory (do not call mj_deleteModel) and is valid as long as the
-  // worlds are.
+  // The model with the values of this world in the arrays and options that differ between worlds. It
+  // owns no memory (do not call mj_deleteModel) and is valid as long as the worlds are, its options
+  // until they are written.
   mjModel model_of(int world) const;
   // Writes this world's values into `copy`, a copy of model().
   void write_model(int world, mjModel* copy) const;

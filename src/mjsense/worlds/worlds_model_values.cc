@@ -6,6 +6,26 @@
 #include "mjsense/worlds/worlds.h"
 
 namespace mjsense::worlds {
+namespace {
+
+// Writes the values that this world has in a field of its own, if it has any.
+void write_row(mjBatch* batch, int world, const char* field, void* to) {
+  int size = 0, element = 0;
+  const auto* rows = static_cast<const char*>(mjb_expanded(batch, field, &size, &element));
+  if (rows == nullptr) return;
+  const std::size_t bytes = static_cast<std::size_t>(size) * element;
+  std::memcpy(to, rows + bytes * world, bytes);
+}
+
+void write_options(mjBatch* batch, int world, mjOption& options) {
+#define X(type, name, size) write_row(batch, world, "opt." #name, &options.name);
+#define XVEC X
+  MJOPTION_FIELDS
+#undef XVEC
+#undef X
+}
+
+}  // namespace
 
 mjModel Worlds::model_of(int world) const {
   mjModel mine = *model();
@@ -15,25 +35,15 @@ mjModel Worlds::model_of(int world) const {
     mine.name = static_cast<type*>(const_cast<void*>(rows)) + std::ptrdiff_t{size} * world;
   MJMODEL_POINTERS
 #undef X
+  write_options(batch_, world, mine.opt);
   return mine;
 }
 
 void Worlds::write_model(int world, mjModel* copy) const {
-  const auto write = [&](const char* field, void* to) {
-    int size = 0, element = 0;
-    const auto* rows = static_cast<const char*>(mjb_expanded(batch_, field, &size, &element));
-    if (rows == nullptr) return;
-    const std::size_t bytes = static_cast<std::size_t>(size) * element;
-    std::memcpy(to, rows + bytes * world, bytes);
-  };
-#define X(type, name, nr, nc) write(#name, copy->name);
+#define X(type, name, nr, nc) write_row(batch_, world, #name, copy->name);
   MJMODEL_POINTERS
 #undef X
-#define X(type, name, size) write("opt." #name, &copy->opt.name);
-#define XVEC X
-  MJOPTION_FIELDS
-#undef XVEC
-#undef X
+  write_options(batch_, world, copy->opt);
 }
 
 }  // namespace mjsense::worlds

@@ -103,7 +103,9 @@ void check_value(const FieldDecl& field, const FieldType& type, const void* valu
     }
     case Kind::kText: {
       const auto& text = *static_cast<const std::string*>(value);
-      if (!field.words.empty()) enum_index(text, field.words, context, name);
+      // A text is used as it is written: unlike enumerations, words have one spelling.
+      if (!field.words.empty() && std::ranges::find(field.words, text) == field.words.end())
+        throw_word(text, field.words, context, name);
       return;
     }
     case Kind::kEnum:

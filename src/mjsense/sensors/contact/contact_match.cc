@@ -121,8 +121,12 @@ std::vector<ContactObject> ContactNames::of_entity(std::string_view context,
     }
   }
   if (std::find(entities.begin(), entities.end(), match.entity) == entities.end()) {
-    throw ValueError(fmt::format("{}: entity '{}' not found{}", context, match.entity,
-                                 suggest(match.entity, entities)));
+    throw ValueError(fmt::format(
+        "{}: entity '{}' not found{}", context, match.entity,
+        entities.empty()
+            ? "; the model has no entities: leave out entity, and give the names of the "
+              "model as they are"
+            : suggest(match.entity, entities)));
   }
   throw ValueError(
       fmt::format("{}: entity '{}' has no named {}", context, match.entity, kind_of(match)));

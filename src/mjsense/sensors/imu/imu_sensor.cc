@@ -64,7 +64,7 @@ void ImuSensor::edit_spec(mjSpec* spec) {
 void ImuSensor::initialize(const SensorInit& init) {
   clear_fields();
   parts_.clear();
-  needs_every_step_ = false;
+  needs_every_step_ = has_errors_ = false;
   const std::string frame = "site " + cfg_.site.full_name();
   const auto add = [&](const char* part, int size, const std::string& axes,
                        effects::Effects effects) {
@@ -77,6 +77,7 @@ void ImuSensor::initialize(const SensorInit& init) {
     SensorSpec spec = kImuData.spec(part, {size}, axes);
     const double tick_s = init.model->opt.timestep;
     effects::EffectChainCfg chain_cfg;
+    has_errors_ |= !effects.empty();
     chain_cfg.effects = std::move(effects);
     effects::EffectChain chain(name() + "/" + part, spec, chain_cfg, init.num_worlds, tick_s,
                                tick_s * init.decimation);

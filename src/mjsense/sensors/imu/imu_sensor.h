@@ -125,6 +125,7 @@ class ImuSensor : public Sensor {
   void reset(const World& world) override;
   void draw(const World& world, DebugShapes& shapes) override;  // draws the axes of the site
   bool needs_every_step() const override { return needs_every_step_; }
+  bool has_errors() const { return has_errors_; }
 
  private:
   struct Part {
@@ -140,6 +141,7 @@ class ImuSensor : public Sensor {
   std::vector<Part> parts_;
   int accelerometer_ = -1;  // id of MuJoCo's sensor
   bool needs_every_step_ = false;
+  bool has_errors_ = false;
 };
 
 }  // namespace mjsense::sensors
