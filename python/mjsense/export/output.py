@@ -60,7 +60,7 @@ def own_folder(path: Path, in_use: str) -> Iterator[Path]:
         finally:
             _empty(path)
             mark.unlink(missing_ok=True)
-            with contextlib.suppress(OSError):  # somebody else put a file there
+            with contextlib.suppress(OSError):  # it contains a file of another program
                 path.rmdir()
 
 
