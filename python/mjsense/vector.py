@@ -64,6 +64,8 @@ class TaskVectorEnv(VectorEnv):
         self.render_mode = render_mode
         self.num_envs = options["num_worlds"]
         self._closed = False
+        if options["seed"] is None:
+            options["seed"] = int(np.random.SeedSequence().generate_state(1, np.uint64)[0])
         self._seed = options["seed"]
         self._has_policy = bool(options["policy"])
         if options["meshes"] == "real":
@@ -120,7 +122,7 @@ class TaskVectorEnv(VectorEnv):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
-        seed."""
+        seed. An environment that has never received a seed plays other episodes than all others."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -366,7 +368,7 @@ def make_vec(
     split: Literal["", "train", "test"] = "",
     num_envs: int = 1,
     threads: int = 0,
-    seed: Seed = 0,
+    seed: Seed | None = None,
     camera_system: str = "",
     cameras: Sequence[str] | None = None,
     width: int | None = None,
@@ -412,7 +414,8 @@ def make_vec(
             or ``@test`` after the scene's name.
         num_envs: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
-        seed: Random seed; the same seed gives the same episodes.
+        seed: Random seed; the same seed gives the same episodes. None: a random seed, so that every environment has
+            other episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.
         cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
         width: Width of the images; by default the robot's. [pixels]

@@ -88,7 +88,7 @@ def test_names_of_gymnasium(monkeypatch):
 
 def test_user_defined_text_sensors_are_observed():
     env = mjs.make_vec(Cart(), num_envs=2, cameras=[], sensors=[Words()])
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
     assert [json.loads(row.tobytes().rstrip(b"\0")) for row in observation["words"]] == [{"world": 0}, {"world": 1}]
     assert "task_info" not in observation
