@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal
@@ -106,6 +107,25 @@ class TaskVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.expert_done = np.zeros(self.num_envs, bool)
         """bool ``[num_envs]``: worlds for which the policy reported ``done`` in the last :meth:`expert_action`."""
+
+    def __reduce__(self) -> Any:
+        """A copy, or what is pickled, is a new environment with the same arguments, in which no episode has begun."""
+        return _made_again, (TaskVectorEnv, self._copyable()), {"spec": self.spec}
+
+    def _copyable(self) -> dict[str, Any]:
+        """The arguments of :func:`make_vec`. Raises TypeError if one belongs to this environment."""
+        if self._arguments is None:
+            raise TypeError("TaskVectorEnv: only environments of make() and make_vec() can be copied or pickled")
+        for name, value in self._arguments.items():
+            try:
+                copy.deepcopy(value)
+            except Exception as error:
+                raise TypeError(f"this environment cannot be copied or pickled, because its argument {name} cannot: {error}; "
+                                "make it with the name or the class instead of an object") from None  # fmt: skip
+        return self._arguments
+
+    _arguments: dict[str, Any] | None = None
+    """Those of :func:`make_vec`."""
 
     def _make_rollout(self, options: dict[str, Any], objects: Any) -> Any:
         return _core.Rollout(options, objects, Simulation._of)
@@ -448,7 +468,9 @@ def make_vec(
         nconmax: With warp: contacts for which each world has memory, on average over the worlds.
         njmax: With warp: constraint rows for which each world has memory.
     """
+    sensors = list(sensors)
     options = dict(locals())
+    arguments = dict(options)
     _check_backend(options)
     for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space", "backend"):
         del options[name]
@@ -462,5 +484,14 @@ def make_vec(
             raise ValueError(
                 f"make_vec(): task '{options['task']}' is not available with backend='warp', which plays tasks written in Python"
             )
-        return warp_module("rollout").WarpTaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
-    return TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+        made = warp_module("rollout").WarpTaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+    else:
+        made = TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+    made._arguments = arguments
+    return made
+
+
+def _made_again(wrapper: Any, arguments: dict[str, Any]) -> Any:
+    """A new environment with the same arguments: what ``make_vec`` makes, or a wrapper of it."""
+    made = make_vec(**arguments)
+    return made if wrapper is TaskVectorEnv else wrapper(made)
