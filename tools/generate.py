@@ -96,11 +96,12 @@ from mjsense._field_docs import show_field_docs
 from mjsense._sensor_data import SensorData, make_data
 '''
 
-# Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters).
+# Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).
 SIGNATURES = {
-    "record.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "scene", "out")),
+    "record.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "scene", "out"), {}),
     "vector.py": (
-        "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False"}, ("task", "robot", "policy", "scene"),
+        "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False", "seed": "None"}, ("task", "robot", "policy", "scene"),
+        {"seed": " None: a random seed, so that every environment has other episodes."},
     ),
 }  # fmt: skip
 
@@ -327,15 +328,16 @@ class Generator:
     # --------------------------------------------------------------------------------------------------- signatures
 
     def signature(self, text: str, name: str) -> str:
-        struct, renamed, defaults, skipped = SIGNATURES[name]
+        struct, renamed, defaults, skipped, more = SIGNATURES[name]
         fields = [f for f in self.structs[struct]["fields"] if not f["hidden"] and f["name"] not in skipped]
         lines, args = [], []
         for f in fields:
             parameter = renamed.get(f["name"], f["name"])
             default = defaults.get(f["name"], self.default(f["type"], f["default"], f))
             annotation = "Seed" if f["type"]["kind"] == "unsigned" else self.annotation(f["type"], f)
+            annotation += " | None" if default == "None" and "None" not in annotation else ""
             lines.append(f"    {parameter}: {annotation} = {default},\n")
-            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}", WIDTH, initial_indent=" " * 8,
+            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}{more.get(f['name'], '')}", WIDTH, initial_indent=" " * 8,
                                                 subsequent_indent=" " * 12)) + "\n")  # fmt: skip
         text = between(text, "    # options of a recording", "    # end of options", "".join(lines))
         return between(text, "        Options:", "        Others:", "".join(args))

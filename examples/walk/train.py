@@ -92,7 +92,7 @@ def main():
     chance = judge(Walk(options.model), lambda observation: rng.normal(size=(len(observation), 12)))
     still = judge(Walk(options.model), lambda observation: np.zeros((len(observation), 12)))
     task = Walk(options.model)
-    env = mjs.make_vec(task, num_envs=options.worlds, observations=["feeling"], cameras=[], autoreset_mode="same_step")
+    env = mjs.make_vec(task, num_envs=options.worlds, observations=["feeling"], cameras=[], autoreset_mode="same_step", seed=0)
     act, learn = {"rsl": with_rsl, "sb3": with_sb3}[options.trainer](task, env)
     start, cpu = time.perf_counter(), 0.0  # learning alone, without what judges it
     curve = []

@@ -8,7 +8,7 @@ represent them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -140,6 +140,16 @@ def rows_of_value(value: Any, path: tuple[str, ...] = ()) -> list[Row]:
         return [row for key, inner in value.items() for row in rows_of_value(inner, (*path, str(key)))]
     array = np.asarray(value)
     return [Row(path, array.shape, array.dtype)]
+
+
+_CHANNELS = 4
+_IMAGE_SIDE = 8  # smallest width and height of an image
+
+
+def is_image(dtype: Any, shape: Sequence[int]) -> bool:
+    """Whether rows are images: uint8 ``[H, W]``, or ``[H, W, C]`` or ``[C, H, W]`` with up to four channels."""
+    sides = shape if len(shape) == 2 else shape[:2] if len(shape) == 3 and shape[2] <= _CHANNELS else shape[1:] if len(shape) == 3 and shape[0] <= _CHANNELS else ()
+    return np.dtype(dtype) == np.uint8 and len(sides) == 2 and min(sides) >= _IMAGE_SIDE
 
 
 def leaves(value: Any, rows: list[Row]) -> list[Any]:

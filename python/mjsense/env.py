@@ -12,7 +12,7 @@ from mjsense._arguments import Seed, checked
 from mjsense._parts import Robots, Tasks
 from mjsense._written_values import numbers
 from mjsense.scene import Scene
-from mjsense.vector import TaskVectorEnv, _row, make_vec
+from mjsense.vector import TaskVectorEnv, _made_again, _row, make_vec
 
 
 @checked
@@ -34,6 +34,10 @@ class TaskEnv(gymnasium.Env):
         self._ended = ""
         self.sim = worlds.sim
         """The simulation, for reading only; the task writes its state."""
+
+    def __reduce__(self) -> Any:
+        """A copy, or what is pickled, is a new environment with the same arguments, in which no episode has begun."""
+        return _made_again, (TaskEnv, self.worlds._copyable()), {"spec": self.spec}
 
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts the next episode; with a seed, the first episode of that seed."""

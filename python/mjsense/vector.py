@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal
@@ -64,6 +65,8 @@ class TaskVectorEnv(VectorEnv):
         self.render_mode = render_mode
         self.num_envs = options["num_worlds"]
         self._closed = False
+        if options["seed"] is None:
+            options["seed"] = int(np.random.SeedSequence().generate_state(1, np.uint64)[0])
         self._seed = options["seed"]
         self._has_policy = bool(options["policy"])
         if options["meshes"] == "real":
@@ -105,6 +108,25 @@ class TaskVectorEnv(VectorEnv):
         self.expert_done = np.zeros(self.num_envs, bool)
         """bool ``[num_envs]``: worlds for which the policy reported ``done`` in the last :meth:`expert_action`."""
 
+    def __reduce__(self) -> Any:
+        """A copy, or what is pickled, is a new environment with the same arguments, in which no episode has begun."""
+        return _made_again, (TaskVectorEnv, self._copyable()), {"spec": self.spec}
+
+    def _copyable(self) -> dict[str, Any]:
+        """The arguments of :func:`make_vec`. Raises TypeError if one belongs to this environment."""
+        if self._arguments is None:
+            raise TypeError("TaskVectorEnv: only environments of make() and make_vec() can be copied or pickled")
+        for name, value in self._arguments.items():
+            try:
+                copy.deepcopy(value)
+            except Exception as error:
+                raise TypeError(f"this environment cannot be copied or pickled, because its argument {name} cannot: {error}; "
+                                "make it with the name or the class instead of an object") from None  # fmt: skip
+        return self._arguments
+
+    _arguments: dict[str, Any] | None = None
+    """Those of :func:`make_vec`."""
+
     def _make_rollout(self, options: dict[str, Any], objects: Any) -> Any:
         return _core.Rollout(options, objects, Simulation._of)
 
@@ -120,7 +142,7 @@ class TaskVectorEnv(VectorEnv):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
-        seed."""
+        seed. An environment that has never received a seed plays other episodes than all others."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -366,7 +388,7 @@ def make_vec(
     split: Literal["", "train", "test"] = "",
     num_envs: int = 1,
     threads: int = 0,
-    seed: Seed = 0,
+    seed: Seed | None = None,
     camera_system: str = "",
     cameras: Sequence[str] | None = None,
     width: int | None = None,
@@ -412,7 +434,8 @@ def make_vec(
             or ``@test`` after the scene's name.
         num_envs: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
-        seed: Random seed; the same seed gives the same episodes.
+        seed: Random seed; the same seed gives the same episodes. None: a random seed, so that every environment has
+            other episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.
         cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
         width: Width of the images; by default the robot's. [pixels]
@@ -445,9 +468,11 @@ def make_vec(
         nconmax: With warp: contacts for which each world has memory, on average over the worlds.
         njmax: With warp: constraint rows for which each world has memory.
     """
+    sensors = list(sensors)
     options = dict(locals())
     if num_envs < 1:
         raise ValueError(f"make_vec(): num_envs is {num_envs}: must be at least 1")
+    arguments = dict(options)
     _check_backend(options)
     for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space", "backend"):
         del options[name]
@@ -461,5 +486,14 @@ def make_vec(
             raise ValueError(
                 f"make_vec(): task '{options['task']}' is not available with backend='warp', which plays tasks written in Python"
             )
-        return warp_module("rollout").WarpTaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
-    return TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+        made = warp_module("rollout").WarpTaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+    else:
+        made = TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+    made._arguments = arguments
+    return made
+
+
+def _made_again(wrapper: Any, arguments: dict[str, Any]) -> Any:
+    """A new environment with the same arguments: what ``make_vec`` makes, or a wrapper of it."""
+    made = make_vec(**arguments)
+    return made if wrapper is TaskVectorEnv else wrapper(made)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a data set with LeRobot and compares every row and frame with what was exported. Run by test_lerobot.py in LeRobot's environment.
 
-    python lerobot_rows.py DATA_SET EXPECTED.npz STEP TOLERANCE
+    python lerobot_rows.py DATA_SET EXPECTED.npz STEP TOLERANCE [stream | delete]
 
+With ``stream``, the rows are read by StreamingLeRobotDataset; with ``delete``, after LeRobot has deleted the first episode.
 The mean difference of an image may be TOLERANCE levels. The episodes of EXPECTED.npz repeat in the data set. Of all rows but the last 1000, every STEP-th is read.
 """
 
@@ -20,11 +21,23 @@ except ImportError:
 root, expected, step = Path(sys.argv[1]), dict(np.load(sys.argv[2])), int(sys.argv[3])
 tolerance = float(sys.argv[4])
 tasks = json.loads(str(expected.pop("tasks")))
+mode = "".join(sys.argv[5:])
 dataset = LeRobotDataset("local/data", root=root)
+first = 0
+if mode == "delete":
+    from lerobot.datasets.dataset_tools import delete_episodes
+
+    first = dataset.meta.episodes[0]["length"]
+    dataset = delete_episodes(dataset, [0], output_dir=root.with_name("deleted"), repo_id="local/deleted")
 read = [i for i in range(len(dataset)) if i % step == 0 or i >= len(dataset) - 1000]
+items = (dataset[i] for i in read)
+if mode == "stream":
+    from lerobot.datasets.streaming_dataset import StreamingLeRobotDataset
+
+    items = iter(StreamingLeRobotDataset("local/data", root=root, shuffle=False, buffer_size=2, max_num_shards=1))
 wrong = 0
-for i in read:
-    item, at = dataset[i], i % len(tasks)
+for item in items:
+    at = (int(item["index"]) + first) % len(tasks)
     right = item["task"] == tasks[at]
     for name, values in expected.items():
         value = item[name].numpy()

@@ -46,7 +46,7 @@ def test_a_single_environment_is_the_first_of_many():
 
 def test_images_of_a_single_environment():
     env = mjs.make(Cart(), width=16, height=8, render_mode="rgb_array", observations=["side"])
-    env.reset()
+    env.reset(seed=0)
     assert env.render().shape == (8, 16, 3)
     env.close()
 
@@ -146,7 +146,7 @@ def test_chunk_equals_its_steps():
 
 def test_no_observation_is_text():
     env = mjs.make_vec("pick", num_envs=1, cameras=[])
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
 
     def arrays(value):
         return [a for v in value.values() for a in (arrays(v) if isinstance(v, dict) else [v])]

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Environments beyond stepping: rendering without cameras, rates, names, the expert, text sensors, image sizes."""
 
+import copy
 import json
+import pickle
 
 import gymnasium
 import numpy as np
@@ -88,7 +90,7 @@ def test_names_of_gymnasium(monkeypatch):
 
 def test_user_defined_text_sensors_are_observed():
     env = mjs.make_vec(Cart(), num_envs=2, cameras=[], sensors=[Words()])
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
     assert [json.loads(row.tobytes().rstrip(b"\0")) for row in observation["words"]] == [{"world": 0}, {"world": 1}]
     assert "task_info" not in observation
@@ -107,3 +109,30 @@ def test_misspelt_options():
         mjs.make("pick", camera=[])
     with pytest.raises(TypeError, match=r"record\(\) got an unexpected keyword argument 'episode'; did you mean 'episodes'"):
         mjs.record("pick", out="x", episode=3)
+
+
+@pytest.mark.parametrize("again", (copy.copy, copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))), ids=("copy", "deepcopy", "pickle"))
+def test_environments_are_copied_and_pickled_by_their_arguments(again):
+    options = dict(cameras=[], observations=["obj_start"], horizon=3, seed=4)
+    for env in (mjs.make_vec("pick", num_envs=2, **options), mjs.make("pick", **options), gymnasium.make("mjsense/Pick-Franka-v0", **options)):
+        env.reset()
+        second = env.reset()[0]["obj_start"]
+        other = again(env)
+        if type(other).__module__.startswith("mjsense"):
+            assert other.spec == env.spec and other.observation_space == env.observation_space
+        if type(other).__module__.startswith("mjsense") or again is not copy.copy:  # the shallow copy of a wrapper wraps the same environment
+            first = other.reset(seed=4)[0]["obj_start"]
+            np.testing.assert_array_equal(other.reset()[0]["obj_start"], second)
+            np.testing.assert_array_equal(env.reset(seed=4)[0]["obj_start"], first)
+            other.close()
+        env.close()
+
+
+def test_environments_of_objects_are_not_copied():
+    env = mjs.make_vec(Cart(), num_envs=2, **SMALL)
+    with pytest.raises(TypeError, match=r"cannot be copied or pickled, because its argument task cannot: .*; make it with the name or the class"):
+        pickle.dumps(env)
+    env.close()
+    env = copy.deepcopy(mjs.make(Cart, **SMALL))
+    assert env.reset(seed=1)[0].keys() == env.observation_space.keys()
+    env.close()

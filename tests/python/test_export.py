@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjsense.export: the files of LeRobot's formats, read with PyArrow and PyAV. test_lerobot.py reads them with LeRobot."""
 
+import contextlib
 import json
 import shutil
 from fractions import Fraction
@@ -14,8 +15,9 @@ pq = pytest.importorskip("pyarrow.parquet")
 
 import av
 from mjsense.dataset import statistics
-from mjsense.export import Mapping, Source, frame_statistics, lerobot, lerobot_depth
+from mjsense.export import Mapping, Source, frame_statistics, lerobot, lerobot_depth, lerobot_files, mapping
 from mjsense.export.mapping import _filled
+from mjsense.export.output import new_output
 from mjsense.export.remux import Concatenation
 
 import mjsense as mjs
@@ -62,13 +64,14 @@ def test_rows_are_states_with_the_actions_taken_there(root, v3):
         np.testing.assert_array_equal(data["next.reward"][part], episode["rewards"][1:])
         np.testing.assert_array_equal(data["next.success"][part], episode["success"][1:])
         assert data["next.done"][part] == [False] * 11 + [True] and data["frame_index"][part] == list(range(12))
-        np.testing.assert_array_equal(data["timestamp"][part], (np.arange(12) * 0.066).astype(np.float32))
+        np.testing.assert_array_equal(data["timestamp"][part], (np.arange(12) / 15).astype(np.float32))
         assert data["episode_index"][part] == [position] * 12 and data["index"][part] == list(range(at, at + 12))
         tasks = pq.read_table(v3 / "meta/tasks.parquet").to_pydict()
         assert tasks["task"][data["task_index"][at]] == episode.task
         at += 12
     info = json.loads((v3 / "meta/info.json").read_text())
-    assert info["total_frames"] == at == 36 and info["total_episodes"] == 3 and info["robot_type"] == "franka"
+    assert info["total_frames"] == at == 36 and info["total_episodes"] == 3 and info["robot_type"] == "franka" and info["fps"] == 15
+    assert rows(v3 / "meta/episodes")["recorded_fps"] == [500 / 33] * 3
     assert info["features"]["action"]["names"] == [*(f"arm_{i}" for i in range(7)), "gripper_0"]
     assert info["features"]["observation.images.wrist_camera"]["shape"] == [24, 32, 3]
     assert {name: column["dtype"] for name, column in info["features"].items()}.items() >= {
@@ -80,17 +83,66 @@ def test_a_mapping_object_is_accepted(root):
 
 
 def test_videos_have_the_same_frames(root, v3):
-    """The two houses have different codec parameters, so the second has a file of its own."""
+    """Each row has one. The two houses have different codec parameters, so the second has a file of its own."""
     episodes = rows(v3 / "meta/episodes")
     prefix = "videos/observation.images.wrist_camera/"
-    assert episodes[prefix + "file_index"] == [0, 0, 1] and episodes[prefix + "from_timestamp"] == [0, pytest.approx(13 * 0.066), 0]
+    assert episodes[prefix + "file_index"] == [0, 0, 1] and episodes[prefix + "from_timestamp"] == [0, 12 / 15, 0]
     for position, episode in enumerate(mjs.Dataset(root).episodes):
         file = episodes[prefix + "file_index"][position]
         rate, times, images = frames(v3 / f"{prefix}chunk-000/file-{file:03d}.mp4")
-        assert rate == mjs.Dataset(root).fps and times == [n / rate for n in range(len(times))]
+        assert rate == 15 and times == [n / rate for n in range(len(times))] and len(images) == (24, 12)[file]
         first = round(episodes[prefix + "from_timestamp"][position] * rate)
-        for image, expected in zip(images[first : first + 13], episode.video("wrist_camera")[:], strict=True):
+        for image, expected in zip(images[first : first + 12], episode.video("wrist_camera")[:12], strict=True):
             np.testing.assert_array_equal(image[:23], expected)
+
+
+def assert_frames_by_row(root, out):
+    """As LeRobot's StreamingLeRobotDataset reads: the frame of a row is at ``index / fps`` in its file, and the file has no other frames."""
+    info, data = json.loads((out / "meta/info.json").read_text()), rows(out / "data")
+    rate, times, images = frames(out / "videos/observation.images.wrist_camera/chunk-000/file-000.mp4")
+    assert len(images) == info["total_frames"] and rate == Fraction(info["fps"]).limit_denominator(1000)
+    for index, position, t in zip(data["index"], data["episode_index"], data["frame_index"], strict=True):
+        assert times[index] == index / rate
+        expected = mjs.Dataset(root).episodes[position].video("wrist_camera")[t]
+        assert np.abs(np.subtract(images[index][:23], expected, dtype=float)).mean() < 5, (position, t)
+
+
+def test_frames_are_found_by_the_number_of_their_row(root, tmp_path):
+    for exact in (False, True):
+        out = mjs.export_lerobot(root / "house_0", tmp_path / str(exact), exact_rate=exact)
+        assert_frames_by_row(root / "house_0", out)
+        timestamps = rows(out / "data")["timestamp"]
+        np.testing.assert_array_equal(timestamps[:12], (np.arange(12) * (0.066 if exact else 1 / 15)).astype(np.float32))
+
+
+def test_videos_with_b_frames_also_have_one_frame_for_each_row(root, tmp_path):
+    """Their last packet is not their last frame, so they are encoded again."""
+    shutil.copytree(root / "house_0", tmp_path / "house_0")
+    for video in (tmp_path / "house_0").glob("*wrist*.mp4"):
+        rate, _, images = frames(video)
+        with av.open(str(video), "w") as file:
+            stream = file.add_stream("libx264", rate=rate, options={"bf": "3", "b-adapt": "0", "crf": "18"})
+            stream.width, stream.height, stream.pix_fmt = 32, 24, "yuv420p"
+            for image in images:
+                file.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+            file.mux(stream.encode(None))
+    out = mjs.export_lerobot(tmp_path / "house_0", tmp_path / "v3")
+    assert_frames_by_row(tmp_path / "house_0", out)
+
+
+def test_rates(root, capsys):
+    """A whole rate if that changes the time by at most 5 %; stderr says what happens."""
+    source = Source(root, whole_rate=True)
+    assert (source.fps, source.recorded_fps) == (15, Fraction(500, 33)) and Source(root).fps == Fraction(500, 33)
+    for fps, whole in ((20, 20), (Fraction(500, 33), 15), (Fraction(30000, 1001), 30), (12.5, 12), (2.5, 2.5), (0.3, 0.3)):
+        assert mapping._whole(Fraction(fps)) == Fraction(whole), fps
+    lerobot_files.print_rate(source)
+    assert "15.1515 rows per second are written as 15" in (printed := capsys.readouterr().err) and "times are 1.0% longer" in printed
+    lerobot_files.print_rate(Source(root))
+    assert "15.1515 rows per second are not a whole number" in (printed := capsys.readouterr().err) and "--policy-dt 50" in printed
+    source.recorded_fps = Fraction(15)
+    lerobot_files.print_rate(source)
+    assert not capsys.readouterr().err
 
 
 def test_statistics(root, v3):
@@ -154,13 +206,13 @@ def test_depth_in_lerobot_form_with_the_exact_file(tmp_path):
     key = "observation.images.eye_depth"
     with av.open(str(out / f"videos/{key}/chunk-000/file-000.mp4")) as file:
         codes = np.stack([frame.to_ndarray(format="gray12le") for frame in file.decode(video=0)])
-    expected = video[:].clip(0.01, 10)
+    expected = video[:-1].clip(0.01, 10)
     assert (np.abs(lerobot_depth.LEVELS[codes] - expected) <= (expected + 3.5) * 1.7e-4).all()
     info = json.loads((out / "meta/info.json").read_text())["features"][key]
     assert info["shape"] == [23, 32, 1] and info["info"]["is_depth_map"] and info["info"]["video.depth_max"] == 10
     stats = json.loads((out / "meta/stats.json").read_text())[key]
-    np.testing.assert_allclose(stats["mean"], expected[:-1].mean().reshape(1, 1, 1), rtol=1e-3)
-    np.testing.assert_allclose(np.ravel(stats["q50"]), np.median(expected[:-1]), atol=2e-3)
+    np.testing.assert_allclose(stats["mean"], expected.mean().reshape(1, 1, 1), rtol=1e-3)
+    np.testing.assert_allclose(np.ravel(stats["q50"]), np.median(expected), atol=2e-3)
     with pytest.raises(ValueError, match=r"LeRobot v2\.1 has no depth images; leave 'eye_depth' out"):
         mjs.export_lerobot21(tmp_path / "data", tmp_path / "v21", map=cameras)
 
@@ -174,7 +226,9 @@ def test_lerobot21(root, tmp_path):
         data = pq.read_table(out / info["data_path"].format(**place)).to_pydict()
         np.testing.assert_array_equal(np.array(data["action"])[:, :7], episode["actions/joint_pos/arm"][1:].astype(np.float32))
         video = out / info["video_path"].format(video_key="observation.images.wrist_camera", **place)
-        assert video.read_bytes() == episode.video("wrist_camera").path.read_bytes()
+        rate, times, images = frames(video)
+        assert rate == info["fps"] == 15 and times == [Fraction(n, 15) for n in range(12)]
+        np.testing.assert_array_equal([image[:23] for image in images], episode.video("wrist_camera")[:12])
     lines = [json.loads(line) for line in (out / "meta/episodes_stats.jsonl").read_text().splitlines()]
     assert [line["episode_index"] for line in lines] == [0, 1, 2] and lines[0]["stats"]["action"]["count"] == [12]
     modality = json.loads((out / "meta/modality.json").read_text())
@@ -185,6 +239,46 @@ def test_lerobot21(root, tmp_path):
     for name, column in (("state", "observation.state"), ("action", "action")):  # as GR00T's page on data preparation says
         parts = sorted((part["start"], part["end"]) for part in modality[name].values())
         assert [start for start, _ in parts] == [0, *(end for _, end in parts[:-1])] and parts[-1][1] == info["features"][column]["shape"][0]
+
+
+def test_groot_reads_the_statistics_and_the_columns_that_modality_names(root, tmp_path):
+    """Its loader takes the numbers of a group out of every statistic: of N1 and N1.5 by position."""
+    features = {"velocity": "obs/agent/qvel", "rel": "actions/joint_pos_rel", "next.phase": "obs/extra/policy_phase"}
+    out = mjs.export_lerobot21(root, tmp_path / "v21", map={"features": features, "cameras": {}}, episodes=[0])
+    modality, found = (json.loads((out / f"meta/{name}.json").read_text()) for name in ("modality", "stats"))
+    assert {name: part["original_key"] for name, part in modality["state"].items()} == {
+        "arm": "observation.state", "gripper": "observation.state", "phase": "next.phase",
+        "velocity_arm": "observation.velocity", "velocity_gripper": "observation.velocity"}  # fmt: skip
+    assert {name: part["original_key"] for name, part in modality["action"].items()} == {"arm": "action", "gripper": "action", "rel_arm": "next.rel", "rel_gripper": "next.rel"}
+    for part in (*modality["state"].values(), *modality["action"].values()):
+        for statistic in found[part["original_key"]].values():
+            assert np.array(statistic)[np.arange(part["start"], part["end"])].size == part["end"] - part["start"]
+    with pytest.raises(ValueError, match=r"the feature 'state' and the feature 'arm' have the same name in the export, 'state\.arm'"):
+        mjs.export_lerobot21(root, tmp_path / "two", map={"features": {"arm": "obs/agent/qvel/arm"}})
+
+
+@pytest.mark.parametrize(("format", "features", "cameras", "message"), (
+    ("lerobot", {"next.done": "rewards"}, {}, "LeRobot's column 'next.done' and the feature 'next.done'"),
+    ("lerobot", {"observation.state": "obs/extra/tcp_pose"}, {}, "the feature 'state' and the feature 'observation.state'"),
+    ("lerobot", {"next.reward": "success"}, {}, "the feature 'next.reward' and the feature 'reward'"),
+    ("lerobot21", {"images.eye": "obs/extra/tcp_pose", "observation.images.eye": "obs/extra/tcp_pose"}, {"eye": "wrist_camera"}, "the camera 'eye'"),
+    ("lerobot21", {"annotation.human.task_description": "rewards"}, {}, "LeRobot's column 'annotation.human.task_description'"),
+    ("robomimic", {"eye_image": "obs/extra/tcp_pose"}, {"eye": "wrist_camera"}, "the feature 'eye_image' and the video 'wrist_camera'"),
+    ("robomimic", {"dones": "rewards"}, {}, "robomimic's 'dones' and the feature 'dones'"),
+    ("rlds", {"discount": "rewards"}, {}, "RLDS's 'discount' and the feature 'discount'"),
+    ("rlds", {"eye": "obs/extra/tcp_pose"}, {"eye": "wrist_camera"}, "the feature 'eye' and the video 'wrist_camera'"),
+    ("zarr", {"eye": "obs/extra/tcp_pose"}, {"eye": "wrist_camera"}, "the feature 'eye' and the video 'wrist_camera'"),
+    ("zarr", {}, {"action": "wrist_camera"}, "the feature 'action' and the video 'wrist_camera'"),
+    ("mcap", {"tf": "obs/extra/tcp_pose"}, {}, "the topic '/tf' and the feature 'tf'"),
+))  # fmt: skip
+def test_no_two_things_have_one_name(format, features, cameras, message, root, tmp_path):
+    try:
+        export = getattr(mjs, f"export_{format}")
+        with pytest.raises(ValueError, match=f"{message}.* have the same name in the export, '.*'; choose other names in the map"):
+            export(root / "house_0", tmp_path / "out", map={"features": features, "cameras": cameras})
+    except (ImportError, RuntimeError) as error:
+        pytest.skip(str(error))
+    assert not list(tmp_path.iterdir())
 
 
 MAP = """
@@ -263,10 +357,41 @@ def test_a_failed_export_leaves_nothing(root, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         mjs.export_lerobot(root, tmp_path / "out", progress=stop)
     assert not list(tmp_path.iterdir())
-    (tmp_path / "out.part").mkdir()  # of an export that was killed
-    (tmp_path / "out.part/old").touch()
+    with contextlib.suppress(KeyboardInterrupt), new_output(tmp_path / "out") as part:
+        part.mkdir()
+        (part / "old").touch()
+        shutil.copytree(tmp_path / "out.part", tmp_path / "killed")
+        raise KeyboardInterrupt
+    (tmp_path / "killed").rename(tmp_path / "out.part")
     mjs.export_lerobot(root, tmp_path / "out", episodes=[0])
     assert [path.name for path in tmp_path.iterdir()] == ["out"] and not (tmp_path / "out/old").exists()
+
+
+def test_an_export_deletes_nothing_that_it_has_not_made(root, tmp_path):
+    (tmp_path / "poetry.lock").write_text("versions")
+    (tmp_path / "poetry.part").mkdir()
+    with pytest.raises(FileExistsError, match=r"poetry\.part exists, and no export has made it: rename it, or choose another output"):
+        mjs.export_lerobot(root, tmp_path / "poetry", episodes=[0])
+    (tmp_path / "poetry.part/thesis.txt").write_text("thesis")
+    with pytest.raises(FileExistsError, match=r"poetry\.part exists"):
+        mjs.record("pick", out=tmp_path / "poetry", format="lerobot", **SMALL)
+    (tmp_path / "poetry.part").rename(tmp_path / "poetry")
+    (tmp_path / "poetry.recording/house_0/.recording").mkdir(parents=True)
+    with pytest.raises(FileExistsError, match=r"poetry exists; name another output"):
+        mjs.record("pick", out=tmp_path / "poetry", format="lerobot", resume=True, **SMALL)
+    (tmp_path / "poetry").rename(tmp_path / "mine")
+    (tmp_path / "poetry.recording").rename(tmp_path / "mine.recording")
+    mjs.export_lerobot(root, tmp_path / "poetry", episodes=[0])
+    assert (tmp_path / "poetry.lock").read_text() == "versions" and (tmp_path / "mine/thesis.txt").read_text() == "thesis"
+    assert {path.name for path in tmp_path.iterdir()} == {"poetry", "poetry.lock", "mine", "mine.recording"}
+
+
+def test_one_process_at_a_time_writes_an_output(root, tmp_path):
+    with new_output(tmp_path / "out") as part:
+        with pytest.raises(FileExistsError, match=r"another process writes .*out"):
+            mjs.export_lerobot(root, tmp_path / "out")
+        part.touch()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 def test_groups_without_an_action_hold_their_position():
@@ -285,4 +410,6 @@ def test_groups_without_an_action_hold_their_position():
 def test_a_video_without_all_frames_is_an_error(root, tmp_path):
     video = next(root.glob("house_0/*wrist*.mp4"))
     with pytest.raises(ValueError, match=r"has 13 frames, but its episode has 14 observations; `mjsense verify`"):
-        Concatenation(tmp_path / "out.mp4", mjs.Dataset(root).fps).add(video, 14)
+        Concatenation(tmp_path / "out.mp4", Fraction(15)).add(video, Fraction(500, 33), 14, 13)
+    with pytest.raises(ValueError, match=r"its times are not those of 20 frames per second"):
+        Concatenation(tmp_path / "out.mp4", Fraction(15)).add(video, Fraction(20), 13, 12)

@@ -125,10 +125,10 @@ def expected_of(source, path):
     return len(tasks)
 
 
-def read(version, out, expected, step, tolerance=0):
+def read(version, out, expected, step, tolerance=0, mode=""):
     """What LeRobot finds in the data set ``out``: the last line of lerobot_rows.py."""
     python, path = environment(version)
-    words = [python, Path(__file__).parent / "lerobot_rows.py", out, expected, str(step), str(tolerance)]
+    words = [python, Path(__file__).parent / "lerobot_rows.py", out, expected, str(step), str(tolerance), *([mode] if mode else [])]
     done = subprocess.run(words, capture_output=True, text=True,
                           env={**os.environ, "PYTHONPATH": path, "HF_HOME": str(expected.parent / "hf"), "HF_HUB_OFFLINE": "1"})  # fmt: skip
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
@@ -165,6 +165,19 @@ def test_lerobot_reads_episodes_without_idle_steps(tmp_path, version, format):
     out = getattr(mjs, f"export_{format}")(tmp_path / "data", tmp_path / "out")
     result = read(version, out, tmp_path / "expected.npz", 1, tolerance=5)
     assert result["rows"] == result["read"] == rows and result["wrong"] == 0, result
+
+
+@pytest.mark.parametrize("version", ("0.4.4", "0.6.1"))
+@pytest.mark.parametrize("mode, tolerance", (("stream", 0), ("delete", 8)))
+def test_lerobot_streams_and_edits_an_export_at_the_default_rate(record, tmp_path, version, mode, tolerance):
+    """Its streaming reader finds frames by the number of the row in the data set; its tools, which encode videos again, by whole rates."""
+    environment(version)
+    root = record(Fraction(500, 33), 200)
+    map = map_of("")
+    rows = expected_of(Source(root, map=map), tmp_path / "expected.npz")
+    out = mjs.export_lerobot(root, tmp_path / "out", map=map)
+    result = read(version, out, tmp_path / "expected.npz", 1, tolerance, mode)
+    assert result["rows"] == (rows // 2 if mode == "delete" else rows) and result["wrong"] == 0, result
 
 
 TRAIN = """--policy.type=act --policy.device=cpu --policy.push_to_hub=false --policy.pretrained_backbone_weights=null --policy.dim_model=64

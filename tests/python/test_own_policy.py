@@ -66,7 +66,7 @@ def test_policy_selects_its_observations():
             return np.tile(HOLD, (self.num_worlds, 1))
 
     env = pick(Look)
-    env.reset()
+    env.reset(seed=0)
     env.expert_action()
     env.close()
     Look.observation = ("qpso",)
@@ -92,7 +92,7 @@ def test_action_layout_and_life_cycle():
     env = pick(policy)
     assert policy.action_groups == {"arm": slice(0, 7), "gripper": slice(7, 8)} and policy.num_worlds == 3
     assert policy.action_high[7] == 255 and policy.action_low.shape == (8,)
-    env.reset()
+    env.reset(seed=0)
     env.expert_action()
     env.reset(options={"reset_mask": np.array([False, True, False])})
     assert calls == ["initialize", [0, 1, 2], [True] * 3, [1]]
@@ -134,7 +134,7 @@ def test_done_ends_an_episode(tmp_path):
     assert json_rows(rows["actions/joint_pos"])[-1] == {}
 
     env = pick(Stop)
-    env.reset()
+    env.reset(seed=0)
     for step in range(5):
         action = env.expert_action()
         terminated = env.step(action, done=env.expert_done)[2]
@@ -164,7 +164,7 @@ def test_next_chunk_is_requested_when_one_ends(tmp_path):
     # Only the world that was reset requests a chunk; the other continues its own.
     policy = Ramp()
     env = mjs.make_vec(Cart(), policy=policy, num_envs=2, cameras=[], autoreset_mode="disabled")
-    env.reset()
+    env.reset(seed=0)
     env.step(env.expert_action())
     env.reset(options={"reset_mask": np.array([False, True])})
     np.testing.assert_allclose(env.expert_action()[:, 0], [0.11, 0.2])
@@ -236,7 +236,7 @@ def test_errors_say_what_was_expected(value, error, text):
             return value
 
     env = pick(Wrong)
-    env.reset()
+    env.reset(seed=0)
     with pytest.raises(error, match=text):
         env.step(env.expert_action())
     env.close()
@@ -249,7 +249,7 @@ def test_errors_of_user_code_name_the_method(tmp_path):
 
     for play in (lambda: mjs.record("pick", policy=Broken(), out=tmp_path, cameras=[]), lambda: env.expert_action()):
         env = pick(Broken)
-        env.reset()
+        env.reset(seed=0)
         with pytest.raises(ArithmeticError, match="no") as caught:
             play()
         assert caught.value.__notes__ == ["in policy 'broken': act()"]

@@ -134,7 +134,7 @@ def test_the_robot_of_the_scene_and_its_move_groups():
 
     env = make(Grouped)
     assert list(env.action_groups) == ["wheels"]
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
     assert observation["qpos"]["wheels"].shape == (3, 1)
     env.close()
 
@@ -167,7 +167,7 @@ def test_a_robot_by_name_joins_the_scene():
             return np.zeros(sim.num_worlds), np.zeros(sim.num_worlds, bool)
 
     env = make(Watch)
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
     assert list(env.action_groups) == ["arm", "gripper"] and env.sim.physics_dt == 0.002
     np.testing.assert_allclose(observation["robot_base_pose"], np.tile(np.float32([0.1, 0.2, 0, 1, 0, 0, 0]), (3, 1)))
     assert {"tcp_pose", "obj_start", "grasp_state_block"} <= set(observation)
@@ -356,7 +356,7 @@ def test_by_name():
     mjs.register_task("carting", Cart)
     assert "carting" in mjs.task_names()
     env = mjs.make_vec("carting", cameras=[])
-    env.reset()
+    env.reset(seed=0)
     env.close()
     with pytest.raises(ValueError, match="a task named 'pick' is already registered"):
         mjs.register_task("pick", Cart)
@@ -386,7 +386,7 @@ def test_memory_is_freed(closed):
     task, sensor = Cart(), Height()
     policy = Driver(task)
     env = make(task, policy=policy, sensors=[sensor])
-    env.reset()
+    env.reset(seed=0)
     env.expert_action()
     gone = [weakref.ref(object) for object in (task, policy, sensor, env, env.sim)]
     if closed:

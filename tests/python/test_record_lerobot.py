@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
-from mjsense.export.output import only_writer
+from mjsense.export.output import part_of
 from mjsense.export.record_lerobot import CompleteError
 
 import mjsense as mjs
@@ -61,15 +61,15 @@ def test_the_program_prints_the_files_that_are_there(keep, tmp_path):
 def test_another_process_that_writes_it_is_not_disturbed(tmp_path):
     """Its unfinished output stays, when the same command is started again, or an export to the same place."""
     mjs.record("pick", out=tmp_path / "out.recording", **{**ARGUMENTS, "width": 16, "height": 16, "horizon": 3})
-    part = tmp_path / "out.part/meta"
-    part.mkdir(parents=True)
-    with only_writer(tmp_path / "out"):
+    with part_of(tmp_path / "out") as part:
+        (part / "meta").mkdir()
         for write in (lambda: mjs.record("pick", out=tmp_path / "out", format="lerobot", resume=True, **ARGUMENTS),
                       lambda: mjs.export_lerobot(tmp_path / "out.recording", tmp_path / "out")):  # fmt: skip
             with pytest.raises(FileExistsError, match=r"another process writes .*/out$"):
                 write()
-    assert part.exists()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.part", "out.recording"]
+        assert (part / "meta").exists()
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["out.part", "out.recording"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out.recording"]
 
 
 def test_kill_at_any_moment(exported, tmp_path, capsys):
@@ -87,7 +87,7 @@ def test_kill_at_any_moment(exported, tmp_path, capsys):
                 except subprocess.TimeoutExpired:
                     process.send_signal(signal.SIGKILL)
                     process.communicate()
-                    states = [name for name in (".recording", ".part", "", ".removed") if out.with_name(out.name + name).exists()]
+                    states = [name for name in (".recording", ".part", "") if out.with_name(out.name + name).exists()]
                     row.append(f"{time.monotonic() - begun:.2f} s: {' '.join(f'OUT{name}' for name in states) or 'nothing'}")
                     kills += 1
                     continue

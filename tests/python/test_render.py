@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjs.render: recorded episodes with other cameras and sensors, as a new recording."""
 
+import inspect
 import json
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import gymnasium
 import h5py
@@ -14,6 +17,7 @@ import numpy as np
 import pytest
 import tasks
 from edited_recordings import changed, file_of
+from mjsense.dataset import render_cameras
 
 import mjsense as mjs
 
@@ -72,6 +76,31 @@ def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
     assert mjs.check_replay(tmp_path)
     dataset = mjs.Dataset(tmp_path)
     assert dataset.episodes[0].settings["render"]["of"]["settings"]["task"] == "pick"
+
+
+def test_image_options_are_those_that_the_recorder_gives_to_its_cameras():
+    """An option that is added to the recorder is kept by render, whose table follows from the declarations."""
+    source = (Path(__file__).parents[2] / "src/mjsense/rollout/episode_cameras.cc").read_text()
+    given = {option: field for field, option in re.findall(r"out\.(\w+) = cfg\.(\w+);", source)}
+    assert render_cameras.image_options() == given and {"shadows", "samples", "shadow_samples"} <= given.keys()
+    assert not {"width", "height"} & given.keys()
+    assert set(given) <= inspect.signature(mjs.render).parameters.keys()
+
+
+@pytest.mark.parametrize("option", render_cameras.image_options())
+def test_every_image_option_is_kept(option, tmp_path):
+    default = render_cameras.recorded_images({})[option]
+    value = not default if isinstance(default, bool) else 4
+    made = {}
+    for name, given in (("usual", {}), ("data", {option: value})):
+        mjs.record("pick", out=tmp_path / name, **{**RECORDING, "episodes": 1, "horizon": 3, **given})
+        made[name] = videos(tmp_path / name)
+    assert made["data"] != made["usual"]
+    mjs.render(tmp_path / "data", tmp_path / "same", copy=False)
+    assert videos(tmp_path / "same") == made["data"]
+    assert mjs.Dataset(tmp_path / "same").episodes[0].settings[option] == value
+    mjs.render(tmp_path / "data", tmp_path / "back", **{option: default})
+    assert videos(tmp_path / "back") == made["usual"]
 
 
 @pytest.mark.parametrize(

@@ -163,6 +163,29 @@ def test_stable_baselines3_with_pictures():
     worlds.close()
 
 
+def test_stable_baselines3_with_pictures_only():
+    """Nothing but images, of which depth is one: a dict without a row of numbers, whose values are those of its space."""
+    pytest.importorskip("stable_baselines3")
+    from mjsense.rl.sb3 import SB3VecEnv
+    from stable_baselines3 import PPO
+
+    options = dict(cameras=["wrist_camera"], width=40, height=36, depth=True)
+    env = same_step(**options, observations=["wrist_camera", "wrist_camera_depth"])
+    worlds = SB3VecEnv(env)
+    spaces = {name: (space.shape, space.dtype.name) for name, space in worlds.observation_space.items()}
+    assert spaces == {"wrist_camera": ((36, 40, 3), "uint8"), "wrist_camera_depth": ((1, 36, 40), "float32")}
+    observation = worlds.reset()
+    np.testing.assert_array_equal(observation["wrist_camera_depth"][:, 0], env.rows["wrist_camera_depth"])
+    for _ in range(4):
+        observation, _, done, infos = worlds.step(np.zeros((3, 8)))
+    assert done.all() and worlds.observation_space.contains(infos[2]["terminal_observation"])
+    assert worlds.observation_space.contains({name: rows[2] for name, rows in observation.items()})
+    normalized = PPO("MultiInputPolicy", worlds, n_steps=5, batch_size=15, n_epochs=1, policy_kwargs={"normalize_images": False}, device="cpu")
+    assert {type(part).__name__ for part in normalized.policy.features_extractor.extractors.values()} == {"NatureCNN"}
+    PPO("MultiInputPolicy", worlds, n_steps=5, batch_size=15, n_epochs=1, device="cpu").learn(30)
+    worlds.close()
+
+
 def test_the_page_s_policy_is_learned():
     """docs/train.md: training with the page's code reaches the stated return."""
     pytest.importorskip("stable_baselines3")

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+from contextlib import closing
+
 import gymnasium
 import numpy as np
 import pytest
@@ -55,7 +57,7 @@ def test_numbers_by_move_group(env):
 
 def test_observations_are_chosen_by_sensor_or_stream():
     env = make(num_envs=1, observations=["qpos", "actions/ee_pose/arm", "tcp_pose", "qpos/arm"])
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
     assert {k: list(v) if isinstance(v, dict) else v.shape for k, v in observation.items()} == {
         "qpos": ["arm", "gripper"], "actions/ee_pose": ["arm"], "tcp_pose": (1, 7)}  # fmt: skip
     env.close()
@@ -82,7 +84,7 @@ def test_same_seed_same_episode(env):
 
 def test_truncation_and_autoreset():
     env = make(horizon=4, num_envs=2)
-    env.reset()
+    env.reset(seed=0)
     steps = [env.step(hold(env)) for _ in range(7)]
     assert [step[3].tolist() for step in steps] == [[False] * 2] * 3 + [[True] * 2] + [[False] * 2] * 3
     # The fifth begins anew: nothing was tried that could have succeeded.
@@ -143,7 +145,7 @@ def test_failed_world_has_no_reward():
 
 def test_cameras_and_render():
     env = make(num_envs=2, cameras=["wrist_camera"], width=32, height=24, observations=["wrist_camera"], render_mode="rgb_array")
-    observation, _ = env.reset()
+    observation, _ = env.reset(seed=0)
     assert list(observation) == ["wrist_camera"] and observation["wrist_camera"].shape == (2, 24, 32, 3)
     assert observation["wrist_camera"].std() > 1
     assert env.render()[1].shape == (24, 32, 3)
@@ -151,7 +153,7 @@ def test_cameras_and_render():
 
 
 def test_bad_use(env):
-    env.reset()
+    env.reset(seed=0)
     for call, error in [
         (lambda: env.step(np.zeros((2, 8))), ValueError),
         (lambda: env.step(np.full((3, 8), np.nan)), ValueError),
@@ -246,3 +248,25 @@ def test_errors_of_action_spaces():
         make(arm_controller="ee_delta_pse")
     with pytest.raises(ValueError, match="commands joint positions; the controller of move group 'arm'"):
         make(arm_controller="joint_position_relative", policy="planner")
+
+
+def test_environments_without_a_seed_play_different_episodes():
+    """As Gymnasium's: each draws entropy, also the copies of a vector environment, and a seeded one continues its own episodes."""
+    options = {"cameras": [], "observations": ["obj_start"], "horizon": 4, "threads": 1}
+
+    def starts(count=2, **more):
+        with closing(mjs.make_vec("pick", "franka", num_envs=2, **options, **more)) as worlds:
+            return [worlds.reset()[0]["obj_start"] for _ in range(count)]
+
+    assert not np.array_equal(starts(), starts())
+    np.testing.assert_array_equal(starts(seed=3), starts(seed=3))
+    np.testing.assert_array_equal(starts(seed=0)[0], starts(1, seed=0)[0])
+    with closing(gymnasium.make_vec("mjsense/Pick-Franka-v0", num_envs=3, vectorization_mode="sync", **options)) as copies:
+        found = copies.reset()[0]["obj_start"]
+        assert len(np.unique(found, axis=0)) == 3
+        seeded, after = copies.reset(seed=7)[0]["obj_start"], copies.reset()[0]["obj_start"]
+        np.testing.assert_array_equal(copies.reset(seed=7)[0]["obj_start"], seeded)
+        np.testing.assert_array_equal(copies.reset()[0]["obj_start"], after)
+        assert not np.array_equal(seeded, after)
+    with closing(mjs.make("pick", "franka", **options)) as env:
+        np.testing.assert_array_equal(env.reset(seed=7)[0]["obj_start"], seeded[0])

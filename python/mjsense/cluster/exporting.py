@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
+import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +16,7 @@ from mjsense.cluster.tasks import check_pickle, cluster, running
 from mjsense.dataset.remote import absolute
 from mjsense.export import export_lerobot, export_lerobot21, mcap, rerun, rlds, robomimic, zarr
 from mjsense.export.mapping import Mapping, Source
-from mjsense.export.output import only_writer, unlocked_output
+from mjsense.export.output import own_folder
 
 _CHUNK = 16  # episodes of one task
 _PARTS: dict[str, ModuleType] = {"mcap": mcap, "rerun": rerun, "rlds": rlds, "robomimic": robomimic, "zarr": zarr}
@@ -67,7 +69,7 @@ def export_on_ray(
         trim_idle = False
     chosen = {name: options.pop(name) for name in ("map", "episodes", "success") if name in options}
     source = Source(absolute(root), **chosen, trim_idle=trim_idle)
-    source.print_trimming()
+    source.print_notes()
     with cluster(address, runtime_env) as ray:
         return _export_parts(ray, format, Path(out), source, options, progress)
 
@@ -75,7 +77,13 @@ def export_on_ray(
 def _export_parts(ray: Any, format: str, out: Path, source: Source, options: dict[str, Any], progress: Callable[[int, int], None] | None) -> Path:
     if out.exists():
         raise FileExistsError(f"{out} exists; name another output, or delete it")
-    folder = out.absolute().with_name(f"{out.name}.parts")
+    with own_folder(out.absolute().with_name(f"{out.name}.parts"), f"another process writes {out}") as folder:
+        return _join_parts(ray, format, out, folder, source, options, progress)
+
+
+def _join_parts(
+    ray: Any, format: str, out: Path, folder: Path, source: Source, options: dict[str, Any], progress: Callable[[int, int], None] | None
+) -> Path:
     ends = [*range(_CHUNK, len(source), _CHUNK), len(source)]
     calls = [(format, source.part(begin, end), str(folder / str(end)), options) for begin, end in zip([0, *ends], ends)]
 
@@ -90,13 +98,8 @@ def _export_parts(ray: Any, format: str, out: Path, source: Source, options: dic
             if progress is not None:
                 progress(end, len(source))
 
-    with only_writer(folder):
-        shutil.rmtree(folder, ignore_errors=True)
-        try:
-            with running(ray, _write_part, calls, lambda format, part, *_: f"The export of the episodes {_numbers(part)} to {format}") as tasks:
-                _PARTS[format].join(source, parts(iter(tasks)), out)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+    with running(ray, _write_part, calls, lambda format, part, *_: f"The export of the episodes {_numbers(part)} to {format}") as tasks:
+        _PARTS[format].join(source, parts(iter(tasks)), out)
     return out
 
 
@@ -114,5 +117,7 @@ def _write_part(format: str, source: Source, out: str, options: dict[str, Any]) 
         local = folder / "part"
         _PARTS[format].write(source, local, **options)
         if not Path(out).exists():  # left by a worker that died after it
-            with unlocked_output(Path(out)) as path:
-                shutil.copytree(local, path) if local.is_dir() else shutil.copyfile(local, path)
+            copy = Path(f"{out}.{uuid.uuid4().hex}")  # in the driver's folder, which deletes it if this worker dies
+            shutil.copytree(local, copy) if local.is_dir() else shutil.copyfile(local, copy)
+            with contextlib.suppress(OSError):  # another worker was faster
+                copy.rename(out)

@@ -28,6 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--trim-idle", action=argparse.BooleanOptionalAction,
                         help="Leave out the steps in which nothing moves; by default in episodes whose task places an object. "
                         "Formats: lerobot, lerobot21, robomimic, rlds, zarr.")  # fmt: skip
+    parser.add_argument("--exact-rate", action="store_true",
+                        help="lerobot, lerobot21: keep a rate that is not a whole number, which LeRobot's own tools cannot edit. By default it is "
+                        "rounded if that changes it by at most 5 %%.")  # fmt: skip
     add_ray(parser)
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--encode-again", action="store_true", help="mcap: encode videos that have B-frames again, without them.")
@@ -42,7 +45,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
-    options: dict[str, Any] = {"encode_again": True} if arguments.encode_again else {}
+    if arguments.exact_rate and arguments.format not in ("lerobot", "lerobot21"):
+        raise ValueError("--exact-rate is an option of the formats lerobot and lerobot21")
+    options: dict[str, Any] = {name: True for name in ("encode_again", "exact_rate") if getattr(arguments, name)}
     if arguments.format not in ("mcap", "rerun"):
         options["trim_idle"] = arguments.trim_idle
     elif arguments.trim_idle:

@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--segmentation", action=flag, help="Segmentation images of all cameras; by default as recorded.")
     parser.add_argument("--shadows", action=flag, help="Shadows; by default as recorded.")
     parser.add_argument("--samples", type=int, metavar="N", help="Rays per pixel of rgb; by default as recorded.")
+    parser.add_argument("--shadow-samples", type=int, metavar="N", help="Points of each lamp at which shadows are computed; by default as recorded.")
     parser.add_argument("--brightness", type=float, metavar="X", help="Factor of all lights; by default as recorded.")
     parser.add_argument("--sensors", metavar="FILE", help="TOML file with [[sensors]] tables, as in a robot.toml.")
     parser.add_argument("--copy", action=flag, default=True, help="Copy the videos of recorded cameras that do not change.")
@@ -81,8 +82,8 @@ def run(arguments: argparse.Namespace) -> int:
         if name in added:
             raise ValueError(f"--add-camera: '{name}' is given twice")
         added[name] = camera
-    same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "brightness", "copy", "episodes", "worlds",
-            "threads", "batches", "crf", "preset", "resume")  # fmt: skip
+    same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "shadow_samples", "brightness", "copy", "episodes",
+            "worlds", "threads", "batches", "crf", "preset", "resume")  # fmt: skip
     if arguments.ray:
         return _on_ray(arguments, added, [name for name in same if name not in ("batches", "episodes", "resume")])
     made = render(

@@ -102,15 +102,16 @@ class _House:
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
         )  # fmt: skip
         settings = first._recording.settings
-        defaults = {"shadows": settings.get("shadows", True), "samples": settings.get("samples", 1),
-                    "brightness": settings.get("render", {}).get("brightness", 1.0)}  # fmt: skip
-        shadows, samples, brightness = (value if options[key] is None else options[key] for key, value in defaults.items())
-        as_recorded = options["copy"] and not options["edit"] and all(options[key] is None for key in (*defaults, "crf", "preset"))
+        images = render_cameras.recorded_images(settings)
+        given = {name: options[name] for name in (*images, "brightness", "crf", "preset") if options.get(name) is not None}
+        images |= {name: value for name, value in given.items() if name in images}
+        brightness = given.get("brightness", settings.get("render", {}).get("brightness", 1.0))
+        as_recorded = options["copy"] and not options["edit"] and not given
         copied = unchanged if as_recorded else []
         new_cameras = [camera for camera in cameras if camera not in copied]
         self._frames = sum(1 + camera.depth for camera in new_cameras)
-        handles = self._make_worlds(new_cameras, shadows, samples, brightness, options)
-        changed = {"cameras": [camera.settings() for camera in cameras], "shadows": shadows, "samples": samples,
+        handles = self._make_worlds(new_cameras, images, brightness, options)
+        changed = {"cameras": [camera.settings() for camera in cameras], **images,
                    "render": {"of": first._recording.provenance, "episodes": [episode.number for episode in episodes], "brightness": brightness,
                               "camera_system": options["camera_system"]}}  # fmt: skip
         self._recorder = self._make_recorder(out, handles, settings | changed, options)
@@ -120,12 +121,12 @@ class _House:
             if not self._recorder.decided(number):
                 self._recorder.skip_episode(number, "not in the rendering")
 
-    def _make_worlds(self, cameras: list[RenderCamera], shadows: bool, samples: int, brightness: float, options: dict[str, Any]) -> list[Any]:
+    def _make_worlds(self, cameras: list[RenderCamera], images: dict[str, Any], brightness: float, options: dict[str, Any]) -> list[Any]:
         """Makes the simulation with the cameras and sensors. Returns the handles of the streams to record."""
         first, sensors = self._episodes[0], list(options["sensors"])
         suite_sensors = [sensor for sensor in sensors if isinstance(sensor, CoreSensor)]
         scene_sensors = [sensor for sensor in sensors if not isinstance(sensor, CoreSensor)]
-        views = [camera.scene_sensor(shadows, samples) for camera in cameras]
+        views = [camera.scene_sensor(images) for camera in cameras]
         self._worlds = EpisodeWorlds(
             first, min(options["worlds"], len(self._episodes)), [*views, *scene_sensors],
             edit=options["edit"], brightness=brightness, threads=options["threads"],
@@ -222,6 +223,7 @@ def render(
     segmentation: bool | None = None,
     shadows: bool | None = None,
     samples: int | None = None,
+    shadow_samples: int | None = None,
     brightness: float | None = None,
     edit: Callable[[Any], None] | None = None,
     sensors: Callable[[], Iterable[Any]] | Iterable[Any] = (),
@@ -252,7 +254,8 @@ def render(
         camera_system: Name or file of a camera system of the robot.
         width, height: Size of all images; one alone keeps the aspect ratio. By default as recorded. [pixels]
         depth, segmentation: Whether every camera has depth and segmentation; by default as recorded.
-        shadows, samples: Whether shadows are drawn, and rays per pixel of rgb; by default as recorded.
+        shadows, samples, shadow_samples: Whether shadows are drawn, rays per pixel of rgb, and points of each lamp at which shadows are
+            computed; by default as recorded.
         brightness: Factor of all lights; by default as recorded.
         edit: Function that edits the MjSpec before compilation: adds lights, replaces textures, hides geoms. Bodies, joints and geoms
             must stay as they are.
@@ -270,8 +273,8 @@ def render(
     """
     options: dict[str, Any] = {
         "cameras": cameras, "add_cameras": add_cameras or {}, "camera_system": camera_system, "width": width, "height": height, "depth": depth,
-        "segmentation": segmentation, "shadows": shadows, "samples": samples, "brightness": brightness, "edit": edit, "copy": copy, "worlds": worlds,
-        "threads": threads, "batches": batches, "crf": crf, "preset": preset, "resume": resume,
+        "segmentation": segmentation, "shadows": shadows, "samples": samples, "shadow_samples": shadow_samples, "brightness": brightness, "edit": edit, "copy": copy,
+        "worlds": worlds, "threads": threads, "batches": batches, "crf": crf, "preset": preset, "resume": resume,
     }  # fmt: skip
     for name, value in (("worlds", worlds), ("width", width), ("height", height), ("samples", samples)):
         if value is not None and value < 1:

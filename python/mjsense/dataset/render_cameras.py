@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import functools
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -25,6 +27,26 @@ ROBOT_PREFIX = "robot_0/"
 _DEFAULT_SIZE = (640, 480)
 
 
+@functools.cache
+def _recording_options() -> dict[str, dict[str, Any]]:
+    """The options of a recording that decide all images, as the field table declares them, by name: those that are fields of a camera, too, but
+    for the size, which each camera has. The camera's name of a switch begins with ``use_``."""
+    structs = json.loads(_core.schema())["structs"]
+    fields = {field["name"] for field in structs["CameraSensorCfg"]["fields"]} - {"width", "height"}
+    options = {option["name"]: option for option in structs["RecordJobCfg"]["fields"]}
+    return {name: {**option, "camera": field} for name, option in options.items() for field in (name, f"use_{name}") if field in fields}
+
+
+def image_options() -> dict[str, str]:
+    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras."""
+    return {name: option["camera"] for name, option in _recording_options().items()}
+
+
+def recorded_images(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of :func:`image_options` in a recording with these settings. One that is older than an option has its default."""
+    return {name: settings.get(name, option["default"]) for name, option in _recording_options().items()}
+
+
 @dataclass(frozen=True)
 class RenderCamera:
     """A camera to render. If ``camera`` is empty, it is added to the model at ``pos``, ``quat`` in the frame of ``body``."""
@@ -44,10 +66,14 @@ class RenderCamera:
     def fields(self) -> list[str]:
         return ["rgb", *(["depth"] if self.depth else []), *(["segmentation"] if self.segmentation else [])]
 
-    def scene_sensor(self, shadows: bool, samples: int) -> CameraSensorCfg:
-        about: dict[str, Any] = dict(
-            name=self.name, width=self.width, height=self.height, data_types=tuple(self.fields), use_shadows=shadows, samples=samples
-        )
+    def scene_sensor(self, images: Mapping[str, Any]) -> CameraSensorCfg:
+        """The camera as a sensor.
+
+        Args:
+            images: Values of the image options of a recording, by name.
+        """
+        about: dict[str, Any] = dict(name=self.name, width=self.width, height=self.height, data_types=tuple(self.fields))
+        about |= {field: images[option] for option, field in image_options().items()}
         if self.camera:
             return CameraSensorCfg(camera_name=self.camera, **about)
         return CameraSensorCfg(parent_body=self.body or None, pos=self.pos, quat=self.quat, fovy=self.fovy, **about)

@@ -117,7 +117,8 @@ class _Archived:
 
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
         cameras, settings = render_cameras.recorded_cameras(episode, None), episode._recording.settings
-        views = [camera.scene_sensor(settings.get("shadows", True), settings.get("samples", 1)) for camera in cameras]
+        images = render_cameras.recorded_images(settings)
+        views = [camera.scene_sensor(images) for camera in cameras]
         self._worlds = EpisodeWorlds(episode, num_worlds, views, brightness=settings.get("render", {}).get("brightness", 1.0), threads=threads)
         self.sim = self._worlds.sim
         self._sensors, self.handles = recorded_sensors(self.sim, [stream for camera in cameras for stream in camera.streams()])

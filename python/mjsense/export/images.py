@@ -14,6 +14,7 @@ from mjsense.dataset import Episode, Video
 from mjsense.errors import UnknownNameError
 from mjsense.export.mapping import Source
 from mjsense.export.output import needs
+from mjsense.export.remux import ends_with_last_frame
 
 CRF = 18
 """Quality of videos that are encoded again, better than the recording's own."""
@@ -52,24 +53,28 @@ def padded(image: np.ndarray) -> Any:
 
 
 @contextlib.contextmanager
-def video_file(video: Video, folder: Path) -> Iterator[Path]:
-    """The file of a colour video. That of a trimmed episode is encoded again, into ``folder``, and deleted at the end of the block."""
+def video_file(video: Video, folder: Path) -> Iterator[tuple[Path, int]]:
+    """The file of a colour video, of which the first ``len(video) - 1`` frames belong to steps, and its number of frames.
+
+    The video of a trimmed episode, or one in which other frames need the last frame, is encoded again, without the last frame, into ``folder``,
+    and deleted at the end of the block.
+    """
     video.check()
-    if not video.trimmed:
-        yield video.path
+    if not video.trimmed and ends_with_last_frame(video.path):
+        yield video.path, len(video)
         return
-    path = folder / "trimmed.mp4"
+    path = folder / "encoded.mp4"
     path.parent.mkdir(parents=True, exist_ok=True)
     with needs("av").open(str(path), "w", format="mp4") as file:
         stream = file.add_stream("libx264", rate=video.fps, options=_OPTIONS)
         height, width = video.shape[1:3]
         stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
-        for t in range(len(video)):
+        for t in range(len(video) - 1):
             frame = padded(video[t])
             frame.pts = t
             file.mux(stream.encode(frame))
         file.mux(stream.encode())
     try:
-        yield path
+        yield path, len(video) - 1
     finally:
         path.unlink()

@@ -20,6 +20,7 @@ from mjsense.export.images import video_file
 from mjsense.export.lerobot_files import (
     FILES_PER_CHUNK,
     Statistics,
+    check_columns,
     codec_of,
     columns_of,
     features_of,
@@ -27,6 +28,7 @@ from mjsense.export.lerobot_files import (
     in_folder,
     is_depth,
     number,
+    print_rate,
     table_of,
     times,
     write_json,
@@ -49,6 +51,7 @@ def export_lerobot(
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
     trim_idle: bool | None = None,
+    exact_rate: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
@@ -61,13 +64,16 @@ def export_lerobot(
         success: Only successful (True) or only failed (False) episodes.
         trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
             places an object. Videos of episodes with such steps are encoded again.
+        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
+            such a data set. By default the rate is rounded if that changes it by at most 5 %.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_trimming()
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle, whole_rate=not exact_rate)
+    source.print_notes()
+    print_rate(source)
     with new_output(out) as path:
         writer = Writer(source, path)
         for episode in source.each(progress):
@@ -112,16 +118,24 @@ class _Videos:
         self._file = 0
         self._video = self._new()
 
-    def add(self, path: Path, length: int) -> tuple[dict[str, int], float]:
-        """Appends a video of ``length + 1`` frames, the last of which is not used. Returns its file and the time of its first frame there."""
+    def add(self, path: Path, fps: Fraction, frames: int, length: int) -> tuple[dict[str, int], float]:
+        """Appends the first ``length`` frames of a video. Returns its file and the time of its first frame there.
+
+        LeRobot's StreamingLeRobotDataset computes the time of a frame from the number of its row in the whole data set, so a file must not
+        contain any other frame.
+
+        Args:
+            fps: Rate of the video.
+            frames: Number of frames of the video.
+        """
         first = self._video.frames
         full = first and self._video.bytes + path.stat().st_size > VIDEO_FILE_MB * 1e6
-        if full or not self._found_by_time(length) or not self._video.add(path, length + 1):
+        if full or not self._found_by_time(length) or not self._video.add(path, fps, frames, length):
             self.close()
             self._file += 1
             self._video = self._new()
             first = 0
-            self._video.add(path, length + 1)
+            self._video.add(path, fps, frames, length)
         return _place(self._file), float(times(1, self._fps, first)[0])
 
     def close(self) -> None:
@@ -146,6 +160,7 @@ class Writer:
     """A data set that is being written."""
 
     def __init__(self, source: Source, path: Path) -> None:
+        check_columns(source)
         self._source, self._path = source, path
         self._tasks: list[str] = []
         self._data, self._episodes = _Tables(path / "data"), _Tables(path / "meta/episodes")
@@ -167,7 +182,8 @@ class Writer:
         columns = columns_of(self._source, episode, self._count, self._frames, self._tasks.index(episode.task))
         length = episode.length - 1
         entry: dict[str, Any] = {"episode_index": self._count, "tasks": [episode.task], "length": length}
-        entry["trimmed_steps"] = episode.trimmed_steps  # LeRobot warns of unknown keys in info.json, but not of columns
+        # LeRobot warns of unknown keys in info.json, but not of columns.
+        entry |= {"trimmed_steps": episode.trimmed_steps, "recorded_fps": float(self._source.recorded_fps)}
         entry |= {"dataset_from_index": self._frames, "dataset_to_index": self._frames + length}
         entry |= {f"data/{name}": value for name, value in self._data.place.items()}
         self._data.add(table_of(columns))
@@ -177,9 +193,10 @@ class Writer:
             if is_depth(self._source, camera):
                 place, first, histograms[key] = self._add_depth(episode, camera, videos)
             else:
-                with video_file(self._source.video(episode, camera), self._path) as path:
+                video = self._source.video(episode, camera)
+                with video_file(video, self._path) as (path, frames):
                     self._codec = self._codec or codec_of(path)
-                    place, first = videos.add(path, length)
+                    place, first = videos.add(path, video.fps, frames, length)
                 histograms[key] = image_histograms(episode, self._source.cameras[camera])
             entry |= {f"videos/{key}/{name}": value for name, value in place.items()}
             entry |= {f"videos/{key}/from_timestamp": first, f"videos/{key}/to_timestamp": first + length / float(self._source.fps)}
@@ -191,9 +208,10 @@ class Writer:
         self._frames += length
         self._trimmed += episode.trimmed_steps
 
-    def print_trimming(self) -> None:
-        """Prints on stderr how many steps of the episodes are left out, if any are."""
+    def print_notes(self) -> None:
+        """Prints on stderr what the data set leaves out of the episodes, and whether its rate is another one."""
         print_trimming(self._trimmed, self._trimmed + self._frames)
+        print_rate(self._source)
 
     def _add_depth(self, episode: Episode, camera: str, videos: _Videos) -> tuple[dict[str, int], float, tuple[np.ndarray, int]]:
         """Encodes a depth video as LeRobot expects it, and writes the exact one to ``extras``; MolmoSpaces' is exact only as a whole."""
@@ -205,8 +223,9 @@ class Writer:
         elif video._info.encoding == "depth16":
             lerobot_depth.encode_exactly(video, in_folder(exact))  # without the frames that are left out
         encoded = self._path / "depth.mp4"
-        histogram = lerobot_depth.encode_depth(video, encoded, self._source.fps, episode.length - 1)
-        place, first = videos.add(encoded, episode.length - 1)
+        length = episode.length - 1
+        histogram = lerobot_depth.encode_depth(video, encoded, self._source.fps, length)
+        place, first = videos.add(encoded, self._source.fps, length, length)
         encoded.unlink()
         return place, first, histogram
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from mjsense.export.images import video_file
 from mjsense.export.lerobot_files import (
     FILES_PER_CHUNK,
     Statistics,
+    check_columns,
     codec_of,
     columns_of,
     exported,
@@ -24,11 +24,13 @@ from mjsense.export.lerobot_files import (
     is_depth,
     key_of,
     number,
+    print_rate,
     table_of,
     write_json,
 )
-from mjsense.export.mapping import Mapping, Source
+from mjsense.export.mapping import Mapping, Source, check_names
 from mjsense.export.output import needs, new_output
+from mjsense.export.remux import Concatenation
 
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 _VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
@@ -45,6 +47,7 @@ def export_lerobot21(
     episodes: Iterable[int] | None = None,
     success: bool | None = None,
     trim_idle: bool | None = None,
+    exact_rate: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``. See docs/export.md.
@@ -57,21 +60,26 @@ def export_lerobot21(
         success: Only successful (True) or only failed (False) episodes.
         trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
             places an object. Videos of episodes with such steps are encoded again.
+        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
+            such a data set. By default the rate is rounded if that changes it by at most 5 %.
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
         ``out``.
     """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_trimming()
+    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle, whole_rate=not exact_rate)
+    source.print_notes()
+    print_rate(source)
     if depth := [camera for camera in source.cameras if is_depth(source, camera)]:
         raise ValueError(f"LeRobot v2.1 has no depth images; leave '{depth[0]}' out of the map, or export to LeRobot v3.0")
+    check_columns(source, [f"annotation.{_INSTRUCTION}"])
+    modality = modality_of(source)
     with new_output(out) as path:
-        _write(source, path, progress)
+        _write(source, path, modality, progress)
     return Path(out)
 
 
-def _write(source: Source, path: Path, progress: Callable[[int, int], None] | None) -> None:
+def _write(source: Source, path: Path, modality: dict[str, Any], progress: Callable[[int, int], None] | None) -> None:
     entries: list[dict[str, Any]] = []
     found: list[dict[str, Any]] = []
     codec: dict[str, Any] = {}
@@ -84,18 +92,23 @@ def _write(source: Source, path: Path, progress: Callable[[int, int], None] | No
         needs("pyarrow.parquet").write_table(table_of(columns), in_folder(path / _DATA.format(**place)))
         histograms = {}
         for camera in source.cameras:
-            with video_file(source.video(episode, camera), path) as video:
-                codec = codec or codec_of(video)
-                shutil.copyfile(video, in_folder(path / _VIDEO.format(video_key=image_key(camera), **place)))
+            video = source.video(episode, camera)
+            with video_file(video, path) as (file, frames):
+                codec = codec or codec_of(file)
+                copy = Concatenation(path / _VIDEO.format(video_key=image_key(camera), **place), source.fps)
+                copy.add(file, video.fps, frames, episode.length - 1)
+                copy.close()
             histograms[image_key(camera)] = image_histograms(episode, source.cameras[camera])
-        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1, "trimmed_steps": episode.trimmed_steps})
+        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1,
+                        "trimmed_steps": episode.trimmed_steps, "recorded_fps": float(source.recorded_fps)})  # fmt: skip
         found.append({"episode_index": position, "stats": statistics.add(columns, histograms)})
         first += episode.length - 1
     _write_lines(path / "meta/episodes.jsonl", entries)
     _write_lines(path / "meta/episodes_stats.jsonl", found)
     _write_lines(path / "meta/tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(source.tasks)])
-    write_json(path / "meta/stats.json", statistics.all())
-    write_json(path / "meta/modality.json", modality_of(source))
+    # GR00T's loader takes the numbers of a move group out of every statistic, so each must have as many as the column.
+    write_json(path / "meta/stats.json", {name: {key: value for key, value in found.items() if key != "count"} for name, found in statistics.all().items()})
+    write_json(path / "meta/modality.json", modality)
     count = len(source)
     info = {
         "codebase_version": "v2.1", "robot_type": source.robot or None, "total_episodes": count, "total_frames": first,
@@ -108,14 +121,20 @@ def _write(source: Source, path: Path, progress: Callable[[int, int], None] | No
 
 
 def modality_of(source: Source) -> dict[str, Any]:
-    """The parts of state and action by move group, the cameras, and the instruction, as GR00T's loader expects them."""
+    """The parts of state and action by move group, the cameras, and the instruction, as GR00T's loader expects them. Other features have
+    their own names; one with several streams is followed by the name of the stream: ``velocity_arm``."""
     result: dict[str, Any] = {"state": {}, "action": {}}
+    names: list[tuple[str, str]] = []
     for feature in exported(source):
         if feature.name in ("reward", "success"):
             continue
-        for name, part in feature.parts.items():
-            entry = {"start": part.start, "end": part.stop, "original_key": key_of(feature)}
-            result["action" if feature.of_step else "state"][name] = entry
+        kind = "action" if feature.of_step else "state"
+        own = feature.name.removeprefix("observation.").removeprefix("next.").replace(".", "_")
+        for part, place in feature.parts.items():
+            name = part if feature.name in ("state", "action") else own if len(feature.parts) == 1 else f"{own}_{part}"
+            names.append((f"{kind}.{name}", f"the feature '{feature.name}'"))
+            result[kind][name] = {"start": place.start, "end": place.stop, "original_key": key_of(feature)}
+    check_names(names)
     result["video"] = {camera: {"original_key": image_key(camera)} for camera in source.cameras}
     result["annotation"] = {_INSTRUCTION: {}}
     return result

@@ -46,10 +46,10 @@ def encode_exactly(video: Video, path: Path) -> None:
 
 
 def encode_depth(video: Video, path: Path, fps: Fraction, length: int) -> tuple[np.ndarray, int]:
-    """Encodes a depth video to the MP4 file ``path``.
+    """Encodes the first ``length`` frames of a depth video to the MP4 file ``path``.
 
     Returns:
-        Histogram int64 [1, 4096] of the codes of the first ``length`` frames, and ``length``.
+        Histogram int64 [1, 4096] of their codes, and ``length``.
     """
     av: Any = needs("av")
     counts = np.zeros((1, _LARGEST + 1), np.int64)
@@ -57,10 +57,9 @@ def encode_depth(video: Video, path: Path, fps: Fraction, length: int) -> tuple[
     with av.open(str(path), "w", format="mp4") as file:
         stream = file.add_stream("libx265", rate=fps, options={"x265-params": _X265})
         stream.width, stream.height, stream.pix_fmt = width, height, "gray12le"
-        for t in range(len(video)):
+        for t in range(length):
             codes = codes_of(video[t])
-            if t < length:
-                counts[0] += np.bincount(codes.ravel(), minlength=_LARGEST + 1)
+            counts[0] += np.bincount(codes.ravel(), minlength=_LARGEST + 1)
             frame = av.VideoFrame.from_ndarray(codes, format="gray12le")
             frame.pts = t
             file.mux(stream.encode(frame))

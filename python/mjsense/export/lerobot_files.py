@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,10 +15,12 @@ import numpy as np
 from mjsense.dataset import Episode, statistics
 from mjsense.dataset.video_decoder import open_container
 from mjsense.export import lerobot_depth
-from mjsense.export.mapping import Feature, Source
+from mjsense.export.mapping import Feature, Source, check_names
 from mjsense.export.output import needs
 
 FILES_PER_CHUNK = 1000
+_WHOLE_RATE = "With --policy-dt 50 (policy_dt_ms=50), `mjsense record` records 20 per second"
+_INDICES = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 
 
 def key_of(feature: Feature) -> str:
@@ -39,6 +43,28 @@ def exported(source: Source) -> list[Feature]:
     return [feature for name, feature in source.features.items() if name not in ("terminated", "truncated")]
 
 
+def print_rate(source: Source) -> None:
+    """Prints on stderr that the rate is not a whole number."""
+    exact, longer = float(source.recorded_fps), float(source.recorded_fps / source.fps) - 1
+    if source.fps != source.recorded_fps:
+        print(f"{exact:.6g} rows per second are written as {source.fps}, because LeRobot's rates are whole numbers: times are {abs(longer):.1%} "
+              f"{'longer' if longer > 0 else 'shorter'}; --exact-rate (exact_rate=True) keeps the rate. {_WHOLE_RATE}", file=sys.stderr)  # fmt: skip
+    elif source.fps.denominator != 1:
+        print(f"{exact:.6g} rows per second are not a whole number: LeRobot reads the data set, but cannot delete, split or append episodes. "
+              f"{_WHOLE_RATE}", file=sys.stderr)  # fmt: skip
+
+
+def check_columns(source: Source, more: Iterable[str] = ()) -> None:
+    """Raises ValueError if two columns would have the same name.
+
+    Args:
+        more: Further columns of the format.
+    """
+    own = ("next.done", *_INDICES, "task", *more)
+    names = [*((name, f"LeRobot's column '{name}'") for name in own), *((key_of(feature), f"the feature '{feature.name}'") for feature in exported(source))]
+    check_names([*names, *((image_key(camera), f"the camera '{camera}'") for camera in source.cameras)])
+
+
 def features_of(source: Source, codec: dict[str, Any]) -> dict[str, Any]:
     """The entry ``features`` of ``meta/info.json``."""
     found: dict[str, Any] = {}
@@ -52,7 +78,7 @@ def features_of(source: Source, codec: dict[str, Any]) -> dict[str, Any]:
         shape = [height, width, info["video.channels"]]
         found[image_key(camera)] = {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": info}
     found["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
-    for name in ("frame_index", "episode_index", "index", "task_index"):
+    for name in _INDICES[1:]:
         found[name] = {"dtype": "int64", "shape": [1], "names": None}
     return found
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense._input_files import read_toml
+from mjsense._rows import is_image
 from mjsense.dataset import Dataset, Episode, Stream, Video
 from mjsense.dataset.episode import LARGE_ROW, VIDEOS, given_name
 from mjsense.dataset.files import is_unfinished
@@ -23,6 +24,7 @@ from mjsense.errors import UnknownNameError
 
 _OF_STEPS = ("actions/", "rewards", "success", "fail", "terminated", "truncated")
 """Row t of these streams belongs to the step that led to observation t."""
+_RATE_CHANGE = 0.05
 _JOINTS, _RELATIVE = "actions/joint_pos/", ("actions/joint_pos_rel/", "actions/ee_twist/")
 _FLAGS = {"reward": ("rewards",), "success": ("success",), "terminated": ("terminated",), "truncated": ("truncated",)}
 
@@ -113,6 +115,7 @@ class Source:
         success: Only successful (True) or only failed (False) episodes.
         trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`); None: in episodes whose task places an
             object.
+        whole_rate: Round ``fps`` to a whole number, as formats need whose rates are whole numbers, if that changes it by at most 5 %.
     """
 
     def __init__(
@@ -123,6 +126,7 @@ class Source:
         episodes: Iterable[int] | None = None,
         success: bool | None = None,
         trim_idle: bool | None = False,
+        whole_rate: bool = False,
     ) -> None:
         mapping = Mapping.of(map)
         chosen = Dataset(root, episodes=episodes, success=success)
@@ -133,23 +137,34 @@ class Source:
         """The episodes that have at least one step."""
         if not self.episodes:
             raise ValueError(f"{root}: no episode with a step matches")
+        self._notes: list[str] = []
+        if without := len(chosen.episodes) - len(self.episodes):
+            self._notes.append(f"{without} of {len(chosen.episodes)} episodes have one observation and no step; they are left out")
         if episodes is None and is_unfinished(chosen.root):
             print(f"{root} is unfinished; the export has the episodes that are published", file=sys.stderr)
         self.first_step: int = 0
         """Number of steps of the episodes before, in a part of a recording."""
-        self.fps: Fraction = chosen.fps
+        self.recorded_fps: Fraction = chosen.fps
         """Observations per second, exactly."""
+        self.fps: Fraction = _whole(chosen.fps) if whole_rate else chosen.fps
+        """The rate that the export states."""
         self.robot: str = str(self.episodes[0].settings.get("robot", ""))
         """Name of the robot; empty if the recording does not state it."""
         known = dict(chosen.streams)
         state = _default_state(known) if mapping.state is None else mapping.state
         action = _default_action(known) if mapping.action is None else mapping.action
         wanted = {"state": state, "action": action, **mapping.features, **_FLAGS}
+        if not state:  # an environment whose observation has no numbers
+            del wanted["state"]
         self.features: dict[str, Feature] = {name: _feature(chosen, name, streams, known) for name, streams in wanted.items()}
-        """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features."""
+        """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features. Without ``state`` if
+        the recorded observation consists of images."""
         self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
         """The distinct instructions, in the order of their first episode."""
         colour = [name[len(VIDEOS) :] for name, stream in chosen.streams.items() if stream.kind == "video" and len(stream.shape) == 3]
+        if mapping.state is None:
+            self._notes += [f"the image '{name}' is recorded as an array; it is left out, because videos become images of an export"
+                            for name in known if _observed(name) and _is_image(known[name]) and known[name].kind != "video"]  # fmt: skip
         self.cameras: dict[str, str] = {camera: camera for camera in colour} if mapping.cameras is None else dict(mapping.cameras)
         """Names of cameras in the recording by exported name."""
         for camera in self.cameras.values():
@@ -175,10 +190,12 @@ class Source:
         part.first_step = self.first_step + sum(episode.length - 1 for episode in self.episodes[:begin])
         return part
 
-    def print_trimming(self) -> None:
-        """Prints on stderr how many steps are left out, if any are."""
+    def print_notes(self) -> None:
+        """Prints on stderr what the export leaves out."""
         trimmed = sum(episode.trimmed_steps for episode in self.episodes)
         print_trimming(trimmed, trimmed + sum(episode.length - 1 for episode in self.episodes))
+        for note in self._notes:
+            print(note, file=sys.stderr)
 
     def rows(self, episode: Episode) -> dict[str, np.ndarray]:
         """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
@@ -225,6 +242,37 @@ def print_trimming(trimmed: int, steps: int) -> None:
         print(f"{share}, in which nothing moves, are left out; --no-trim-idle (trim_idle=False) keeps them", file=sys.stderr)
 
 
+def _whole(fps: Fraction) -> Fraction:
+    """The nearest whole rate, or ``fps`` if that differs by more than 5 %."""
+    whole = Fraction(max(1, round(fps)))
+    return whole if abs(whole / fps - 1) <= _RATE_CHANGE else fps
+
+
+def check_names(names: Iterable[tuple[str, str]]) -> None:
+    """Raises ValueError if two things would have the same name in an export, where one of them would replace the other.
+
+    Args:
+        names: Names in the export, and what they belong to.
+    """
+    owners: dict[str, str] = {}
+    for name, owner in names:
+        if owners.setdefault(name, owner) != owner:
+            raise ValueError(f"{owners[name]} and {owner} have the same name in the export, '{name}'; choose other names in the map")
+
+
+def named_streams(source: Source, features: Iterable[str], place: str = "", image: str = "") -> Iterator[tuple[str, str]]:
+    """Names in an export, for :func:`check_names`: those of features and cameras, and of the depth images that formats add to cameras.
+
+    Args:
+        place: Start of the names, such as ``obs/``.
+        image: End of the names of cameras.
+    """
+    yield from ((f"{place}{name}", f"the feature '{name}'") for name in features)
+    yield from ((f"{place}{name}{image}", f"the video '{camera}'") for name, camera in source.cameras.items())
+    known = source.episodes[0].streams if source.episodes else {}
+    yield from ((f"{place}{name}_depth", f"the video '{camera}_depth'") for name, camera in source.cameras.items() if f"{VIDEOS}{camera}_depth" in known)
+
+
 def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
     try:
         expanded = chosen._expand_all(streams, known)
@@ -242,6 +290,8 @@ def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[s
         size = int(np.prod(about.shape))
         parts[short] = slice(len(names), len(names) + size)
         names += [f"{short}_{i}" for i in range(size)] if about.shape else [short]
+    if not names:
+        raise ValueError(f"The feature '{name}' has no numbers: {', '.join(found)} is empty")
     of_step = {stream.startswith(_OF_STEPS) for stream in found}
     if len(of_step) != 1:
         raise ValueError(f"The feature '{name}' mixes observations and results of steps: {', '.join(found)}")
@@ -249,10 +299,22 @@ def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[s
 
 
 def _default_state(known: dict[str, Stream]) -> tuple[str, ...]:
+    """Streams of the state; none if the observation of an environment has no numbers."""
     if any(name.startswith("obs/agent/qpos") for name in known):
         return ("obs/agent/qpos",)
-    observed = [name for name in known if f"{name}/".startswith("obs/extra/observation/") and len(known[name].shape) < 2]
-    return tuple(observed) or ("obs/agent/qpos",)
+    observed = [name for name in known if _observed(name)]
+    numbers = [name for name in observed if not _is_image(known[name]) and np.prod(known[name].shape)]
+    return tuple(numbers) if observed else ("obs/agent/qpos",)
+
+
+def _observed(name: str) -> bool:
+    """Whether the stream belongs to the observation of an environment that :class:`mjsense.RecordEpisodes` recorded."""
+    return f"{name}/".startswith(("obs/extra/observation/", f"{VIDEOS}observation/"))
+
+
+def _is_image(stream: Stream) -> bool:
+    """Whether the rows of an observation are images, or as large as images."""
+    return stream.kind == "video" or is_image(stream.dtype, stream.shape) or stream.dtype.itemsize * int(np.prod(stream.shape)) >= LARGE_ROW
 
 
 def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from mjsense._rotations import quaternions_of
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.video_decoder import open_container
 from mjsense.export.images import CRF, depth_videos, padded
-from mjsense.export.mapping import Mapping, Source
+from mjsense.export.mapping import Mapping, Source, check_names
 from mjsense.export.output import join_folders, needs, new_output
 from mjsense.export.scene import Body, Shape, bodies
 
@@ -56,6 +56,7 @@ def export_mcap(
         ValueError: A video has B-frames, and ``encode_again`` is False.
     """
     source = Source(root, map=map, episodes=episodes, success=success)
+    source.print_notes()
     with new_output(out) as path:
         write(source, path, progress, encode_again=encode_again)
     return Path(out)
@@ -66,6 +67,7 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     writers, schemas = needs("mcap.writer", "mcap"), needs("mcap_protobuf.schema", "mcap")
     for module in ("foxglove_schemas_protobuf", "av"):
         needs(module, "mcap")
+    check_names([*((topic, f"the topic '/{topic}'") for topic in ("tf", "scene", "joint_states")), *((name, f"the feature '{name}'") for name in source.features)])
     path.mkdir()
     for episode in source.each(progress):
         with open(path / f"episode_{episode.index:08d}.mcap", "wb") as file:

@@ -2,7 +2,7 @@
 """``record --format lerobot``: a recording that is converted to LeRobot v3.0 while it is made.
 
 The recording is made in the folder ``OUT.recording`` as always, so it is crash-safe and can be resumed. A thread adds each published HDF5
-file to the data set ``OUT.part``, which is renamed to ``OUT`` when the recording is complete. After a crash the data set is
+file to a data set in the folder ``OUT.part``, which is renamed to ``OUT`` when the recording is complete. After a crash the data set is
 written again from the beginning, which takes little time, because the recording contains the videos and the histograms of their images.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import threading
 from collections.abc import Iterator
@@ -19,9 +20,10 @@ from typing import Any
 from mjsense.dataset.files import BATCH
 from mjsense.export.lerobot import Writer
 from mjsense.export.mapping import Mapping, Source
-from mjsense.export.output import needs, only_writer, unlocked_output
+from mjsense.export.output import complete_output, needs, part_of
 
 _PERIOD_S = 0.3
+_HOUSE = re.compile(r"house_\d+")
 
 
 class CompleteError(FileExistsError):
@@ -50,22 +52,22 @@ def converted(
     final, mapping = Path(out), Mapping.of(map)
     for module in ("av", "pyarrow"):
         needs(module)
-    with only_writer(final), _converted(final, resume, {"map": mapping, "trim_idle": trim_idle}, keep_recording, quiet) as folder:
+    options = {"map": mapping, "trim_idle": trim_idle, "whole_rate": True}
+    with part_of(final) as part, _converted(final, part, resume, options, keep_recording, quiet) as folder:
         yield folder
 
 
 @contextlib.contextmanager
-def _converted(final: Path, resume: bool, options: dict[str, Any], keep_recording: bool, quiet: bool) -> Iterator[Path]:
-    folder, removed = (final.with_name(f"{final.name}{end}") for end in (".recording", ".removed"))
-    shutil.rmtree(removed, ignore_errors=True)
+def _converted(final: Path, part: Path, resume: bool, options: dict[str, Any], keep_recording: bool, quiet: bool) -> Iterator[Path]:
+    folder = final.with_name(f"{final.name}.recording")
     if final.is_dir() and any(final.iterdir()):
-        if not resume:
+        if not resume or not (final / "meta/info.json").exists():
             raise FileExistsError(f"{final} exists; name another output, or delete it")
-        _remove(folder, removed, keep_recording)
+        _remove(folder, part, keep_recording)
         raise CompleteError(f"{final} is complete")
     if folder.exists() and not resume:
         raise FileExistsError(f"{folder} contains an unfinished recording: continue it with resume (--resume), or delete it")
-    conversion = _Conversion(folder, final, options)
+    conversion = _Conversion(folder, final, part, options)
     conversion.start()
     try:
         yield folder
@@ -73,23 +75,23 @@ def _converted(final: Path, resume: bool, options: dict[str, Any], keep_recordin
         conversion.end()
     if final.exists():
         if conversion.writer is not None and not quiet:
-            conversion.writer.print_trimming()
-        _remove(folder, removed, keep_recording)
+            conversion.writer.print_notes()
+        _remove(folder, part, keep_recording)
 
 
-def _remove(folder: Path, removed: Path, keep: bool) -> None:
-    """Removes a recording so that a crash leaves nothing that looks like one."""
-    if not keep and folder.exists():
-        folder.rename(removed)
-        shutil.rmtree(removed)
+def _remove(folder: Path, part: Path, keep: bool) -> None:
+    """Removes a recording so that a crash leaves nothing that looks like one. A folder that contains anything else stays."""
+    if not keep and folder.exists() and all(_HOUSE.fullmatch(path.name) for path in folder.iterdir()):
+        folder.rename(part / "removed")
+        shutil.rmtree(part / "removed")
 
 
 class _Conversion(threading.Thread):
     """Writes the data set while the recording grows."""
 
-    def __init__(self, recording: Path, out: Path, options: dict[str, Any]) -> None:
+    def __init__(self, recording: Path, out: Path, part: Path, options: dict[str, Any]) -> None:
         super().__init__(name="mjsense-lerobot", daemon=True)
-        self._recording, self._out, self._options = recording, out, options
+        self._recording, self._out, self._part, self._options = recording, out, part, options
         self.writer: Writer | None = None
         self._ended, self._error = threading.Event(), None
 
@@ -118,7 +120,7 @@ class _Conversion(threading.Thread):
         return not any(self._recording.glob("house_*/.recording"))
 
     def _convert(self) -> None:
-        with contextlib.suppress(_UnfinishedError), unlocked_output(self._out) as path:
+        with contextlib.suppress(_UnfinishedError), complete_output(self._out, self._part) as path:
             abouts: list[tuple[Any, ...]] = []
             done: list[Path] = []
             while True:

@@ -44,6 +44,7 @@ def export_rerun(
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success)
+    source.print_notes()
     with new_output(out) as path:
         write(source, path, progress)
     return Path(out)

@@ -16,11 +16,13 @@ from mjsense._arguments import checked
 from mjsense._png import png_of
 from mjsense.dataset import Episode
 from mjsense.export.images import FLAGS, depth_unit, depth_videos, to_uint16
-from mjsense.export.mapping import Mapping, Source
+from mjsense.export.mapping import Mapping, Source, check_names, named_streams
 from mjsense.export.output import needs, new_output
 
 _VERSION = "1.0.0"
 _SHARD_BYTES = 200_000_000
+_OWN = ("observation", "reward", "discount", "is_first", "is_last", "is_terminal", "language_instruction")
+"""Members of a step."""
 _MODULE = "tensorflow_datasets.core.features."
 
 
@@ -51,7 +53,7 @@ def export_rlds(
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_trimming()
+    source.print_notes()
     _write_data_set(source, _records(source, progress), Path(out))
     return Path(out)
 
@@ -73,6 +75,10 @@ def join(source: Source, parts: Iterable[Path], out: Path) -> None:
 
 def _write_data_set(source: Source, records: Iterable[bytes], out: Path) -> None:
     name = out.resolve().name
+    observed = [feature for feature in source.features if not source.features[feature].of_step]
+    others = [feature for feature in source.features if source.features[feature].of_step and feature not in FLAGS]
+    check_names([*((key, f"RLDS's '{key}'") for key in _OWN), *((feature, f"the feature '{feature}'") for feature in others),
+                 *named_streams(source, observed, "observation/")])  # fmt: skip
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         valid = re.sub(r"\W+", "_", name.lower())
         raise ValueError(f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'")

@@ -15,11 +15,13 @@ from mjsense._gymnasium import env_id
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.model_xml import model_xml
 from mjsense.export.images import FLAGS, depth_videos
-from mjsense.export.mapping import Mapping, Source
+from mjsense.export.mapping import Mapping, Source, check_names, named_streams
 from mjsense.export.output import needs, new_output
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _VALID_EVERY = 10
+_OWN = ("actions", "rewards", "dones", "obs", "next_obs", "states", "integration_states", "assets")
+"""Members of a demonstration."""
 
 
 @checked
@@ -50,7 +52,7 @@ def export_robomimic(
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_trimming()
+    source.print_notes()
     with new_output(out) as path:
         write(source, path, progress)
     return Path(out)
@@ -58,11 +60,19 @@ def export_robomimic(
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Writes all episodes to the new file ``path``."""
+    _check_names(source)
     with needs("h5py", "robomimic").File(path, "w") as file:
         models: dict[bytes, Any] = {}
         for i, episode in enumerate(source.each(progress)):
             _write_demo(file.create_group(f"data/demo_{i}"), models, source, episode)
         _finish(file, source)
+
+
+def _check_names(source: Source) -> None:
+    observed = [name for name, feature in source.features.items() if not feature.of_step]
+    others = [name for name, feature in source.features.items() if feature.of_step and name not in ("action", *FLAGS)]
+    check_names([*((name, f"robomimic's '{name}'") for name in _OWN), *((name, f"the feature '{name}'") for name in others),
+                 *named_streams(source, observed, "obs/", "_image")])  # fmt: skip
 
 
 def join(source: Source, parts: Iterable[Path], out: Path) -> None:

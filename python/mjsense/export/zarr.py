@@ -11,7 +11,7 @@ import numpy as np
 
 from mjsense._arguments import checked
 from mjsense.export.images import depth_videos
-from mjsense.export.mapping import Mapping, Source
+from mjsense.export.mapping import Mapping, Source, check_names, named_streams
 from mjsense.export.output import needs, new_output
 
 _ROWS = 4096  # rows of a chunk of numbers
@@ -46,7 +46,7 @@ def export_zarr(
         ``out``.
     """
     source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_trimming()
+    source.print_notes()
     with new_output(out) as path:
         write(source, path, progress)
     return Path(out)
@@ -54,6 +54,7 @@ def export_zarr(
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Writes all episodes to the new folder ``path``. Of a part of a recording, the rows of the episodes before are missing."""
+    check_names(named_streams(source, source.features))
     group = _zarr().open_group(str(path), mode="w")
     data = group.create_group("data")
     ends = _ends(source)

@@ -26,15 +26,20 @@ def checked_env(env: Any, who: str) -> TaskVectorEnv:
 
 
 class Numbers:
-    """Concatenates numeric streams to one row per world: float32 ``[B, n]``."""
+    """Concatenates numeric streams to one row per world: float32 ``[B, n]``.
 
-    def __init__(self, env: TaskVectorEnv, observations: Sequence[str] | None = None) -> None:
+    Args:
+        depth_images: Whether depth images are images, too, instead of numbers.
+    """
+
+    def __init__(self, env: TaskVectorEnv, observations: Sequence[str] | None = None, *, depth_images: bool = False) -> None:
         self._paths = env._paths
         streams = {name: (env._paths[name][0], env.specs[name], rows) for name, rows in env.rows.items()}
         chosen = list(streams) if observations is None else choose_streams(observations, streams)
-        self.names = [name for name in chosen if not is_image(env.specs[name])]
+        images = {name for name in chosen if is_image(env.specs[name]) or (depth_images and is_depth(env.specs[name]))}
+        self.names = [name for name in chosen if name not in images]
         """Names of the streams, in the order of the columns."""
-        self.images = [name for name in chosen if is_image(env.specs[name])]
+        self.images = [name for name in chosen if name in images]
         """Names of the streams that are images."""
         self.columns: dict[str, slice] = {}
         """Columns of each stream."""
@@ -67,6 +72,11 @@ class Numbers:
 def is_image(spec: Any) -> bool:
     """Whether a world's row is uint8 ``[H, W, C]``."""
     return len(spec.shape) == 3 and spec.dtype == "uint8"
+
+
+def is_depth(spec: Any) -> bool:
+    """Whether a world's row is a depth image of a camera: float32 ``[H, W]``."""
+    return len(spec.shape) == 2 and spec.dtype == "float32" and spec.frame.startswith("camera ")
 
 
 def stream_of(observation: Any, path: Sequence[str]) -> Any:

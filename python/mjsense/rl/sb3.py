@@ -17,14 +17,15 @@ except ModuleNotFoundError as error:
     ) from error
 
 from mjsense._arrays import on_host
-from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
+from mjsense.rl._numbers import Actions, Numbers, checked_env, is_depth, stream_of
 
 
 class SB3VecEnv(VecEnv):
     """A :class:`mjsense.TaskVectorEnv` for the algorithms of Stable-Baselines3.
 
-    Observations are one row of float32 ``[n]`` (``MlpPolicy``), or with images a dict of ``"state"`` and the images
-    (``MultiInputPolicy``). Actions are in [-1, 1].
+    Observations are one row of float32 ``[n]`` (``MlpPolicy``), or with images a dict of ``"state"``, unless there are only images, and the
+    images (``MultiInputPolicy``): uint8 ``[H, W, 3]``, and depth in metres, float32 ``[1, H, W]``, which Stable-Baselines3 treats as an image
+    with ``policy_kwargs={"normalize_images": False}`` and flattens otherwise. Actions are in [-1, 1].
 
     Args:
         env: Result of ``make_vec(..., autoreset_mode="same_step")``.
@@ -37,7 +38,7 @@ class SB3VecEnv(VecEnv):
         self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None
     ) -> None:
         self.env = checked_env(env, "SB3VecEnv")
-        self.numbers = Numbers(self.env, observations)
+        self.numbers = Numbers(self.env, observations, depth_images=True)
         """Columns of each stream."""
         self._images = self.numbers.images
         self._commands = Actions(env.single_action_space, action_mean, action_scale)
@@ -45,8 +46,8 @@ class SB3VecEnv(VecEnv):
         self._returns, self._lengths = np.zeros(env.num_envs), np.zeros(env.num_envs, int)
         space: Any = self.numbers.box()
         if self._images:
-            spaces = {name: gymnasium.spaces.Box(0, 255, env.specs[name].shape, np.uint8) for name in self._images}
-            space = gymnasium.spaces.Dict({"state": space, **spaces})
+            state = {"state": space} if self.numbers.size else {}
+            space = gymnasium.spaces.Dict({**state, **{name: _image_space(env.specs[name]) for name in self._images}})
         self.render_mode = env.render_mode
         super().__init__(env.num_envs, space, gymnasium.spaces.Box(-1, 1, env.single_action_space.shape, np.float32))
 
@@ -54,8 +55,11 @@ class SB3VecEnv(VecEnv):
         numbers = on_host(self.numbers.of(observation, worlds))
         if not self._images:
             return numbers
-        paths = self.env._paths
-        return {"state": numbers, **{name: on_host(stream_of(observation, paths[name])) for name in self._images}}
+        found = {"state": numbers} if self.numbers.size else {}
+        for name in self._images:
+            rows = on_host(stream_of(observation, self.env._paths[name]))
+            found[name] = rows.reshape(worlds, *self.observation_space[name].shape)  # pyright: ignore[reportIndexIssue]
+        return found
 
     def reset(self) -> Any:
         """Starts a new episode in every world; after ``seed(s)`` the first episodes of that seed."""
@@ -82,9 +86,7 @@ class SB3VecEnv(VecEnv):
             last = self._observation(infos["final_obs"][world], 1)
             final = infos["final_info"]
             out[world] = {
-                "terminal_observation": {key: value[0] if key == "state" else value for key, value in last.items()}
-                if self._images
-                else last[0],
+                "terminal_observation": {key: value[0] for key, value in last.items()} if self._images else last[0],
                 "TimeLimit.truncated": bool(truncated[world] and not terminated[world]),
                 "episode": {"r": float(self._returns[world]), "l": int(self._lengths[world])},
                 "is_success": bool(final["success"][world]),
@@ -119,3 +121,8 @@ class SB3VecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """True for ``Monitor``, because episodes are counted here in the same manner."""
         return [wrapper_class.__name__ == "Monitor"] * len(self._get_indices(indices))
+
+
+def _image_space(spec: Any) -> gymnasium.spaces.Box:
+    """The space of a colour or depth image."""
+    return gymnasium.spaces.Box(0, np.inf, (1, *spec.shape), np.float32) if is_depth(spec) else gymnasium.spaces.Box(0, 255, spec.shape, np.uint8)
