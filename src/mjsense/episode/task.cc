@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "mjsense/core/error.h"
 #include "mjsense/episode/policy.h"
@@ -93,7 +94,7 @@ void Task::register_policy(Policy& policy) {
 
 void Task::sample(int world, std::int64_t episode, const robots::StateRow& state, int draw) {
   episodes_[world] = {.number = episode};
-  Rng rng(cfg_.seed, static_cast<std::uint32_t>(draw), stream_of("task/sample"),
+  Rng rng(cfg_.seed, static_cast<std::uint32_t>(draw), stream("sample"),
           static_cast<std::uint64_t>(episode));
   const std::optional<Pose> base = sample_scene(world, rng, state);
   if (!samples_robot()) robot_->write_joints(state, rng);
@@ -115,8 +116,7 @@ void Task::begin(const World& world) {
   episode.perturbation.begin(cfg_.perturb, cfg_.seed, episode.number);
   episode.paraphrase.clear();
   if (cfg_.instructions == Instructions::kVaried) {
-    Rng rng(cfg_.seed, 0, stream_of("task/instruction"),
-            static_cast<std::uint64_t>(episode.number));
+    Rng rng(cfg_.seed, 0, stream("instruction"), static_cast<std::uint64_t>(episode.number));
     episode.paraphrase = paraphrase(world, rng);
   }
   robot_->reset(world);
@@ -140,6 +140,21 @@ void Task::apply(const World& world, const robots::Action& action, const robots:
   episode.action = action;
   episode.done = episode.done || action.done;
   ++episode.step;
+}
+
+std::uint32_t Task::stream(std::string_view what) const {
+  const std::string_view name = children().empty() ? this->name() : children().front()->name();
+  return stream_of(fmt::format("task/{}/{}", name, what));
+}
+
+std::size_t Task::sentence_index(int world, std::size_t count) const {
+  const auto episode = static_cast<std::uint64_t>(this->episode(world));
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), 0);
+  Rng rng(cfg_.seed, 0, stream("sentences"), episode / count);
+  for (std::size_t i = count; i > 1; --i)
+    std::swap(order[i - 1], order[rng.below(static_cast<std::uint32_t>(i))]);
+  return order[episode % count];
 }
 
 std::string Task::instruction(int world) const {

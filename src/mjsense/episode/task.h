@@ -237,8 +237,11 @@ class Task {
   virtual std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) = 0;
   virtual bool samples_robot() const { return false; }
   // Draws a sentence that describes the episode, whose start state is that of `world`; "": there is
-  // only description().
+  // only description(). The form of the sentence is that of sentence_index().
   virtual std::string paraphrase(const World& /*world*/, Rng& /*rng*/) const { return ""; }
+  // Index in [0, count) of the sentence of this world's episode: `count` consecutive episodes use
+  // each of them once, in random order.
+  std::size_t sentence_index(int world, std::size_t count) const;
   // In a state that another task has sampled: chooses the goal of the episode without moving
   // anything. Throws ValueError if the task does not support it.
   virtual void choose_goal(int world, Rng& rng, const robots::StateRow& state);
@@ -263,6 +266,9 @@ class Task {
     Perturbation perturbation;
     std::string paraphrase;
   };
+  // A stream of random numbers that differs between tasks. A task that consists of others uses those
+  // of the first one, whose episodes it plays.
+  std::uint32_t stream(std::string_view what) const;
   const Episode& now(int world) const { return whole_ ? whole_->now(world) : episodes_[world]; }
 
   TaskCfg cfg_;

@@ -11,7 +11,8 @@ namespace mjsense::record {
 // reach; ...)". Other texts, such as the errors of user-defined code, are returned unchanged.
 inline std::string_view outcome_without_details(std::string_view outcome) {
   // Recordings of earlier versions contain "found no way" instead.
-  constexpr std::string_view kReasons[] = {"found no plan", "found no way"};
+  constexpr std::string_view kReasons[] = {"found no plan", "found no way",
+                                           "a contact was too deep"};
   for (const std::string_view reason : kReasons) {
     const std::size_t begin = outcome.find(reason);
     const std::size_t end = begin + reason.size();

@@ -84,6 +84,23 @@ void validate(const MoveGroupCfg& cfg, std::string_view context) {
     throw ValueError(fmt::format("{}: the gripper '{}' needs leaf_site, the site of its tool frame",
                                  context, cfg.name));
   }
+  // Grasps are planned with these sizes: with 0 there is no grasp of any object.
+  struct Size {
+    const char *name, *meaning, *example;
+    double value;
+  };
+  for (const Size& size :
+       {Size{"max_opening", "the distance between its open pads", "0.08", cfg.max_opening},
+        Size{"pad_half_width", "half the width of a pad across the approach, the tool's x axis",
+             "0.01", cfg.pad_half_width},
+        Size{"pad_half_length", "half the length of a pad along the approach, the tool's z axis",
+             "0.02", cfg.pad_half_length}}) {
+    if (size.value > 0) continue;
+    throw ValueError(fmt::format(
+        "{}: the gripper '{}' needs {}, {}, in m; it is {:g}: write for "
+        "example {} = {}",
+        context, cfg.name, size.name, size.meaning, size.value, size.name, size.example));
+  }
 }
 
 void validate(const RobotCfg& cfg, std::string_view context) {
@@ -122,7 +139,7 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
     for (const PartCfg& part : cfg.parts)
       parts.push_back(
           {resolve_relative(path, part.model), part.to, part.prefix, part.pos, part.quat});
-    const std::shared_ptr<mjSpec> spec = scene::compose_model(cfg.model, parts, context);
+    const std::shared_ptr<mjSpec> spec = scene::compose_model(cfg.model, parts, path);
     check_references(cfg, spec.get(), path);
     cfg.model = {.spec = spec.get(), .owner = spec};
   }

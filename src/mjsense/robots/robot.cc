@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/named.h"
 #include "mjsense/robots/action_noise.h"
 #include "mjsense/scene/resolve.h"
@@ -21,6 +22,41 @@ void check_groups(const std::string& context, std::size_t found) {
     throw ValueError(fmt::format("{}: {} move groups: the maximum is {}", context, found,
                                  RobotValues::kMaxGroups));
   }
+}
+
+// Throws ValueError unless the tool frame of a gripper has the axes that grasps are planned with: z
+// points from the hand to the object, and the pads are apart along y or x.
+void check_tool_frame(const RobotCfg& cfg, const MoveGroupCfg& group_cfg, const MoveGroup& group,
+                      const mjModel* model, mjData* data) {
+  for (std::size_t i = 0; i < group_cfg.init.size(); ++i)
+    data->qpos[group.qpos[i]] = group_cfg.init[i];
+  mj_kinematics(model, data);
+  constexpr double kAlong = 0.9;    // cosine of 26 degrees
+  constexpr double kClosed = 1e-3;  // m
+  const Pose tool = site_pose(data, group.leaf_site);
+  const Vec3 pads[2] = {vec3(data->site_xpos + 3 * group.pad_sites[0]),
+                        vec3(data->site_xpos + 3 * group.pad_sites[1])};
+  const Vec3 between = pads[1] - pads[0];
+  if (norm(between) < kClosed) return;  // closed at the start: the direction is not known
+  const Vec3 closing = normalized(between);
+  const Vec3 out = 0.5 * (pads[0] + pads[1]) - vec3(data->xpos + 3 * group.root_body);
+  const Vec3 forward = out - dot(out, closing) * closing;
+  if (norm(forward) < kClosed) return;
+  const Vec3 approach = normalized(forward), in_tool = rotate(conjugate(tool.q), closing);
+  if (std::max(std::abs(in_tool.x), std::abs(in_tool.y)) > kAlong &&
+      dot(rotate(tool.q, {0, 0, 1}), approach) > 0)
+    return;
+  const int body = model->site_bodyid[group.leaf_site];
+  const Quat wanted = quat_from_columns(cross(closing, approach), closing, approach);
+  const Quat local = conjugate(quat(data->xquat + 4 * body)) * wanted;
+  const Vec3 z = rotate(conjugate(tool.q), approach);
+  throw ValueError(fmt::format(
+      "{}: move group '{}': leaf_site '{}': its z axis must point from the hand to the object, and "
+      "its y or x axis from pad to pad; in its frame, the pads are in direction ({:.2f}, {:.2f}, "
+      "{:.2f}) of the hand and apart along ({:.2f}, {:.2f}, {:.2f}): give the site "
+      "quat=\"{:.4g} {:.4g} {:.4g} {:.4g}\"",
+      cfg.file.empty() ? "robot '" + cfg.name + "'" : cfg.file, group.name, group_cfg.leaf_site,
+      z.x, z.y, z.z, in_tool.x, in_tool.y, in_tool.z, local.w, local.x, local.y, local.z));
 }
 
 }  // namespace
@@ -53,6 +89,10 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
     groups_.push_back(std::move(group));
   }
   placement_ = BasePlacement(model, base_body_, base_joints, context);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    if (groups_[g].kind == GroupKind::kGripper)
+      check_tool_frame(cfg_, cfg_.groups[g], groups_[g], model, make_data(model).get());
+  }
 
   std::vector<int> moving;
   for (const MoveGroup& g : groups_) moving.insert(moving.end(), g.joints.begin(), g.joints.end());

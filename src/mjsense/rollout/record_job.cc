@@ -202,7 +202,8 @@ class RecordJob {
                        : now.terminal ? "no success"
                                       : "horizon reached";
     const episode::Policy* policy = rollout_.policy();
-    const std::string why = gave_up && policy ? policy->failure(w) : std::string(now.missing);
+    std::string why = gave_up && policy ? policy->failure(w) : std::string(now.missing);
+    if (now.missing == kTooDeep) why = fmt::format("{} ({})", kTooDeep, rollout_.deep_contact(w));
     return why.empty() ? what : fmt::format("{}: {}", what, why);
   }
 

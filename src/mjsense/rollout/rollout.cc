@@ -184,6 +184,7 @@ void Rollout::make() {
   faults_.resize(cfg_.num_worlds);
   active_.assign(cfg_.num_worlds, 0);
   refused_.assign(cfg_.num_worlds, 0);
+  depth_.emplace(cfg_.max_penetration, cfg_.num_worlds);
   for (int w = 0; w < cfg_.num_worlds; ++w)
     rows_.push_back(robots::state_row(simulation_->worlds(), w));
   ids_.reserve(cfg_.num_worlds);

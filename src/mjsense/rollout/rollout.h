@@ -31,6 +31,7 @@
 #include "mjsense/episode/task.h"
 #include "mjsense/observe/suite.h"
 #include "mjsense/rollout/action_log.h"
+#include "mjsense/rollout/contact_depth.h"
 #include "mjsense/rollout/core_suite.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/sim/simulation.h"
@@ -80,6 +81,7 @@ struct RolloutCfg {
   std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
   bool terminate_upon_success = false;
+  double max_penetration = 0.003;
   double perturb = 0;
   NamedEnum<episode::Instructions> instructions;
   bool use_sensors = true;
@@ -188,6 +190,12 @@ void visit_fields(V& v, RolloutCfg& c) {
       .decides_data();
   v("terminate_upon_success", c.terminate_upon_success, "End an episode at its first success.")
       .decides_data();
+  v("max_penetration", c.max_penetration,
+    "Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: "
+    "any depth. Pairs of geoms that are deeper at the start do not count.")
+      .unit("m")
+      .at_least(0)
+      .decides_data();
   v("use_sensors", c.use_sensors,
     "Add the sensors of the task, of the robot and of the policy. False: only the sensors that are "
     "passed in.")
@@ -270,6 +278,10 @@ class Rollout {
   const std::string& fault(int world) const { return faults_[world]; }
   // True if the fault is a row that could not be computed: the episode must not be kept.
   bool refused(int world) const { return refused_[world]; }
+  // The contact because of which this world's episode cannot succeed; "" if there is none.
+  std::string deep_contact(int world) const {
+    return depth_->description(world, simulation_->model());
+  }
 
   const RolloutTimes& times() const { return times_; }
 
@@ -282,6 +294,8 @@ class Rollout {
   void move(std::span<const int> worlds, bool answers, std::span<const RecordedStep> recorded = {});
   void write_recorded(const RecordedStep& step, std::span<const double> before);
   void evaluate(std::span<const int> worlds);
+  // Turns a success after a contact deeper than max_penetration into a failure.
+  void refuse_deep_contacts(std::span<const int> worlds);
   void finish_rows();
   bool guard_rows(const std::function<void()>& body);
   void sense();
@@ -308,6 +322,7 @@ class Rollout {
   std::vector<episode::Evaluation> evaluations_;
   std::vector<std::string> faults_;
   std::vector<char> active_, refused_;
+  std::optional<ContactDepth> depth_;
   std::vector<robots::StateRow> rows_;  // [B]
   std::vector<int> ids_;                // scratch of active_worlds()
   std::vector<int> moving_;             // scratch of start() and step_chunk()

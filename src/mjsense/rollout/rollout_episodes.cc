@@ -100,6 +100,7 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
     refused_[w] = false;
     actions_[w] = robots::Action{};
     log_->begin(w);
+    depth_->begin(w);
   }
   sample(worlds, episodes);
   place_cameras(sorted);
@@ -290,12 +291,23 @@ void Rollout::evaluate(std::span<const int> worlds) {
   const auto begun = Clock::now();
   WorldSubset some(*this, worlds);
   task_->evaluate_all(some, evaluations_);
+  refuse_deep_contacts(worlds);
   for (int w : worlds) {
     const double reward = evaluations_[w].reward;
     if (!std::isfinite(reward))
       set_fault(w, fmt::format("task '{}': the reward is {}", task_->name(), reward));
   }
   times_.sensing += since(begun);
+}
+
+void Rollout::refuse_deep_contacts(std::span<const int> worlds) {
+  if (!depth_->has_limit()) return;
+  for_each(worlds, [this](const World& world) { depth_->observe(world); });
+  for (int w : worlds) {
+    if (!evaluations_[w].success || !depth_->is_exceeded(w)) continue;
+    evaluations_[w].success = false;
+    evaluations_[w].missing = kTooDeep;
+  }
 }
 
 // Updates rows that depend on the evaluation, which happens after the sensors.

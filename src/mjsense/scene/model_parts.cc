@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <utility>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/mujoco_call.h"
@@ -36,6 +38,31 @@ mjsFrame* mount(mjSpec* model, const std::string& name, const std::string& conte
   throw_unknown(context, "site or body", name, names);
 }
 
+// Elements whose names must differ within a model.
+constexpr std::pair<mjtObj, const char*> kNamed[] = {
+    {mjOBJ_BODY, "body"},         {mjOBJ_JOINT, "joint"},   {mjOBJ_GEOM, "geom"},
+    {mjOBJ_SITE, "site"},         {mjOBJ_CAMERA, "camera"}, {mjOBJ_LIGHT, "light"},
+    {mjOBJ_ACTUATOR, "actuator"}, {mjOBJ_SENSOR, "sensor"}, {mjOBJ_TENDON, "tendon"}};
+
+// Throws ValueError if the model has an element with the name that one of the part would have.
+void check_names(const mjSpec* model, const mjSpec* child, const ModelPart& part,
+                 const std::string& context) {
+  for (const auto& [type, what] : kNamed) {
+    const std::vector<std::string> taken = spec_names(model, type);
+    for (const std::string& name : spec_names(child, type)) {
+      const std::string full = part.prefix + name;
+      if (name.empty() || (type == mjOBJ_BODY && name == "world") ||
+          std::ranges::find(taken, full) == taken.end())
+        continue;
+      throw ValueError(
+          fmt::format("{}: its {} '{}' has the name of a {} of the models before it; its prefix is "
+                      "'{}': write another one, for example prefix = \"{}/\"",
+                      context, what, full, what, part.prefix,
+                      std::filesystem::path(part.path).stem().string()));
+    }
+  }
+}
+
 void attach_part(mjSpec* model, const ModelPart& part, std::string_view of) {
   const std::string context = fmt::format("{}: part '{}'", of, part.path);
   Vfs vfs;
@@ -49,6 +76,7 @@ void attach_part(mjSpec* model, const ModelPart& part, std::string_view of) {
   child->authored.option = 0;
   child->authored.disableflags = child->authored.enableflags = child->authored.disableactuator = 0;
 
+  check_names(model, child.get(), part, context);
   mjsFrame* at = mount(model, part.attach_to, context);
   mjsFrame* frame = mjs_addFrame(mjs_getParent(at->element), at);
   std::copy(part.pos.begin(), part.pos.end(), frame->pos);

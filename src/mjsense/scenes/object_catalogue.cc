@@ -31,8 +31,13 @@ std::string model_of_parts(const CatalogueObjectCfg& object) {
     assets += fmt::format("<material name='{}' rgba='{}' specular='0.3' shininess='0.3'{}/>", i,
                           fmt::join(part.rgba, " "),
                           part.texture.empty() ? "" : fmt::format(" texture='{}'", i));
-    geoms += fmt::format("<geom type='mesh' mesh='{0}' material='{0}' pos='{1}' euler='{2}'/>", i,
-                         fmt::join(part.pos, " "), fmt::join(part.euler, " "));
+    const std::string pose =
+        fmt::format("pos='{}' euler='{}'", fmt::join(part.pos, " "), fmt::join(part.euler, " "));
+    geoms += fmt::format("<geom type='mesh' mesh='{0}' material='{0}' {1} {2}/>", i, pose,
+                         part.cylinder ? "contype='0' conaffinity='0' mass='0'" : "");
+    if (part.cylinder)
+      geoms += fmt::format("<geom type='cylinder' size='{}' {} group='3'/>",
+                           fmt::join(*part.cylinder, " "), pose);
   }
   // The contact parameters are those of the built-in objects.
   return fmt::format(

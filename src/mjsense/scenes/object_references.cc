@@ -123,6 +123,9 @@ class Describer {
   }
 
   void attributes(const std::string& noun, const Rivals& rivals) {
+    // "salt" names what is in a "salt shaker": there is no glass or larger salt.
+    const std::string& name = it_->names[0];
+    if (name.starts_with(noun + " ") && !name.starts_with(noun + " of ")) return;
     const auto has = [&](std::string_view word) { return has_word(noun, word); };
     const int is = it_->colour.is;
     if (is >= 0 && std::ranges::none_of(kColourWords, has) &&

@@ -33,13 +33,6 @@ References object_references(const World& world, const EpisodeScene& scene, int 
 // Draws one of them, or returns "" if there is none: the kind first, with fixed weights.
 std::string draw_reference(const References& references, Rng& rng);
 
-// Draws a sentence and replaces its {} by the arguments.
-template <class... Args>
-std::string one_of(std::span<const char* const> sentences, Rng& rng, const Args&... args) {
-  return fmt::format(
-      fmt::runtime(sentences[rng.below(static_cast<std::uint32_t>(sentences.size()))]), args...);
-}
-
 // Whether "the <phrase>" may be used for an object with this name: they are equal, or the phrase is
 // the name without its first words, or the first part of "box of tea".
 bool may_be_called(std::string_view name, std::string_view phrase);

@@ -6,6 +6,7 @@
 // Tool frame: z is the approach, y the closing direction, the origin lies between the finger tips.
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "mjsense/core/pose.h"
@@ -61,12 +62,23 @@ struct Grasp {
 std::vector<Grasp> propose_grasps(const GripperShape& gripper, const episode::ObjectShape& shape,
                                   const Pose& object, double support_height, const Pose& tool);
 
+// How many candidates of grasps_all_around() each check rejected.
+struct GraspChecks {
+  int candidates = 0;
+  int nothing_between = 0;  // no point of the object, or less than 4 mm of it, is between the pads
+  int too_wide = 0;         // for the gripper
+  int no_faces = 0;         // that are opposite and wide enough
+  int in_object = 0;        // the open gripper
+};
+// "0 grasps: of 900 candidates 700 too wide for the gripper, which opens to 85 mm; ...".
+std::string text_of(const GraspChecks& checks, const GripperShape& gripper);
+
 // Grasps of an object in its own frame, regardless of its support: closing directions over the
 // whole sphere with sixteen approaches each, filtered by the same criterion for faces. The open
 // gripper does not collide with the object. `cost` is 8 * distance to the object's origin (m) + 4 *
 // slope of the faces (without the slope RB-Y1 retried 6 of 50 picks instead of 1).
-std::vector<Grasp> grasps_all_around(const GripperShape& gripper,
-                                     const episode::ObjectShape& shape);
+std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const episode::ObjectShape& shape,
+                                     GraspChecks* checks = nullptr);
 
 // The grasps of an object at X_WO in the world frame, sorted by cost = distance to the tool (m) +
 // 0.01 * turn (deg) - 2 * (approach . wanted) + 8 * distance to the object's origin (m). With

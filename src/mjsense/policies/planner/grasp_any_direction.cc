@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -60,8 +62,26 @@ double GripperShape::lowest(const Pose& tool) const {
   return z;
 }
 
-std::vector<Grasp> grasps_all_around(const GripperShape& gripper,
-                                     const episode::ObjectShape& shape) {
+std::string text_of(const GraspChecks& checks, const GripperShape& gripper) {
+  std::vector<std::pair<int, std::string>> parts{
+      {checks.nothing_between, "without 4 mm of the object between the pads"},
+      {checks.too_wide, fmt::format("too wide for the gripper, whose max_opening is {:g} mm",
+                                    1000 * gripper.max_opening)},
+      {checks.no_faces, "without opposite faces of 10 mm for the pads"},
+      {checks.in_object, "with the open gripper in the object"}};
+  std::erase_if(parts, [](const auto& part) { return part.first == 0; });
+  std::ranges::stable_sort(parts, std::ranges::greater(),
+                           [](const auto& part) { return part.first; });
+  std::string text = fmt::format("0 grasps, of {} candidates: ", checks.candidates);
+  for (const auto& part : parts)
+    text += fmt::format("{}{} {}", &part == parts.data() ? "" : "; ", part.first, part.second);
+  return text;
+}
+
+std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const episode::ObjectShape& shape,
+                                     GraspChecks* checks) {
+  GraspChecks unused;
+  GraspChecks& count = checks ? *checks : unused;
   std::vector<Vec3> points;
   const std::size_t stride = shape.points.size() / kPoints + 1;
   for (std::size_t i = 0; i < shape.points.size(); i += stride) points.push_back(shape.points[i]);
@@ -91,15 +111,25 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper,
               measure_finger_contact(points, center + gripper.pad_middle * approach, close, across,
                                      approach, half_width, half_length);
           const double width = s.high - s.low;
-          if (!(width > kMinWidth && width < gripper.max_opening - 2 * kMinSideGap) ||
-              s.face < kFaceWidth)
+          ++count.candidates;
+          int* const rejected = !(width > kMinWidth) ? &count.nothing_between
+                                : !(width < gripper.max_opening - 2 * kMinSideGap) ? &count.too_wide
+                                : s.face < kFaceWidth                              ? &count.no_faces
+                                                                                   : nullptr;
+          if (rejected) {
+            ++*rejected;
             continue;
+          }
           Grasp grasp;
           grasp.pose = {center + (0.5 * (s.low + s.high)) * close,
                         quat_from_columns(cross(close, approach), close, approach)};
           grasp.width = width;
           grasp.cost = 8.0 * norm(grasp.pose.p) + std::min(kMaxSlope, kSlope * std::abs(s.slope));
-          if (!gripper.hits(grasp.pose, {}, shape, 0.0)) grasps.push_back(grasp);
+          if (gripper.hits(grasp.pose, {}, shape, 0.0)) {
+            ++count.in_object;
+          } else {
+            grasps.push_back(grasp);
+          }
         }
       }
     }

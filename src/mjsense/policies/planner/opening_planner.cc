@@ -68,8 +68,12 @@ void OpeningPlanner::plan_floating(const World& world, const tasks::HandlePath& 
   add_move(plan, kGrasp, path.hand, at, path.grasp, cfg_.slow);
   add_move(plan, kCloseGripper, path.hand, path.grasp, path.grasp, cfg_.slow, cfg_.close_time)
       .grip(path.hand.gripper, gripper.closed_command);
-  // A rotation about a hinge and a translation along a slide are both screws.
-  add_move(plan, kLift, path.hand, path.grasp, path.end, cfg_.fast).holds(path.hand.gripper);
+  // A rotation about a hinge and a translation along a slide are both screws. The fingers may close
+  // before a handle that they push, which slides towards the palm.
+  const bool pushes = opening_->kind() == tasks::OpeningKind::kClose;
+  Segment& move =
+      add_move(plan, kLift, path.hand, path.grasp, path.end, pushes ? cfg_.push : cfg_.fast);
+  if (!pushes) move.holds(path.hand.gripper);
 }
 
 // Timed joint positions and, with `driving`, poses of the mobile base; the tool moves at `speed`.

@@ -12,6 +12,9 @@ struct OpeningPlannerCfg {
   // m/s, speed of the tool: to the pregrasp, with the handle, with the handle while the base
   // drives, to the handle
   double approach_speed = 0.20, fast = 0.08, driving = 0.12, slow = 0.04;
+  // m/s, of a floating hand that pushes something shut; it starts and ends at rest, so that with
+  // `fast` half of the fridges were not shut within the horizon
+  double push = 0.15;
   double fastest_joint = 0.8;                  // rad/s
   double base_speed = 0.20, base_turn = 0.35;  // m/s, rad/s, with the handle
   double turn = 1.0;                           // rad/s, of a floating hand

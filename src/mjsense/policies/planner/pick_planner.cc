@@ -9,6 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
 #include "mjsense/policies/planner/phases.h"
+#include "mjsense/policies/planner/rejections.h"
 
 namespace mjsense::policies {
 namespace {
@@ -45,7 +46,7 @@ void PickPlanner::initialize_planner() {
 void PickPlanner::make_plan(const World& world, const PlanRequest& /*request*/, Plan& plan) {
   const int arm = robot().arm(), gripper = robot().gripper();
   Grasp grasp;
-  if (!choose_grasp(world, grasp)) return;
+  if (!choose_grasp(world, grasp, plan.rejection)) return;
   plan.grasp = grasp.pose;
 
   const Pose to_base = inverse(robot().base_pose(world));
@@ -61,7 +62,7 @@ void PickPlanner::make_plan(const World& world, const PlanRequest& /*request*/, 
   plan.move_tool(kLift, arm, at, after, cfg_.slow).holds(gripper);
 }
 
-bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
+bool PickPlanner::choose_grasp(const World& world, Grasp& chosen, std::string& why) const {
   const robots::Robot& robot = this->robot();
   const auto objects = scene_->all_objects();
   const auto& target = objects[scene_->target(world.id)];
@@ -72,6 +73,7 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
   robots::RobotValues joints;
   robot.read_qpos(world, joints);
   int tried = 0;
+  std::vector<Rejection> rejections;
   const Grasp* second_best = nullptr;  // reachable, but its path is blocked
   for (const Grasp& grasp : grasps) {
     bool blocked = false;
@@ -82,16 +84,25 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
                 gripper_shape_->hits(grasp.pose, body_pose(world.data, body),
                                      scene_->shape(world.id, static_cast<int>(i)), kGraspMargin);
     }
-    if (blocked) continue;
+    if (blocked) {
+      rejections.push_back({"with another object in the way"});
+      continue;
+    }
     if (++tried > cfg_.max_ik_candidates) break;
-    if (!reachable(base, grasp.pose, joints)) continue;
+    if (!reachable(base, grasp.pose, joints)) {
+      rejections.push_back({"out of reach"});
+      continue;
+    }
     if (path_is_free(world, tool, raised(grasp.pose, cfg_.pregrasp_height))) {
       chosen = grasp;
       return true;
     }
     if (!second_best) second_best = &grasp;
   }
-  if (!second_best) return false;
+  if (!second_best) {
+    why = text_of("grasps from above", rejections, world.model);
+    return false;
+  }
   chosen = *second_best;
   return true;
 }

@@ -33,7 +33,8 @@ class PickPlanner final : public TaskPlanner {
   int first_phase() const override;
 
  private:
-  bool choose_grasp(const World& world, Grasp& chosen) const;
+  // Returns false, and the reason in `why`, if no grasp is possible.
+  bool choose_grasp(const World& world, Grasp& chosen, std::string& why) const;
   bool reachable(const Pose& base, const Pose& grasp, robots::RobotValues joints) const;
   bool path_is_free(const World& world, const Pose& tool, const Pose& pregrasp) const;
 

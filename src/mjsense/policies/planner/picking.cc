@@ -41,15 +41,16 @@ struct Picking::Search {
 Picking::Picking(const Manipulation& shared, const Placing* placing)
     : m_(shared), placing_(placing) {}
 
-std::span<const Grasp> Picking::grasps(const episode::ObjectShape& shape, int hand) {
+const Picking::Grasps& Picking::grasps(const episode::ObjectShape& shape, int hand) {
   Grasps* entry = nullptr;
   {
     const std::lock_guard lock(grasps_mutex_);
     entry = &grasps_[{&shape, hand}];
   }
-  std::call_once(entry->once,
-                 [&] { entry->of_object = grasps_all_around(m_.gripper(hand), shape); });
-  return entry->of_object;
+  std::call_once(entry->once, [&] {
+    entry->of_object = grasps_all_around(m_.gripper(hand), shape, &entry->checks);
+  });
+  return *entry;
 }
 
 std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest& request,
@@ -131,12 +132,16 @@ std::optional<Picking::Grip> Picking::plan_pick_with(const Search& search, int h
   // The tool frame is turned so that its y axis is the closing direction. First pass: solutions
   // near the current joints; second pass: farther away.
   const GripperShape& shape = m_.gripper(h);
+  const Grasps& found = grasps(m_.target_shape(world.id), h);
   const std::vector<Grasp> ranked =
-      rank_grasps(grasps(m_.target_shape(world.id), h), object, start.tool * Pose{{}, shape.turn},
+      rank_grasps(found.of_object, object, start.tool * Pose{{}, shape.turn},
                   wanted_approach(world, search.request, object));
   int num_paths = 0, misplaced = 0;
   std::vector<Rejection> rejections(ranked.size());
-  const auto say_why = [&] { plan.rejection = text_of("grasps", rejections, world.model); };
+  const auto say_why = [&] {
+    plan.rejection =
+        ranked.empty() ? text_of(found.checks, shape) : text_of("grasps", rejections, world.model);
+  };
   for (const auto& [iterations, maximum] :
        {std::pair(robots::Chain::kTracking, search.max_near), std::pair(400, search.max_far)}) {
     int tried = 0;

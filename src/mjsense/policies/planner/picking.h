@@ -48,14 +48,15 @@ class Picking {
   HandPose draw_back(const World& world, HandPlanner& hand, CollisionQuery& query,
                      const HandPose& start, Plan& plan) const;
   bool lift(const World& world, HandPlanner& hand, const HandPose& at, Plan& plan) const;
-  std::span<const Grasp> grasps(const episode::ObjectShape& shape, int hand);
-
-  const Manipulation& m_;
-  const Placing* placing_;
   struct Grasps {
     std::once_flag once;
     std::vector<Grasp> of_object;
+    GraspChecks checks;
   };
+  const Grasps& grasps(const episode::ObjectShape& shape, int hand);
+
+  const Manipulation& m_;
+  const Placing* placing_;
   // By address of the shape and hand; computed on first use.
   std::map<std::pair<const episode::ObjectShape*, int>, Grasps> grasps_;
   std::mutex grasps_mutex_;  // guards the map, not its values

@@ -10,18 +10,13 @@
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense::policies {
-namespace {
 
-// Name of the geom's body or its nearest named ancestor; name of the geom if it belongs to the
-// world body.
-std::string named(const mjModel* m, int geom) {
+std::string name_of_solid(const mjModel* m, int geom) {
   int body = m->geom_bodyid[geom];
   while (body > 0 && scene::name_of(m, mjOBJ_BODY, body).empty()) body = m->body_parentid[body];
   const std::string name = scene::name_of(m, mjOBJ_GEOM, geom);
   return body == 0 && !name.empty() ? name : scene::name_of(m, mjOBJ_BODY, body);
 }
-
-}  // namespace
 
 std::string text_of(std::string_view what, const std::vector<Rejection>& rejections,
                     const mjModel* model) {
@@ -37,7 +32,7 @@ std::string text_of(std::string_view what, const std::vector<Rejection>& rejecti
     Reason& reason = reasons[rejection.reason];
     ++reason.count;
     const auto [a, b] = rejection.geoms;
-    if (a >= 0 && b >= 0) ++reason.bodies[{named(model, a), named(model, b)}];
+    if (a >= 0 && b >= 0) ++reason.bodies[{name_of_solid(model, a), name_of_solid(model, b)}];
   }
   std::vector<std::pair<std::string_view, Reason>> sorted(reasons.begin(), reasons.end());
   std::ranges::stable_sort(sorted, std::ranges::greater(),

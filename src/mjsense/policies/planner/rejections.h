@@ -18,9 +18,12 @@ struct Rejection {
   static Rejection collision(std::pair<int, int> geoms) { return {"in collision", geoms}; }
 };
 
+// Name of a geom's body or its nearest named ancestor; name of the geom if it belongs to the world
+// body.
+std::string name_of_solid(const mjModel* model, int geom);
+
 // "256 grasps: 200 out of reach; 40 in collision, mostly 'link5' with 'shelf/board'". `what` names
-// the candidates. Collisions name bodies, since geoms often have no name; geoms of the world body
-// are named themselves.
+// the candidates. Collisions name bodies, since geoms often have no name.
 std::string text_of(std::string_view what, const std::vector<Rejection>& rejections,
                     const mjModel* model);
 

@@ -12,7 +12,6 @@
 #include "mjsense/robots/finger_grasp.h"
 #include "mjsense/robots/robot_sensors.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scenes/object_references.h"
 #include "mjsense/scenes/robot_floor.h"
 
 namespace mjsense::tasks {
@@ -43,6 +42,8 @@ constexpr std::array<const char*, 14> kSentences{
     "I would like {0} to be open. It opens {3} you",
     "Go up to {0}, press its handle and open it {3} you",
 };
+
+bool mentions_handle(std::string_view text) { return text.find("handle") != text.npos; }
 
 }  // namespace
 
@@ -146,10 +147,12 @@ std::string DoorOpeningTask::paraphrase(const World& world, Rng& rng) const {
     doors.emplace_back(left > 0 ? "the door with the handle on the left"
                                 : "the door with the handle on the right");
   }
+  const std::string_view sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  if (mentions_handle(sentence)) std::erase_if(doors, mentions_handle);
   const bool push = pushes(world);
-  return scenes::one_of(kSentences, rng, doors[rng.below(static_cast<std::uint32_t>(doors.size()))],
-                        push ? "Push" : "Pull", push ? "pushing" : "pulling",
-                        push ? "away from" : "towards");
+  return fmt::format(
+      fmt::runtime(sentence), doors[rng.below(static_cast<std::uint32_t>(doors.size()))],
+      push ? "Push" : "Pull", push ? "pushing" : "pulling", push ? "away from" : "towards");
 }
 
 episode::Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {

@@ -203,7 +203,8 @@ std::string NavToObjTask::paraphrase(const World& world, Rng& rng) const {
       scenes::draw_reference(scenes::object_references(world, scene(), targets_[world.id],
                                                        robot().base_pose(world), {}, true),
                              rng);
-  return object.empty() ? "" : scenes::one_of(kSentences, rng, object);
+  const char* sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  return object.empty() ? "" : fmt::format(fmt::runtime(sentence), object);
 }
 
 episode::Task::Referrals NavToObjTask::referrals(int world) const {

@@ -26,30 +26,58 @@ constexpr double kBeyond =
 constexpr double kSpread = 0.02, kTurn = 0.05;  // m, rad
 constexpr int kTries = 12;                      // maximum number of grasps tried from a placement
 constexpr double kApart = 0.08;  // m, minimum distance along a direction that an instruction names
-constexpr std::array<const char*, 12> kOpenSentences{"Open {}",
-                                                     "Open up {}",
-                                                     "Pull {} open",
-                                                     "Please open {}",
-                                                     "Can you open {}?",
-                                                     "Could you open {} for me?",
-                                                     "Open {} by its handle",
-                                                     "Take the handle of {} and open it",
-                                                     "Grasp the handle of {} and pull it open",
-                                                     "Make sure that {} is open",
-                                                     "I would like {} to be open",
-                                                     "Try to open {}"};
-constexpr std::array<const char*, 12> kCloseSentences{"Close {}",
-                                                      "Shut {}",
-                                                      "Push {} shut",
-                                                      "Push {} closed",
-                                                      "Please close {}",
-                                                      "Please shut {}",
-                                                      "Can you close {}?",
-                                                      "Could you shut {} for me?",
-                                                      "Make sure that {} is closed",
-                                                      "I would like {} to be closed",
-                                                      "Try to close {}",
-                                                      "Close {} again"};
+constexpr std::array<const char*, 24> kOpenSentences{
+    "Open {}",
+    "Open up {}",
+    "Pull {} open",
+    "Please open {}",
+    "Can you open {}?",
+    "Could you open {} for me?",
+    "Open {} by its handle",
+    "Take the handle of {} and open it",
+    "Grasp the handle of {} and pull it open",
+    "Make sure that {} is open",
+    "I would like {} to be open",
+    "Try to open {}",
+    "Open {}, please",
+    "Reach for {} and open it",
+    "I need to get into {}. Please open it",
+    "Would you open {}?",
+    "Get {} open",
+    "Go ahead and open {}",
+    "Leave {} open",
+    "Pull at the handle of {} until it is open",
+    "Use the handle to open {}",
+    "Hold {} by its handle and pull",
+    "Please pull {} open",
+    "Your task is to open {}",
+};
+constexpr std::array<const char*, 24> kCloseSentences{
+    "Close {}",
+    "Shut {}",
+    "Push {} shut",
+    "Push {} closed",
+    "Please close {}",
+    "Please shut {}",
+    "Can you close {}?",
+    "Could you shut {} for me?",
+    "Make sure that {} is closed",
+    "I would like {} to be closed",
+    "Try to close {}",
+    "Close {} again",
+    "Close {}, please",
+    "Reach for {} and close it",
+    "I am done with {}. Please close it",
+    "Would you close {}?",
+    "Get {} closed",
+    "Go ahead and shut {}",
+    "Leave {} closed",
+    "Push {} until it is closed",
+    "Use the handle to close {}",
+    "Take the handle of {} and push it shut",
+    "Please push {} shut",
+    "Your task is to close {}",
+};
 
 }  // namespace
 
@@ -238,8 +266,8 @@ std::vector<std::string> OpeningTask::references(const World& world) const {
 std::string OpeningTask::paraphrase(const World& world, Rng& rng) const {
   const std::vector<std::string> all = references(world);
   const std::string& object = all[rng.below(static_cast<std::uint32_t>(all.size()))];
-  return kind_ == OpeningKind::kOpen ? scenes::one_of(kOpenSentences, rng, object)
-                                     : scenes::one_of(kCloseSentences, rng, object);
+  const auto& sentences = kind_ == OpeningKind::kOpen ? kOpenSentences : kCloseSentences;
+  return fmt::format(fmt::runtime(sentences[sentence_index(world.id, sentences.size())]), object);
 }
 
 episode::Task::Referrals OpeningTask::referrals(int world) const {

@@ -131,7 +131,8 @@ std::string PickTask::description(int world) const { return "Pick up the " + obj
 std::string PickTask::paraphrase(const World& world, Rng& rng) const {
   const std::string object = scenes::draw_reference(
       scenes::object_references(world, scene(), targets_[world.id], robot().base_pose(world)), rng);
-  return object.empty() ? "" : scenes::one_of(kSentences, rng, object);
+  const char* sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  return object.empty() ? "" : fmt::format(fmt::runtime(sentence), object);
 }
 
 episode::Task::Referrals PickTask::referrals(int world) const {

@@ -26,8 +26,15 @@ constexpr double kBeside = 0.05 + 0.01;              // m, maximum horizontal ga
 constexpr double kSamePlace = 0.005,
                  kSameTurn = 10 * pi / 180;  // m, rad, tolerance of a pose carried forward
 constexpr double kSameHeight = 0.01;  // m, tolerance of underside heights without contact forces
-constexpr double kBesideGap = 0.03;   // m, gap that a planner aims at
-constexpr double kAround = 0.012;     // m, radius of surface points considered for a placement
+constexpr double kBesideGap = 0.03;   // m, gap that a planner aims at if no drawn place is free
+constexpr double kMinGap = 0.02, kMaxGap = 0.04;  // m, of the drawn places next to an object
+constexpr double kAlong = 0.5;  // drawn shift along the other object, as a share of its half size
+constexpr double kAround = 0.012;  // m, radius of surface points considered for a placement
+// Drawn places, at most, and how many points of the receptacle are drawn for them.
+constexpr int kMaxPlaces = 8, kMaxDraws = 32;
+constexpr double kUneven = 0.008;  // m, maximum difference in height below an object
+constexpr double kCell = 0.008;    // m, twice the distance of the surface points
+constexpr int kMaxCells = 6;       // along each side of an object
 
 // {0}: the object, {1}: where it is put ("next to the plate"), {2}: where it is moved to ("into the
 // box").
@@ -241,34 +248,64 @@ episode::Evaluation PickAndPlaceTask::evaluate(const World& world) const {
   return make_evaluation_from(world.id, std::exp(-now.position_error), now.missing);
 }
 
+// Random numbers of the places of an episode: they depend on seed and episode only.
+Rng PickAndPlaceTask::place_rng(int world) const {
+  return {cfg().seed, 0, stream_of("task/place"), static_cast<std::uint64_t>(episode(world))};
+}
+
 void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<Vec3>& out) const {
+  if (kind_ == PlaceKind::kNextTo) {
+    places_beside(world, turn, out);
+  } else {
+    places_within(world, turn, out);
+  }
+}
+
+// Drawn places first: a random side, gap and shift along the side. Then those nearest to the robot.
+void PickAndPlaceTask::places_beside(const World& world, const Quat& turn,
+                                     std::vector<Vec3>& out) const {
+  const Episode& episode = episodes_[world.id];
+  const int body = episode.objects[1].body;
+  const Aabb box = world_box(world, body);
+  const Vec3 c = box.center(), half_other = 0.5 * box.size();
+  const Vec3 half = 0.5 * turned_box(world, episode.objects[0].body, turn).size();
+  const Vec3 both = half + half_other;
+  Rng draw = place_rng(world.id);
+  for (int k = 0; k < kMaxPlaces; ++k) {
+    const bool of_x = draw.below(2) == 0;
+    const double gap = draw.uniform(kMinGap, kMaxGap), side = draw.below(2) == 0 ? 1 : -1;
+    const double along = draw.uniform(-kAlong, kAlong);
+    out.push_back(of_x ? Vec3{c.x + side * (both.x + gap), c.y + along * half_other.y, box.low.z}
+                       : Vec3{c.x + along * half_other.x, c.y + side * (both.y + gap), box.low.z});
+  }
+  const double x = both.x + kBesideGap, y = both.y + kBesideGap;
+  for (double along : {0.0, 0.02, -0.02}) {
+    for (int side = -1; side <= 1; side += 2) {
+      out.push_back({c.x + along, c.y + side * y, box.low.z});
+      out.push_back({c.x + side * x, c.y + along, box.low.z});
+    }
+  }
+  const Vec3 base = vec3(world.data->xpos + 3 * robot().base_body());
+  std::stable_sort(out.begin() + kMaxPlaces, out.end(), [&](Vec3 a, Vec3 b) {
+    return std::hypot(a.x - base.x, a.y - base.y) < std::hypot(b.x - base.x, b.y - base.y);
+  });
+  // Remove placements beyond the edge of the supporting surface, such as on the robot's pedestal
+  // next to the table: there the two objects would not be on the same surface.
+  const int carrier = supporting_body(world, body);
+  std::erase_if(out, [&](Vec3 p) {
+    return carrier >= 0 &&
+           !is_supported_over_whole_area(world, p, half, carrier, episode.objects[0].body);
+  });
+}
+
+// Drawn places first: points uniformly distributed over the receptacle at which the object fits.
+// Then its middle, points around it, and its rim.
+void PickAndPlaceTask::places_within(const World& world, const Quat& turn,
+                                     std::vector<Vec3>& out) const {
   const Episode& episode = episodes_[world.id];
   const int body = episode.objects[1].body;
   const Aabb box = world_box(world, body);
   const Vec3 c = box.center();
-  if (kind_ == PlaceKind::kNextTo) {
-    const Aabb object = turned_box(world, episode.objects[0].body, turn);
-    const double x = 0.5 * (box.high.x - box.low.x + object.high.x - object.low.x) + kBesideGap;
-    const double y = 0.5 * (box.high.y - box.low.y + object.high.y - object.low.y) + kBesideGap;
-    for (double along : {0.0, 0.02, -0.02}) {
-      for (int side = -1; side <= 1; side += 2) {
-        out.push_back({c.x + along, c.y + side * y, box.low.z});
-        out.push_back({c.x + side * x, c.y + along, box.low.z});
-      }
-    }
-    const Vec3 base = vec3(world.data->xpos + 3 * robot().base_body());
-    std::ranges::stable_sort(out, {},
-                             [&](Vec3 p) { return std::hypot(p.x - base.x, p.y - base.y); });
-    // Remove placements beyond the edge of the supporting surface, such as on the robot's pedestal
-    // next to the table: there the two objects would not be on the same surface.
-    const int carrier = supporting_body(world, body);
-    const Vec3 half = 0.5 * object.size();
-    std::erase_if(out, [&](Vec3 p) {
-      return carrier >= 0 &&
-             !is_supported_over_whole_area(world, p, half, carrier, episode.objects[0].body);
-    });
-    return;
-  }
   // The height is that of the receptacle's surface: its bottom if it is open, otherwise its rim.
   const Pose pose = body_pose(world.data, body);
   std::vector<Vec3> points;
@@ -282,6 +319,33 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
     }
     return top;
   };
+  const Vec3 half = 0.5 * turned_box(world, episode.objects[0].body, turn).size();
+  // Height at which the object rests at (x, y); NaN if not all of the surface below its box is level,
+  // such as on a rim. The box is divided into cells, in each of which the surface has points.
+  const int nx = std::clamp(static_cast<int>(2 * half.x / kCell), 1, kMaxCells);
+  const int ny = std::clamp(static_cast<int>(2 * half.y / kCell), 1, kMaxCells);
+  const auto rest = [&](double x, double y) {
+    std::array<double, kMaxCells * kMaxCells> tops;
+    tops.fill(-std::numeric_limits<double>::infinity());
+    double top = tops[0];
+    for (Vec3 p : points) {
+      const double dx = p.x - x, dy = p.y - y;
+      if (!(std::abs(dx) < half.x && std::abs(dy) < half.y)) continue;
+      const int i = static_cast<int>(0.5 * (dx / half.x + 1) * nx);
+      const int j = static_cast<int>(0.5 * (dy / half.y + 1) * ny);
+      double& of_cell = tops[std::min(i, nx - 1) * ny + std::min(j, ny - 1)];
+      of_cell = std::max(of_cell, p.z);
+      top = std::max(top, p.z);
+    }
+    const double low = *std::min_element(tops.begin(), tops.begin() + nx * ny);
+    return top - low <= kUneven ? top : std::numeric_limits<double>::quiet_NaN();
+  };
+  Rng draw = place_rng(world.id);
+  for (int k = 0; k < kMaxDraws && static_cast<int>(out.size()) < kMaxPlaces; ++k) {
+    const double x = draw.uniform(box.low.x, box.high.x), y = draw.uniform(box.low.y, box.high.y);
+    const double z = rest(x, y);
+    if (std::isfinite(z)) out.push_back({x, y, z});
+  }
   for (double radius : {0.0, 0.02, 0.04}) {
     for (int k = 0; k < (radius > 0 ? 6 : 1); ++k) {
       const double x = c.x + radius * std::cos(k * pi / 3), y = c.y + radius * std::sin(k * pi / 3);
@@ -337,7 +401,8 @@ std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
   } else if (is_any(kOnTop)) {
     at = "on ", to = "onto ";
   }
-  return scenes::one_of(kSentences, rng, object, at + where, to + where);
+  const char* sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  return fmt::format(fmt::runtime(sentence), object, at + where, to + where);
 }
 
 episode::Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {

@@ -92,6 +92,9 @@ class PickAndPlaceTask final : public scenes::SceneTask,
   static std::string_view missing_within(const Assessment& now);
   std::string_view missing_beside(const World& world, const Assessment& now) const;
   std::vector<int> choose(int world, Rng& rng) const;
+  Rng place_rng(int world) const;
+  void places_beside(const World& world, const Quat& turn, std::vector<Vec3>& out) const;
+  void places_within(const World& world, const Quat& turn, std::vector<Vec3>& out) const;
   std::string place_description(int world) const;
   Referrals::value_type referral(const char* key, int object) const;
 
