@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer is a program for one person: who may connect to its page, what a client may do, and what texts of files do in the page."""
 
+import contextlib
 import json
 import math
 import re
@@ -266,6 +267,33 @@ def test_a_client_that_only_sends_pings_is_dropped(arm):
         with pytest.raises(OSError):
             for _ in range(1000):
                 plain.sendall(1000 * ping)  # 131 MB in total
+
+
+def test_connections_that_speak_no_http_or_vanish(arm, capfd):
+    """They print nothing and change nothing."""
+    for payload in (b"\0" * 1000, b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 100_000, bytes(range(256)) * 16, b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nx", b"GET /\xff HTTP/1.1\r\n\r\n"):
+        with socket.create_connection(("127.0.0.1", arm.port), 5) as plain, contextlib.suppress(OSError):
+            plain.sendall(payload)
+            plain.settimeout(2)
+            plain.recv(100)
+    idle = [socket.create_connection(("127.0.0.1", arm.port), 5) for _ in range(300)]  # more than are kept
+    for one in idle:
+        one.close()
+
+    def served():
+        with contextlib.suppress(ConnectionError):
+            return get(arm.url)[0] == 200
+
+    eventually(served)
+    vanishing = [RawClient(arm.url).appear() for _ in range(5)]
+    eventually(lambda: len(arm._server.get_clients()) == 5)
+    for client in vanishing:
+        client.reset()
+    eventually(lambda: not arm.watched)
+    arm.update()
+    with RawClient(arm.url).read() as client:
+        assert client.uuid("a")
+    assert capfd.readouterr().err == ""
 
 
 # ------------------------------------------------------------------------------------------------------------ texts of files
