@@ -3,6 +3,7 @@
 
 import http.client
 import socket
+import struct
 import time
 from urllib.parse import urlsplit
 
@@ -60,6 +61,12 @@ class RawClient:
 
     def set(self, label, value):
         self.send("GuiUpdateMessage", uuid=self.uuid(label), updates={"value": value})
+
+    def reset(self):
+        """Ends the connection without a word."""
+        self._socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self._socket.socket.shutdown(socket.SHUT_RDWR)
+        self._socket.socket.close()
 
     def close(self):
         self._socket.close()

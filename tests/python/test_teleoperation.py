@@ -17,6 +17,7 @@ from devtools import Page, needs_chromium
 from mjsense._rotations import rotation_of
 from mjsense.teleoperation.devices import SpaceMouse, device_of
 from mjsense.teleoperation.page import STEP, TURN
+from mjsense.teleoperation.play import Teleoperation
 from mjsense.teleoperation.pose import Pose
 
 import mjsense as mjs
@@ -44,6 +45,9 @@ def test_spacemouse(monkeypatch):
     motion = device.read(0.1)
     np.testing.assert_allclose(motion.translation, [SpaceMouse.SPEED * 0.1, 0, 0])
     assert not motion.rotation.any() and not motion.toggle_gripper, "0.02 is in the dead zone"
+    state.x, state.y, state.roll = -np.inf, 1e9, np.nan
+    np.testing.assert_allclose(device.read(0.1).translation, [SpaceMouse.SPEED * 0.1, SpaceMouse.SPEED * 0.1, 0], err_msg="a device that is broken")
+    assert not device.read(0.1).rotation.any()
     state.buttons = [1, 0]
     assert device.read(0.1).toggle_gripper and not device.read(0.1).toggle_gripper, "once per press"
     monkeypatch.setitem(sys.modules, "pyspacemouse", types.SimpleNamespace(open=lambda: False))
@@ -51,6 +55,15 @@ def test_spacemouse(monkeypatch):
         device_of("spacemouse")
     with pytest.raises(ValueError, match="must be keyboard or spacemouse"):
         device_of("gamepad")
+
+
+def test_commands_are_within_the_bounds():
+    policy = Teleoperation("pick")
+    policy.action_groups, policy.action_low, policy.action_high = {"arm": slice(0, 2), "gripper": slice(2, 3)}, np.array([-1.0, -2, 0]), np.array([1.0, 2, 0.04])
+    np.testing.assert_array_equal(policy._possible("arm", np.array([1e300, -0.5])), [[1, -0.5]])
+    np.testing.assert_array_equal(policy._possible("gripper", np.array([-1.0])), [[0]])
+    with pytest.raises(ValueError, match="a command of move group 'arm' is not finite"):
+        policy._possible("arm", np.array([np.nan, 0]))
 
 
 def test_errors(tmp_path):

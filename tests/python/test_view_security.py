@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer is a program for one person: who may connect to its page, what a client may do, and what texts of files do in the page."""
 
+import contextlib
 import json
 import math
 import re
@@ -95,8 +96,8 @@ def test_every_viewer_has_its_own_token_and_other_servers_of_viser_none(arm, por
 
 @pytest.mark.parametrize("host, port, message", [
     ("127.0.0.1", 65536, r"port is 65536: must be in \[0, 65535\]"), ("127.0.0.1", -1, r"port is -1: must be in \[0, 65535\]"),
-    ("", 8080, "host is empty: .*127.0.0.1.*0.0.0.0"), (" ", 8080, "host is empty"), ("256.1.1.1", 8080, "host is '256.1.1.1', which is no known name"),
-    ("no such host", 8080, "host is 'no such host', which is no known name"), ("a" * 300, 8080, "no known name"), ("8.8.8.8", 8080, "host is '8.8.8.8': this computer cannot listen there")])  # fmt: skip
+    ("", 8080, "host is empty: .*127.0.0.1.*0.0.0.0"), (" ", 8080, "host is empty"), ("256.1.1.1", 8080, "host is '256.1.1.1', which is not a known name"),
+    ("no such host", 8080, "host is 'no such host', which is not a known name"), ("a" * 300, 8080, "not a known name"), ("8.8.8.8", 8080, "host is '8.8.8.8': this computer cannot listen there")])  # fmt: skip
 def test_an_address_that_cannot_be_used_is_an_error_at_once(tmp_path, host, port, message):
     (tmp_path / "arm.xml").write_text(ARM.format("b"))
     with pytest.raises(ValueError, match=message):
@@ -125,10 +126,10 @@ def test_other_addresses(tmp_path, port, capsys):
         assert viewer.url.startswith(f"http://[::1]:{port}/") and get(viewer.url)[0] == 200
         with RawClient(viewer.url).read() as client:
             assert client.uuid("a")
-    assert "anybody" not in capsys.readouterr().out
+    assert "every person" not in capsys.readouterr().out
     with mjs.view(tmp_path / "arm.xml", host="0.0.0.0", port=port, block=False, open_browser=False) as viewer:
         said = capsys.readouterr().out
-        assert said.count("anybody on the network who has its address") == 1 and viewer.url.startswith(f"http://127.0.0.1:{port}/")
+        assert said.count("every person on the network who has the address") == 1 and viewer.url.startswith(f"http://127.0.0.1:{port}/")
         assert get(viewer.url)[0] == get(viewer.url, host="192.168.1.7:8080")[0] == get(viewer.url, host=socket.gethostname())[0] == 200
         assert get(viewer.url, host="evil.example")[0] == get(viewer.url, path="/")[0] == 403
     with mjs.view(tmp_path / "arm.xml", host="localhost", port=0, block=False, open_browser=False) as viewer:
@@ -268,6 +269,33 @@ def test_a_client_that_only_sends_pings_is_dropped(arm):
                 plain.sendall(1000 * ping)  # 131 MB in total
 
 
+def test_connections_that_speak_no_http_or_vanish(arm, capfd):
+    """They print nothing and change nothing."""
+    for payload in (b"\0" * 1000, b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 100_000, bytes(range(256)) * 16, b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nx", b"GET /\xff HTTP/1.1\r\n\r\n"):
+        with socket.create_connection(("127.0.0.1", arm.port), 5) as plain, contextlib.suppress(OSError):
+            plain.sendall(payload)
+            plain.settimeout(2)
+            plain.recv(100)
+    idle = [socket.create_connection(("127.0.0.1", arm.port), 5) for _ in range(300)]  # more than are kept
+    for one in idle:
+        one.close()
+
+    def served():
+        with contextlib.suppress(ConnectionError):
+            return get(arm.url)[0] == 200
+
+    eventually(served)
+    vanishing = [RawClient(arm.url).appear() for _ in range(5)]
+    eventually(lambda: len(arm._server.get_clients()) == 5)
+    for client in vanishing:
+        client.reset()
+    eventually(lambda: not arm.watched)
+    arm.update()
+    with RawClient(arm.url).read() as client:
+        assert client.uuid("a")
+    assert capfd.readouterr().err == ""
+
+
 # ------------------------------------------------------------------------------------------------------------ texts of files
 
 
@@ -382,6 +410,31 @@ def test_texts_in_the_page(tmp_path, port):
                 while "Episodes" not in (page.run("document.body?.innerText") or ""):
                     assert time.monotonic() < deadline
                     time.sleep(0.1)
+                assert not page.console
+        finally:
+            viewer.close()
+            thread.join()
+
+
+@devtools.needs_chromium
+def test_names_of_a_model_in_the_page(tmp_path, port):
+    """In a browser: labels of controls, of curves and of the scene tree."""
+    name = "&lt;img src=x onerror='window.owned=1'&gt;"
+    xml = ARM.format(name).replace('"j"', f'"{name}"').replace('name="a"', f'name="{name}"')
+    xml = xml.replace("</mujoco>", f'<sensor><jointpos name="{name}" joint="{name}"/></sensor></mujoco>')
+    (tmp_path / "<img src=x>.xml").write_text(xml)
+    with mjs.view(tmp_path / "<img src=x>.xml", port=port, block=False, open_browser=False) as viewer:
+        thread = threading.Thread(target=viewer.run, args=(False,))
+        thread.start()
+        try:
+            with devtools.Page(viewer.url) as page:
+                viewer._events[1] = lambda: viewer._curves.choose("<img src=x onerror='window.owned=1'>")
+                for tab in ("Curves", "Control", "Show", "Cameras"):
+                    page.click("[role=tab]", tab)
+                    time.sleep(1)
+                    assert page.run("window.owned") is None and page.run("document.querySelectorAll('img[src=x]').length") == 0, tab
+                    if tab == "Curves":
+                        assert "<img src=x" in page.run("document.querySelector('.uplot').innerText")
                 assert not page.console
         finally:
             viewer.close()

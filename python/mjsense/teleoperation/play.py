@@ -100,7 +100,8 @@ class Teleoperation(Policy):
                 page.toggle_gripper()
         page._handle_events()
         grip = self._closed if page.gripper_closed else self._open
-        return {self._arm: self._possible(self._arm, page.target.row), self._gripper: self._possible(self._gripper, grip), "done": np.array([page.finished])}
+        return {self._arm: self._possible(self._arm, page.target.row), self._gripper: self._possible(self._gripper, grip),
+                "done": np.array([page.finished])}  # fmt: skip
 
     def _possible(self, group: str, command: np.ndarray) -> np.ndarray:
         """Commands [1, n] within the bounds of the group's controller."""
@@ -144,8 +145,9 @@ def play(
         gripper: Move group that is opened and closed.
         episodes: Number of successful episodes to keep.
         seed: Random seed of the starts.
-        host: Address that the page's server is bound to; the default is reachable from this computer only.
-        port: Port of the server; if it is taken, the next free one.
+        host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with the printed
+            address, which contains a token.
+        port: Port of the server; if it is taken, the next free one; 0: any free one.
         open_browser: Open the page in the default browser.
         options: Further options of :func:`record`, such as ``append=True``.
 

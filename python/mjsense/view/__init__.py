@@ -37,8 +37,9 @@ def view(
         episode: Position of a recording's episode to show first.
         worlds: Number of worlds, if ``thing`` is a path or a name.
         seed: Seed of the first episode, if ``thing`` is a path or a name.
-        host: Address that the server is bound to; the default is reachable from this computer only.
-        port: Port of the server. If it is taken, the next free one is used.
+        host: Address that the server is bound to; the default is reachable from this computer only. The page opens with the printed address
+            (:attr:`Viewer.url`), which contains a token.
+        port: Port of the server. If it is taken, the next free one is used; 0: any free one.
         block: Run until Ctrl-C or :meth:`Viewer.close`. False: return, and show the present state at every :meth:`Viewer.update`.
         open_browser: Open the page in the default browser.
         options: Options of :func:`make_vec` for a task or a scene, such as ``robot``.
@@ -47,6 +48,7 @@ def view(
         The viewer, which is closed if ``block`` is true.
 
     Raises:
+        ValueError: This computer cannot listen at this host and port.
         ModuleNotFoundError: viser is not installed.
     """
     from mjsense.view.open import source_of, viewer_of

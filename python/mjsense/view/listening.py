@@ -7,6 +7,7 @@ import errno
 import ipaddress
 import re
 import socket
+from typing import Any
 
 from mjsense._show import plain
 
@@ -34,7 +35,7 @@ class Listening:
         try:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
         except (OSError, UnicodeError) as error:
-            raise ValueError(f"host is '{plain(host, 60)}', which is no known name or address ({error}): must be an address of this computer, such as "
+            raise ValueError(f"host is '{plain(host, 60)}', which is not a known name or address ({error}): must be an address of this computer, such as "
                              "127.0.0.1, or 0.0.0.0 for all its networks") from None  # fmt: skip
         family, _, _, _, address = min(found, key=lambda one: one[0] != socket.AF_INET)
         self._host = host
@@ -66,20 +67,13 @@ class Listening:
         return address.is_loopback or not self.local  # an address cannot be pointed elsewhere
 
 
-def _bound(family: int, address: tuple[str | int, ...], host: str, port: int) -> socket.socket:
+def _bound(family: int, address: tuple[Any, ...], host: str, port: int) -> socket.socket:
     """A socket that listens at this port or one of the next ones."""
     last = min(port + _TRIED, 65535) if port else 0
     for candidate in range(port, last + 1):
-        made = socket.socket(family, socket.SOCK_STREAM)
         try:
-            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            if family == socket.AF_INET6:
-                made.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-            made.bind((address[0], candidate, *address[2:]))
-            made.listen(100)
-            return made
+            return _listening(family, (address[0], candidate, *address[2:]))
         except OSError as error:
-            made.close()
             if error.errno == errno.EADDRINUSE:
                 continue
             if error.errno == errno.EACCES:
@@ -87,3 +81,17 @@ def _bound(family: int, address: tuple[str | int, ...], host: str, port: int) ->
             raise ValueError(f"host is '{plain(host, 60)}': this computer cannot listen there ({error.strerror}); must be one of its own addresses, such as "
                              "127.0.0.1, or 0.0.0.0 for all its networks") from None  # fmt: skip
     raise ValueError(f"port is {port}: it and all ports up to {last} are taken")
+
+
+def _listening(family: int, address: tuple[Any, ...]) -> socket.socket:
+    made = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if family == socket.AF_INET6:
+            made.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        made.bind(address)
+        made.listen(100)
+    except OSError:
+        made.close()
+        raise
+    return made

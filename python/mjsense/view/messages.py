@@ -26,6 +26,9 @@ class Messages:
         import msgspec.msgpack  # a dependency of viser
 
         self._viser, self._gui, self._scene = viser, server.gui, server.scene
+        private = {"_gui_input_handle_from_uuid": server.gui, "_command_handle_from_uuid": server.gui, "_handle_from_transform_controls_name": server.scene}
+        if missing := [name for name, owner in private.items() if not hasattr(owner, name)]:
+            raise RuntimeError(f"viser {plain(viser.__version__)} has no {missing[0]}, which the viewer reads: install viser 1.1.1")
         self._codec: Any = msgspec.msgpack
         self._error: type[Exception] = msgspec.MsgspecError
         self._kinds = {"GuiUpdateMessage": self._value, "CommandTriggerMessage": self._command, "ViewerCameraMessage": self._camera,

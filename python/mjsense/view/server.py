@@ -51,7 +51,7 @@ def _behind(gate: Gate) -> Iterator[str]:
     """Gives the host of which a server that is made meanwhile is one behind the gate.
 
     viser has no option for who may connect. It looks ``serve`` of websockets up when it starts, and passes it the host, so ``serve`` is replaced
-    until then. A host that does not exist makes sure that nobody listens without the gate, and that servers of others are as always.
+    until then. The host does not exist, so that no server listens without the gate, and servers of other programs stay as they are.
     """
     import websockets.asyncio.server as library
 

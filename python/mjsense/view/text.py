@@ -32,4 +32,4 @@ def panel_text(title: object, *lines: object) -> str:
     images in them."""
     shown = "".join(f"<div>{escaped(line, 2000)}</div>" for line in lines if line)
     head = f"<b>{escaped(title, 2000)}</b>" if title else ""
-    return f"<div style='padding:0 .5em;font-size:.875rem;line-height:1.5;overflow-wrap:anywhere;white-space:pre-wrap'>{head}{shown}</div>"
+    return f"<div style='padding:0 .5em .4em;font-size:.875rem;line-height:1.5;overflow-wrap:anywhere;white-space:pre-wrap'>{head}{shown}</div>"
