@@ -76,4 +76,4 @@ class DerivedFields:
             sim._derived[name] = handle, handle.arrays()[""]
         handle, array = sim._derived[name]
         sim._core.refresh(handle)
-        return array
+        return array.view()
