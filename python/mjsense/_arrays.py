@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._sensor_data import SensorData
+
 
 def on_host(values: Any) -> np.ndarray:
     """Numbers, an array, a tensor or a ``wp.array`` as a NumPy array."""
@@ -17,6 +19,25 @@ def on_host(values: Any) -> np.ndarray:
 def copied(array: Any) -> Any:
     """A copy of an array, or of a tensor on its device; a ``wp.array`` becomes a NumPy array."""
     return array.clone() if hasattr(array, "clone") else np.array(on_host(array))
+
+
+def fresh(value: Any) -> Any:
+    """The same memory in new array objects: a shape, dtype or strides that one reader sets do not reach the others.
+
+    Args:
+        value: An array, a dict of arrays, also nested, or the data of a sensor. Other values are returned as they are.
+    """
+    if isinstance(value, np.ndarray):
+        return value.view()
+    if isinstance(value, dict):
+        return {name: fresh(part) for name, part in value.items()}
+    if not isinstance(value, SensorData):
+        return value
+    made = object.__new__(type(value))  # dataclasses.replace() takes twice as long
+    for name in value.__dataclass_fields__:
+        array = getattr(value, name)
+        object.__setattr__(made, name, array.view() if isinstance(array, np.ndarray) else array)
+    return made
 
 
 def ids_of_worlds(given: Any, count: int) -> np.ndarray:

@@ -3,9 +3,14 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 import weakref
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class OneThread:
@@ -25,6 +30,17 @@ class OneThread:
 
     def __exit__(self, *_: object) -> None:
         self.lock.release()
+
+
+def guarded(method: F) -> F:
+    """Decorates a method of an object with a `_guard`: it runs inside the guard."""
+
+    @functools.wraps(method)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        with args[0]._guard:
+            return method(*args, **kwargs)
+
+    return cast(F, call)
 
 
 _guards: weakref.WeakSet[OneThread] = weakref.WeakSet()

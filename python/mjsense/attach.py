@@ -11,6 +11,7 @@ import numpy as np
 
 from mjsense import _core, _foreign_model
 from mjsense._arguments import KnownAttributes, Seed, checked
+from mjsense._one_thread import OneThread, guarded
 from mjsense._randomizable import check_randomizable
 from mjsense.configs import SceneCfg
 from mjsense.errors import UnknownNameError, did_you_mean
@@ -33,7 +34,8 @@ class Attached(KnownAttributes):
     """Sensors over data that the user's program steps; made by :func:`attach`.
 
     ``attached["front"]`` is the sensor of that name, as ``scene["front"]`` is in a :class:`mjsense.Simulation`; world ``i`` is ``data[i]``.
-    The sensors show the states at the last :meth:`update` or :meth:`reset`. The user's model and data are never written.
+    The sensors show the states at the last :meth:`update` or :meth:`reset`. The user's model and data are never written. A call of
+    :meth:`update`, :meth:`reset`, :meth:`reload` or :meth:`replace` during one of another thread is an error; :meth:`close` waits for it.
     """
 
     def __init__(
@@ -46,6 +48,7 @@ class Attached(KnownAttributes):
         threads: int = 0,
         seed: Seed = 0,
     ) -> None:
+        self._guard = OneThread("attached sensors: another thread is updating them; update them in one thread")
         self.datas: tuple[Any, ...] = tuple(getattr(one, "_data", one) for one in (data if isinstance(data, (list, tuple)) else [data]))
         """The user's data, by world."""
         if not self.datas:
@@ -110,7 +113,8 @@ class Attached(KnownAttributes):
 
     def close(self) -> None:
         """Frees the sensors once no array of them is referenced any more. Every later call raises RuntimeError."""
-        self._sim.close()
+        with self._guard.lock:
+            self._sim.close()
 
     def __getitem__(self, name: str) -> Any:
         sensors = self.sensors
@@ -162,6 +166,7 @@ class Attached(KnownAttributes):
         """``data.time`` of each world at the last update, s, ``[B]``."""
         return self._times.copy()
 
+    @guarded
     def update(self) -> None:
         """Makes the sensors show the current states of the data.
 
@@ -197,6 +202,7 @@ class Attached(KnownAttributes):
                 self._sim._core.forward(ids)
             self._check_failures("update")
 
+    @guarded
     def reset(self, ids: Sequence[int] | None = None) -> None:
         """Call when an episode has begun in these worlds: clears what sensors remember, and shows the current states.
 
@@ -209,6 +215,7 @@ class Attached(KnownAttributes):
         self._sim._core.reset(worlds, _WRITTEN_STATE, None)
         self._check_failures("reset")
 
+    @guarded
     def reload(self) -> None:
         """Call after the model was edited (masses, sizes, friction, colours, options ...): the sensors follow.
 
@@ -219,6 +226,7 @@ class Attached(KnownAttributes):
         self._read_models("reload()")
         self._sim.forward()
 
+    @guarded
     def replace(self, world: int, data: Any, model: Any = None) -> None:
         """Call when the program has made a new data for a world, and perhaps a new model; an episode begins in it.
 

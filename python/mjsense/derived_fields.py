@@ -78,4 +78,4 @@ class DerivedFields:
             sim._derived[name] = handle, handle.arrays()[""]
         handle, array = sim._derived[name]
         sim._core.refresh(handle)
-        return array
+        return array.view()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mjsense import _core, _show, data
 from mjsense._arguments import KnownAttributes, checked
-from mjsense._arrays import copied, on_host
+from mjsense._arrays import copied, fresh, on_host
 from mjsense.drawing import DebugShapes
 
 
@@ -67,10 +67,13 @@ class NativeSensor(KnownAttributes):
         Computed when it is read, if it is out of date. The arrays are the sensor's own memory and read-only. The next read after
         a step, reset or forward overwrites them, and step() itself may do so. Copy them to keep or change them.
         """
+        self._refresh()
+        return fresh(self._data)
+
+    def _refresh(self) -> None:
         if self._core is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
         self._core.refresh(self._handle)
-        return self._data
 
     def _row(self, world: int) -> Any:
         """A copy of the current value of one world."""
@@ -80,8 +83,8 @@ class NativeSensor(KnownAttributes):
     @property
     def fields(self) -> Mapping[str, np.ndarray]:
         """All current fields by name; the name of the only or main field is ''."""
-        self.data  # update the sensor
-        return self._fields
+        self._refresh()
+        return MappingProxyType(fresh(dict(self._fields)))
 
     @property
     def specs(self) -> dict[str, _core.SensorSpec]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mjsense import _core, _scene_layout
 from mjsense._arguments import OutputArray, checked
-from mjsense._one_thread import OneThread
+from mjsense._one_thread import OneThread, guarded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -217,23 +217,23 @@ class Renderer:
     def width(self) -> int:
         return self._width
 
+    @guarded
     def enable_depth_rendering(self) -> None:
-        with self._guard:
-            self._segmentation = False
-            self._depth = True
+        self._segmentation = False
+        self._depth = True
 
+    @guarded
     def disable_depth_rendering(self) -> None:
-        with self._guard:
-            self._depth = False
+        self._depth = False
 
+    @guarded
     def enable_segmentation_rendering(self) -> None:
-        with self._guard:
-            self._segmentation = True
-            self._depth = False
+        self._segmentation = True
+        self._depth = False
 
+    @guarded
     def disable_segmentation_rendering(self) -> None:
-        with self._guard:
-            self._segmentation = False
+        self._segmentation = False
 
     @staticmethod
     def _sizes_of(model: mujoco.MjModel) -> tuple[int, ...]:
@@ -437,14 +437,14 @@ class Renderer:
             self._batch = _Pool(lambda: Renderer(self._model, self._height, self._width, self._scene.maxgeom))
         return self._batch
 
+    @guarded
     def reload(self) -> None:
         """Makes the next image show the current textures, height fields and meshes of the model.
 
         Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a large one
         may be missed.
         """
-        with self._guard:
-            self._opened().reload()
+        self._opened().reload()
 
     def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
         if kind not in _KINDS:

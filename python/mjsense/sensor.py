@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 
 from mjsense import _core, _show
+from mjsense._arrays import fresh
 from mjsense._rows import Row, leaves, nested, rows_of_space, rows_of_value
 from mjsense._user_code import RandomStreams, SensorError, named, observe, required, takes
 from mjsense.drawing import DebugShapes
@@ -168,7 +169,7 @@ class Sensor(Generic[T]):
         if self._mjs_core is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no data yet: it belongs to no simulation")
         self._mjs_core.refresh(self._mjs_handle)
-        return self._mjs_value
+        return fresh(self._mjs_value) if self._mjs_fields else self._mjs_value
 
     @property
     def rows(self) -> Any:
@@ -177,7 +178,7 @@ class Sensor(Generic[T]):
         if self._mjs_rows is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no rows: give it an observation_space, or is_dict = True")
         self._mjs_core.refresh(self._mjs_handle)
-        return self._mjs_shown
+        return fresh(self._mjs_shown)
 
     def debug_shapes(self, world: int = 0) -> DebugShapes:
         """The shapes that ``debug_vis`` adds for this world."""

@@ -248,7 +248,7 @@ class Simulation(KnownAttributes):
         """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it."""
         if "state" not in self._views or self._core.closed:
             self._views["state"] = self._core.state()
-        return self._views["state"]
+        return self._views["state"].view()
 
     qpos = _State("Joint positions [B, nq] (m, rad).")
     qvel = _State("Joint velocities [B, nv] (m/s, rad/s).")
@@ -353,7 +353,7 @@ class Simulation(KnownAttributes):
 
     def model_field(self, name: str) -> np.ndarray:
         """A field of the model with one value per world, ``[B, ...]``, live; see :meth:`randomize`."""
-        return self._models.field(name)
+        return self._models.field(name).view()
 
     def _ids(self, world_ids: Any) -> list[int] | None:
         """Ids of worlds, of ids or a mask; None: all. Raises ValueError for ids out of range."""
@@ -368,7 +368,7 @@ class Simulation(KnownAttributes):
         if view is None or self._core.closed:
             view = self._core.component(name)
             view = self._views[name] = view[:, 0] if name == "time" else view
-        return view
+        return view.view()
 
     # --------------------------------------------------------------------------------------------------------- sensors
 

@@ -5,6 +5,8 @@ import copy
 import dataclasses
 import gc
 import resource
+import threading
+import time
 
 import gymnasium
 import mujoco
@@ -378,3 +380,68 @@ def test_attaching_a_thousand_times_leaks_nothing():
         attach()
     gc.collect()
     assert resident() - before < 20e6
+
+
+BUSY = "attached sensors: another thread is updating them; update them in one thread"
+
+
+def runtime_errors(*works):
+    """Messages of RuntimeErrors of functions that run in threads at the same time."""
+    messages, others = set(), []
+
+    def run(work):
+        try:
+            work()
+        except RuntimeError as error:
+            messages.add(str(error))
+        except Exception as error:
+            others.append(error)
+
+    threads = [threading.Thread(target=run, args=(work,)) for work in works]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not others
+    return messages
+
+
+@pytest.mark.parametrize("call", ["update", "reset", "reload", "replace"])
+def test_one_thread_at_a_time(call):
+    model, datas = started(2)
+    with mjs.attach(model, datas, sensors()[1:9], threads=1) as attached:
+        work = getattr(attached, call) if call != "replace" else lambda: attached.replace(1, datas[1])
+        with attached._guard:
+            assert runtime_errors(work) == {BUSY}
+            work()  # of the same thread
+
+
+def test_threads_update_read_and_close():
+    model, datas = started(2)
+    attached = mjs.attach(model, datas, sensors()[1:9], threads=2)
+    updated = threading.Event()
+
+    def update():
+        for _ in range(30):
+            for data in datas:
+                mujoco.mj_step(model, data)
+            attached.update()
+        updated.set()
+
+    def read():
+        while not updated.is_set():
+            for name in attached:
+                attached[name].data
+
+    assert runtime_errors(update, read, read) == set()
+
+    def until_closed(work):
+        while True:
+            work()
+
+    def close():
+        time.sleep(0.2)
+        attached.close()
+
+    messages = runtime_errors(lambda: until_closed(attached.update), lambda: until_closed(attached.reset), close)
+    assert messages and all(message == BUSY or "closed" in message for message in messages)
