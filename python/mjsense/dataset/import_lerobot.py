@@ -141,6 +141,8 @@ class _Source:
                 if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) and len(task) <= 10_000 for task in tasks)):
                     raise ValueError(f"{path}: tasks of episode {index} is {foreign.found(tasks)}, expected a list of texts")
                 self.episodes[index] = row
+        if not self.episodes:
+            raise ValueError(f"{root}/meta/episodes contains no episodes (chunk-000/file-000.parquet ...)")
         self._read: tuple[Path, Any] = Path(), None
 
     def _names(self, path: Path) -> list[str]:
@@ -256,7 +258,7 @@ class _Source:
         av = _needs("av")
         try:
             with path.open("rb") as content, av.open(content, format=_container(content, path)) as file:
-                if not file.streams.video:
+                if not file.streams.video or file.streams.video[0].codec_context is None:
                     raise ValueError(f"{path}: has no video")
                 stream = file.streams.video[0]
                 feature.check_size(stream.codec_context.height, stream.codec_context.width, str(path))
@@ -365,6 +367,8 @@ def _image(content: bytes, feature: Feature, place: str) -> np.ndarray:
         feature.check_size(height, width, place)
     try:
         with av.open(io.BytesIO(content), format=kind) as file:
+            if file.streams.video[0].codec_context is None:
+                raise ValueError(f"{place}: has no image")
             feature.check_size(file.streams.video[0].codec_context.height, file.streams.video[0].codec_context.width, place)
             return next(file.decode(video=0)).to_ndarray(format="rgb24")
     except (av.error.FFmpegError, StopIteration) as error:
