@@ -300,7 +300,7 @@ class Feature:
         info = foreign.mapping(about.get("info") or about.get("video_info") or {}, f"{place}: info")
         self.is_depth = bool(info.get("is_depth_map") or info.get("video.is_depth_map"))
         self._info, self._place = info, place
-        self.shape = self._image_shape(sizes) if self.is_image else () if sizes == [1] else tuple(sizes)
+        self.shape: tuple[int, ...] = self._image_shape(sizes) if self.is_image else () if sizes == [1] else tuple(sizes)
         """Height and width of images, or the shape of other values."""
         if self.is_depth:
             self._depth = [foreign.number(info.get(f"video.{name}"), f"{place}: video.{name}", 0, 1e6) for name in ("depth_min", "depth_max", "shift")]
@@ -312,12 +312,13 @@ class Feature:
         if len(sizes) not in (2, 3):
             raise ValueError(f"{self._place}: shape is {sizes}, expected height, width and channels")
         if len(sizes) == 2:
-            return foreign.image_shape(*sizes, f"{self._place}: shape")
+            return foreign.image_shape(sizes[0], sizes[1], f"{self._place}: shape")
         named = [i for i, name in enumerate(self.names[:3]) if name.lower() in ("channel", "channels", "c")] if len(self.names) == 3 else []
         last = named[0] == 2 if named else sizes[2] in (1, 3, 4)
         if sizes[2 if last else 0] not in (1, 3, 4):
             raise ValueError(f"{self._place}: shape is {sizes} with the names {self.names}, expected 1, 3 or 4 channels at its start or end")
-        return foreign.image_shape(*(sizes[:2] if last else sizes[1:]), f"{self._place}: shape")
+        height, width = sizes[:2] if last else sizes[1:]
+        return foreign.image_shape(height, width, f"{self._place}: shape")
 
     def check_size(self, height: int, width: int, place: str) -> None:
         """Encoders may add rows and columns, up to their block size."""

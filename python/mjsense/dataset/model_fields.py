@@ -98,7 +98,7 @@ def read_input(group: Mapping[str, Any], name: str, length: int, about: str) -> 
     if name not in group:
         return None
     dataset, (dtype, dimensions, with_nan) = group[name], INPUTS[name]
-    shape = tuple(getattr(dataset, "shape", ()))
+    shape: tuple[int, ...] = tuple(getattr(dataset, "shape", ()))
     rows = shape[0] if name == "held" and shape else length
     if getattr(dataset, "dtype", None) != dtype or len(shape) != dimensions or shape[0] != rows or (name == "mocap" and shape[3] != 7):
         expected = f"{dtype} with {dimensions} dimensions" + ("" if name == "held" else f" and {length} rows")
