@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mjsense._png import png_of
 from mjsense.dataset import archive
-from mjsense.dataset.closed_model import closed_model, compile_closed
+from mjsense.dataset.closed_model import check_archive, closed_model, compile_closed
 from mjsense.dataset.model_sizes import MAX_PIXELS
 
 import mjsense as mjs
@@ -36,7 +36,7 @@ def test_files_of_an_archive(tmp_path):
     files = {"model.xml": MODEL.format("", "").encode(), "assets/0.obj": OBJ}
     assert archive.read_archive(written(tmp_path / "a.zip", files)) == files
     assert archive.read_archive(written(tmp_path / "b.zip", files, zipfile.ZIP_STORED)) == files
-    archive.check_archive(tmp_path / "a.zip")
+    check_archive(tmp_path / "a.zip")
 
 
 @pytest.mark.parametrize("files, why", [

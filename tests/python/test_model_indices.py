@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from mjsense.dataset.episode_worlds import EpisodeWorlds
+from mjsense.dataset.playback import check_episode
 
 import mjsense as mjs
 
@@ -51,9 +52,9 @@ def put(name, value):
 
 
 def refuses(episode, message):
-    """Both readers of the model refuse the episode with the same line."""
+    """All readers of the model refuse the episode with the same line."""
     place = r"^episode 0 \(trajectories_batch_1_of_1\.h5, traj_0\): "
-    for call in (episode.model, lambda: EpisodeWorlds(episode, 1).begin(0, episode)):
+    for call in (episode.model, lambda: check_episode(episode), lambda: EpisodeWorlds(episode, 1).begin(0, episode)):
         with pytest.raises(ValueError, match=place + message) as error:
             call()
         assert "\n" not in str(error.value)
