@@ -34,18 +34,6 @@ def read_archive(path: Path) -> dict[str, bytes]:
         return files_of(file, path)
 
 
-def check_archive(path: str | Path) -> None:
-    """Raises ValueError, with one line, if the files of an archive cannot be read, or if its model names other files or is too large.
-
-    The model is not compiled.
-    """
-    from mjsense.dataset.closed_model import closed_model
-
-    files = read_archive(Path(path))
-    text = files.pop(MODEL_FILE)
-    closed_model(text, files, f"{path}: {MODEL_FILE}")
-
-
 def files_of(file: IO[bytes], about: object) -> dict[str, bytes]:
     """The files of an open archive. ``about`` names it in errors."""
     try:

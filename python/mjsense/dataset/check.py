@@ -12,7 +12,6 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from mjsense import _libmujoco
 from mjsense.dataset import playback
 from mjsense.dataset.episode import NUMBERS, REPLAY, VIDEOS, Episode, Store, is_json
 from mjsense.dataset.files import batches, entries_of
@@ -100,11 +99,7 @@ def _check_replay(episode: Episode) -> None:
     with open_h5(episode.path) as file:
         if "replay" not in file[episode.trajectory] or not episode._recording.model_archive:
             return
-    if _libmujoco.shared is not None:
-        playback.model_of(episode)
-    else:
-        playback.inputs_of(episode)
-        playback.read_archive(playback.archive_of(episode))
+    playback.check_episode(episode)
     recorded_cameras(episode, None)
 
 

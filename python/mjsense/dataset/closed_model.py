@@ -12,11 +12,12 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from mjsense import _libmujoco
-from mjsense.dataset.archive import MODEL_FILE, fault_of_name
+from mjsense.dataset.archive import MODEL_FILE, fault_of_name, read_archive
 from mjsense.dataset.model_sizes import MAX_ARENA, check_sizes
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
         plugin = element.get("plugin")
         if plugin is not None and not re.fullmatch(r"mujoco\.[\w.]{1,80}", plugin):
             raise ValueError(f"{about}: the plugin {plugin[:80]!r} is not one of MuJoCo's own")
-    folders = dict.fromkeys(_FOLDERS, "")
+    folders: dict[str, str] = dict.fromkeys(_FOLDERS, "")
     strip = False
     for compiler in root.iter("compiler"):
         for key in _FOLDERS:
@@ -163,6 +164,16 @@ def closed_model(text: str | bytes, members: Mapping[str, bytes], about: str) ->
     close_names(root, find, about)
     check_sizes(root, members, about)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def check_archive(path: str | Path) -> None:
+    """Raises ValueError, with one line, if the files of an archive cannot be read, or if its model names other files or is too large.
+
+    The model is not compiled.
+    """
+    files = read_archive(Path(path))
+    text = files.pop(MODEL_FILE)
+    closed_model(text, files, f"{path}: {MODEL_FILE}")
 
 
 def compile_closed(files: Mapping[str, bytes], about: str) -> mujoco.MjModel:

@@ -109,6 +109,8 @@ def regular_inside(roots: tuple[Path, ...], path: Path, about: str) -> Path:
         place = path.resolve()
         kind = place.stat().st_mode
     except (OSError, RuntimeError) as error:
+        if path.is_symlink():
+            raise ValueError(f"{about}: {path} is a link to {os.readlink(path)}, which cannot be read") from None
         raise unreadable(path, error if isinstance(error, OSError) else OSError(str(error))) from None
     inside = [root.resolve() for root in roots]
     # Data sets in the cache of the Hugging Face Hub are links from snapshots/REVISION to blobs.

@@ -141,6 +141,8 @@ class _Source:
                 if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) and len(task) <= 10_000 for task in tasks)):
                     raise ValueError(f"{path}: tasks of episode {index} is {foreign.found(tasks)}, expected a list of texts")
                 self.episodes[index] = row
+        if not self.episodes:
+            raise ValueError(f"{root}/meta/episodes contains no episodes (chunk-000/file-000.parquet ...)")
         self._read: tuple[Path, Any] = Path(), None
 
     def _names(self, path: Path) -> list[str]:
@@ -256,7 +258,7 @@ class _Source:
         av = _needs("av")
         try:
             with path.open("rb") as content, av.open(content, format=_container(content, path)) as file:
-                if not file.streams.video:
+                if not file.streams.video or file.streams.video[0].codec_context is None:
                     raise ValueError(f"{path}: has no video")
                 stream = file.streams.video[0]
                 feature.check_size(stream.codec_context.height, stream.codec_context.width, str(path))
@@ -298,7 +300,7 @@ class Feature:
         info = foreign.mapping(about.get("info") or about.get("video_info") or {}, f"{place}: info")
         self.is_depth = bool(info.get("is_depth_map") or info.get("video.is_depth_map"))
         self._info, self._place = info, place
-        self.shape = self._image_shape(sizes) if self.is_image else () if sizes == [1] else tuple(sizes)
+        self.shape: tuple[int, ...] = self._image_shape(sizes) if self.is_image else () if sizes == [1] else tuple(sizes)
         """Height and width of images, or the shape of other values."""
         if self.is_depth:
             self._depth = [foreign.number(info.get(f"video.{name}"), f"{place}: video.{name}", 0, 1e6) for name in ("depth_min", "depth_max", "shift")]
@@ -310,12 +312,13 @@ class Feature:
         if len(sizes) not in (2, 3):
             raise ValueError(f"{self._place}: shape is {sizes}, expected height, width and channels")
         if len(sizes) == 2:
-            return foreign.image_shape(*sizes, f"{self._place}: shape")
+            return foreign.image_shape(sizes[0], sizes[1], f"{self._place}: shape")
         named = [i for i, name in enumerate(self.names[:3]) if name.lower() in ("channel", "channels", "c")] if len(self.names) == 3 else []
         last = named[0] == 2 if named else sizes[2] in (1, 3, 4)
         if sizes[2 if last else 0] not in (1, 3, 4):
             raise ValueError(f"{self._place}: shape is {sizes} with the names {self.names}, expected 1, 3 or 4 channels at its start or end")
-        return foreign.image_shape(*(sizes[:2] if last else sizes[1:]), f"{self._place}: shape")
+        height, width = sizes[:2] if last else sizes[1:]
+        return foreign.image_shape(height, width, f"{self._place}: shape")
 
     def check_size(self, height: int, width: int, place: str) -> None:
         """Encoders may add rows and columns, up to their block size."""
@@ -365,6 +368,8 @@ def _image(content: bytes, feature: Feature, place: str) -> np.ndarray:
         feature.check_size(height, width, place)
     try:
         with av.open(io.BytesIO(content), format=kind) as file:
+            if file.streams.video[0].codec_context is None:
+                raise ValueError(f"{place}: has no image")
             feature.check_size(file.streams.video[0].codec_context.height, file.streams.video[0].codec_context.width, place)
             return next(file.decode(video=0)).to_ndarray(format="rgb24")
     except (av.error.FFmpegError, StopIteration) as error:

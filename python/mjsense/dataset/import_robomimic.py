@@ -243,10 +243,10 @@ class _Writer:
                 continue
             key, kind = place.removeprefix("obs/"), next((end for end in _IMAGES if place.endswith(end)), "")
             if kind and values.dtype == np.uint8 and values.ndim == 4 and values.shape[3] == 3:
-                shape = (*foreign.image_shape(*values.shape[1:3], f"{demo.about}: {place}"), 3)
+                shape = (*foreign.image_shape(values.shape[1], values.shape[2], f"{demo.about}: {place}"), 3)
                 self._add(demo, key.removesuffix(kind), place, "uint8", shape, "Image of the camera.", video=True)
             elif key.endswith("_depth") and values.dtype.kind == "f" and values.ndim == 4 and values.shape[3] == 1:
-                shape = foreign.image_shape(*values.shape[1:3], f"{demo.about}: {place}")
+                shape = foreign.image_shape(values.shape[1], values.shape[2], f"{demo.about}: {place}")
                 self._add(demo, key, place, "float32", shape, "Depth image of the camera.", video=True, unit="m")
             else:
                 self._add(demo, f"observation/{key}", place, values.dtype.name, values.shape[1:], "Observation of the demonstration.")

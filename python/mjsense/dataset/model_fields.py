@@ -100,11 +100,11 @@ def read_input(group: Mapping[str, Any], name: str, length: int, about: str) -> 
     if name not in group:
         return None
     dataset, (dtype, dimensions, with_nan) = group[name], INPUTS[name]
-    shape = tuple(getattr(dataset, "shape", ()))
+    shape: list[int] = [*getattr(dataset, "shape", ())]
     rows = shape[0] if name == "held" and shape else length
     if getattr(dataset, "dtype", None) != dtype or len(shape) != dimensions or shape[0] != rows or (name == "mocap" and shape[3] != 7):
         expected = f"{dtype} with {dimensions} dimensions" + ("" if name == "held" else f" and {length} rows")
-        raise ValueError(f"{about}: replay/{name}: is {getattr(dataset, 'dtype', 'a group')} {[*shape]}, expected {expected}")
+        raise ValueError(f"{about}: replay/{name}: is {getattr(dataset, 'dtype', 'a group')} {shape}, expected {expected}")
     if (count := math.prod(shape)) > MAX_NUMBERS:
         raise ValueError(f"{about}: replay/{name}: has {count} numbers, the limit is {MAX_NUMBERS}")
     values = dataset[()]

@@ -13,7 +13,7 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense.dataset.archive import read_archive
-from mjsense.dataset.closed_model import compile_closed
+from mjsense.dataset.closed_model import check_archive, compile_closed
 from mjsense.dataset.hdf5 import open_h5, text_of
 from mjsense.dataset.model_fields import INPUTS, check_inputs, check_model_fields, read_input
 
@@ -137,6 +137,21 @@ def fields_of(episode: Episode, model: mujoco.MjModel) -> dict[str, np.ndarray]:
         if not hasattr(group, "items"):
             raise ValueError(f"{where(episode)}: replay/model is an array, expected a group")
         return check_model_fields(group, model, where(episode))
+
+
+def check_episode(episode: Episode) -> None:
+    """Raises ValueError, with one line, for an episode whose archive or data for replay would be refused by replay, render or the viewer.
+
+    Without the package ``mujoco`` the archive and the arrays are checked, but not the values of the model's fields.
+    """
+    archive = archive_of(episode)
+    if _libmujoco.shared is None:
+        check_archive(archive)
+        inputs_of(episode)
+        return
+    model = archived_model(episode)
+    fields_of(episode, model)
+    check_inputs(inputs_of(episode), model, mujoco.mj_stateSize(model, STATE), substeps_of(episode, model), where(episode))
 
 
 def substeps_of(episode: Episode, model: mujoco.MjModel) -> float:
