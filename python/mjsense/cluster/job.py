@@ -20,9 +20,10 @@ from mjsense._recording import PARTS, check_names, record_here
 from mjsense.assets import use_installed_files
 from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.storage import Storage
-from mjsense.dataset import Episode
+from mjsense.dataset import Episode, bounded_json, index
 from mjsense.dataset.episode import Store
 from mjsense.dataset.files import entries_of
+from mjsense.dataset.limits import SCENE_BYTES
 
 _OF_RECORD = {"sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"}
 """Arguments of ``record`` that do not decide the data."""
@@ -65,9 +66,23 @@ class ShardResult:
 
     @staticmethod
     def parse(text: bytes) -> ShardResult:
-        """Inverse of ``json.dumps(asdict(result))``."""
-        values = json.loads(text)
-        return ShardResult(**{**values, "shard": Shard(**values["shard"])})
+        """Inverse of ``json.dumps(asdict(result))``.
+
+        Raises:
+            ValueError: The text is damaged, or was changed by someone: a value has another type, or a path leaves the shard.
+        """
+        values = bounded_json.parse_object(text, "done.json", SCENE_BYTES)
+        kinds = {"shard": dict, "fingerprint": str, "episodes": list, "succeeded": int, "failed": int, "steps": int, "failures": dict, "seconds": (int, float)}
+        for name, value in values.items():
+            if not isinstance(value, kinds.get(name, ())):
+                raise ValueError(f"done.json: {name} is {bounded_json.kind_of(value)}, which is never written")
+        shard, rows = values.get("shard", {}), values.get("episodes", [])
+        if set(shard) != {"number", "first", "count"} or not all(isinstance(n, int) and 0 <= n < 2**53 for n in shard.values()):
+            raise ValueError("done.json: shard must have a number, the first attempt and the count")
+        checked = [index.checked_row("done.json", i, row) for i, row in enumerate(rows)]
+        if missing := kinds.keys() - values.keys() - {"failures", "seconds"}:
+            raise ValueError(f"done.json has no {min(missing)}")
+        return ShardResult(**{**values, "shard": Shard(**shard), "episodes": checked})
 
 
 @dataclass(frozen=True)

@@ -68,11 +68,14 @@ def _indexed(root: Path, source: Fetcher | None) -> tuple[list[EpisodeEntry], li
     entries: list[EpisodeEntry] = []
     descriptions: list[Description] = []
     of_house: dict[str, int] = {}
+    folders: set[Path] = set()
     for row in read_index(root):
         place = root / row["path"]
         house = place.parent.name
         entry = EpisodeEntry(place, row["trajectory"], row["length"], _house(place), row["episode"], row["seed"], row["outcome"],
                              of_house.setdefault(house, len(of_house)), source)  # fmt: skip
+        if source is None:
+            _plain_folders(root, place, folders)
         if entry.recording == len(descriptions):
             with open_h5(entry.path) as file:
                 descriptions.append(_description(file, place))
@@ -104,9 +107,18 @@ def batches(root: Path) -> list[Path]:
         waiting = any(root.glob("**/.recording"))
         hint = ": it is unfinished; `mjsense repair` publishes its episodes" if waiting else ""
         raise FileNotFoundError(f"{root} contains no recording (house_*/trajectories_batch_*.h5){hint}")
-    for folder in {folder for path in found for folder in (path.parent, path.parents[1]) if folder != root and root in folder.parents}:
-        plain_folder(folder)
+    folders: set[Path] = set()
+    for path in found:
+        _plain_folders(root, path, folders)
     return sorted(found, key=order)
+
+
+def _plain_folders(root: Path, file: Path, known: set[Path]) -> None:
+    """Raises an error if one of the folders between a recording's folder and one of its files is a link."""
+    for folder in (file.parent, file.parents[1]):
+        if folder not in known and root in folder.parents:
+            plain_folder(folder)
+            known.add(folder)
 
 
 def is_unfinished(root: Path) -> bool:

@@ -38,7 +38,7 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
             _check_columns(path, file)
             for batch in file.iter_batches(_ROWS, columns=[*_TEXTS, *_NUMBERS, "success"]):
                 _check_texts(path, batch)
-                rows += [_checked(path, len(rows) + i, row) for i, row in enumerate(batch.to_pylist())]
+                rows += [checked_row(path, len(rows) + i, row) for i, row in enumerate(batch.to_pylist())]
         except (arrow.ArrowException, OSError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: not an index that can be read: {printable(str(error)[:200])}") from None
     return rows
@@ -73,8 +73,11 @@ def _check_texts(path: Path, batch: Any) -> None:
         raise ValueError(f"{path}: the texts of {len(batch)} rows have up to {total} characters, more than {_BATCH_BYTES}")
 
 
-def _checked(path: Path, number: int, row: dict[str, Any]) -> dict[str, Any]:
+def checked_row(path: Path | str, number: int, row: Any) -> dict[str, Any]:
+    """The row of an index, or of a shard's results, with values in their bounds."""
     what = f"{path} row {number}"
+    if not isinstance(row, dict) or row.keys() != {*_TEXTS, *_NUMBERS, "success"}:
+        raise ValueError(f"{what} must have exactly the columns {', '.join([*_TEXTS, *_NUMBERS, 'success'])}")
     for name, (low, high) in _NUMBERS.items():
         value = row[name]
         if not ((isinstance(value, int) and low <= value <= high) or (value is None and name == "seed")):
@@ -84,5 +87,7 @@ def _checked(path: Path, number: int, row: dict[str, Any]) -> dict[str, Any]:
             shown = "house_0/trajectories_batch_1_of_1.h5, with or without a shard in front" if name == "path" else "traj_0"
             raise ValueError(f"{what}: {name} is '{printable(str(row[name])[:100])}'; it must have the form {shown}")
     for name in ("outcome", "task"):
+        if not isinstance(row[name], (str, type(None))):
+            raise ValueError(f"{what}: {name} is no text")
         row[name] = row[name] or ""
     return row
