@@ -145,14 +145,14 @@ def test_attached_sensors_that_are_behind_warn_once():
     model = mujoco.MjModel.from_xml_string(XML)
     state = mujoco.MjData(model)
     attached = mjs.attach(model, state, sensors=(mjs.ImuSensorCfg(name="i", site=mjs.ObjRef("site", "tip")),))
-    attached["i"].data  # noqa: B018
+    attached["i"].data
     mujoco.mj_step(model, state)
     with pytest.warns(RuntimeWarning, match=r"attached sensors show data\[0\] at 0 s, and it is at 0\.002 s: call update\(\) after mj_step") as found:
-        attached["i"].data  # noqa: B018
-        attached["i"].data  # noqa: B018
+        attached["i"].data
+        attached["i"].data
     assert len(found) == 1 and found[0].filename == __file__
     attached.update()
-    attached["i"].data  # noqa: B018
+    attached["i"].data
 
 
 def test_an_environment_that_has_ended_asks_for_a_reset():

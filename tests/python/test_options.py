@@ -326,3 +326,23 @@ def test_built_in_tasks_do_not_change_the_model_during_an_episode(tmp_path):
     mjs.record("pick", out=tmp_path, **{**RECORDING, "cameras": ["wrist_camera"], "width": 32, "height": 24})
     with h5py.File(next(tmp_path.glob("house_0/*.h5"))) as file:
         assert all("changed" not in file[trajectory]["replay"] for trajectory in file)
+
+
+class Light(mjs.Policy):
+    """Sets an option in a built-in task, in every second episode."""
+
+    observation = ("qpos",)
+
+    def reset(self, world_ids):
+        for world in world_ids:
+            self.sim.randomize("opt.gravity", [0, 0, -5 if self._mjs_episodes[world] % 2 else -9.81], world_ids=[world])
+
+    def act(self, obs):
+        return {}
+
+
+def test_options_that_a_policy_sets_in_a_built_in_task(tmp_path):
+    mjs.record("pick", policy=Light(), out=tmp_path, **{**RECORDING, "worlds": 1})
+    assert [episode.model().opt.gravity[2] for episode in mjs.Dataset(tmp_path).episodes] == [-9.81, -5, -9.81]
+    report = mjs.check_replay(tmp_path, states=True, worlds=1)
+    assert report.ok, report

@@ -35,6 +35,12 @@ def _model_fields(episode: Episode) -> dict[str, np.ndarray]:
         return {name: dataset[:] for name, dataset in file[episode.trajectory].get("replay/model", {}).items()}
 
 
+def recorded_options(episode: Episode) -> dict[str, np.ndarray]:
+    """Options in which the model of an episode differs from the archived one, ``opt.gravity``; NaN: the same."""
+    with open_h5(episode.path) as file:
+        return {name: data[:] for name, data in file[episode.trajectory].get("replay/model", {}).items() if name.startswith(PREFIX)}
+
+
 class EpisodeWorlds:
     """Worlds of the archived model. :meth:`begin` gives a world the model of an episode.
 

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense._randomizable import field_of
 from mjsense.assets import use_installed_meshes
 from mjsense.dataset import json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import VIDEOS
-from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
+from mjsense.dataset.episode_worlds import EpisodeWorlds, recorded_options, show_states
 from mjsense.dataset.files import open_h5, text_of, video_options
 from mjsense.dataset.playback import ReplayInputs, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
@@ -75,6 +76,8 @@ class _Rebuilt:
             raise ValueError(f"the recorded state has {stored} numbers, that of the task in this version has {self.sim.state.shape[1]}")
         self.handles: list[Any] = []
         self.reasons: dict[str, str] = {}
+        self._optional: set[str] = set()
+        """Options in which an episode has differed from the task's."""
         for handle, _ in self._rollout.sensors():
             if handle.name.startswith("actions/"):
                 self.reasons[handle.name] = "the action that the policy chose"
@@ -83,6 +86,15 @@ class _Rebuilt:
 
     def begin(self, world: int, episode: Episode) -> None:
         self._rollout.start([world], [episode.number])
+        options = recorded_options(episode)  # of a policy that sets options
+        for name in {*options, *self._optional}:
+            rows = self.sim.model_field(name)
+            rows[world] = field_of(self.sim.model, name)
+            values = options.get(name, rows[world])
+            rows[world] = np.where(np.isnan(values), rows[world], np.reshape(values, rows[world].shape))
+        self._optional |= options.keys()
+        if self._optional:
+            self.sim._core.options_changed()
         self._set(world, inputs_of(episode).state[0])
 
     def evaluations(self) -> tuple[np.ndarray, np.ndarray]:
