@@ -11,6 +11,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from mjsense.dataset import sensor_check
 from mjsense.dataset.model_xml import model_xml
 from tasks import Cart, Driver
 
@@ -343,6 +344,11 @@ class Light(mjs.Policy):
 
 def test_options_that_a_policy_sets_in_a_built_in_task(tmp_path):
     mjs.record("pick", policy=Light(), out=tmp_path, **{**RECORDING, "worlds": 1})
-    assert [episode.model().opt.gravity[2] for episode in mjs.Dataset(tmp_path).episodes] == [-9.81, -5, -9.81]
+    episodes = mjs.Dataset(tmp_path).episodes
+    assert [episode.model().opt.gravity[2] for episode in episodes] == [-9.81, -5, -9.81]
+    worlds = sensor_check._Rebuilt(episodes[0], 1, 1)
+    for episode in episodes:  # the task is rebuilt without the policy
+        worlds.begin(0, episode)
+        assert worlds.sim.options.gravity[0, 2] == episode.model().opt.gravity[2]
     report = mjs.check_replay(tmp_path, states=True, worlds=1)
     assert report.ok, report
