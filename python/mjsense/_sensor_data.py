@@ -23,7 +23,7 @@ class SensorData:
         )
         return f"{type(self).__name__}({shown})"
 
-    def __getattr__(self, name: str) -> Any:  # names that are no fields
+    def __getattr__(self, name: str) -> Any:  # a name without a field
         hint = "" if name[0] == "_" else did_you_mean(name, [f.name for f in fields(self)], "there are")
         raise AttributeError(f"{type(self).__name__} has no attribute '{name}'{hint}")
 

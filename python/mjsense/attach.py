@@ -136,7 +136,7 @@ class Attached(KnownAttributes):
         return [*self.sensors]
 
     def _warn_if_behind(self) -> None:
-        """Warns once if a sensor is asked for after a data was stepped, and before update()."""
+        """Warns once if a sensor is read after a step of a data without update()."""
         for world, before in enumerate(self._times) if not self._warned else ():
             if (now := self.datas[world].time) != before:
                 self._warned = True

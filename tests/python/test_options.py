@@ -11,6 +11,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from mjsense.dataset import sensor_check
 from mjsense.dataset.model_xml import model_xml
 from tasks import Cart, Driver
 
@@ -326,3 +327,28 @@ def test_built_in_tasks_do_not_change_the_model_during_an_episode(tmp_path):
     mjs.record("pick", out=tmp_path, **{**RECORDING, "cameras": ["wrist_camera"], "width": 32, "height": 24})
     with h5py.File(next(tmp_path.glob("house_0/*.h5"))) as file:
         assert all("changed" not in file[trajectory]["replay"] for trajectory in file)
+
+
+class Light(mjs.Policy):
+    """Sets an option in a built-in task, in every second episode."""
+
+    observation = ("qpos",)
+
+    def reset(self, world_ids):
+        for world in world_ids:
+            self.sim.randomize("opt.gravity", [0, 0, -5 if self._mjs_episodes[world] % 2 else -9.81], world_ids=[world])
+
+    def act(self, obs):
+        return {}
+
+
+def test_options_that_a_policy_sets_in_a_built_in_task(tmp_path):
+    mjs.record("pick", policy=Light(), out=tmp_path, **{**RECORDING, "worlds": 1})
+    episodes = mjs.Dataset(tmp_path).episodes
+    assert [episode.model().opt.gravity[2] for episode in episodes] == [-9.81, -5, -9.81]
+    worlds = sensor_check._Rebuilt(episodes[0], 1, 1)
+    for episode in episodes:  # the task is rebuilt without the policy
+        worlds.begin(0, episode)
+        assert worlds.sim.options.gravity[0, 2] == episode.model().opt.gravity[2]
+    report = mjs.check_replay(tmp_path, states=True, worlds=1)
+    assert report.ok, report

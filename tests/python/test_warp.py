@@ -467,3 +467,13 @@ def test_noise_is_that_of_the_cpu_through_resets_and_failures():
     for sim in sims:
         sim.reset(seed=9)
     read()
+
+
+@needs_warp
+def test_options_of_a_running_simulation_are_for_the_cpu():
+    xml = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=xml)), num_worlds=2, backend="warp", device="cpu")
+    with pytest.raises(NotImplementedError, match=r"Simulation\.options is not available with backend='warp'; use backend='cpu'"):
+        sim.options
+    with pytest.raises(NotImplementedError, match=r"randomize\('opt\.gravity'\) is not available with backend='warp': set SceneCfg\(options="):
+        sim.randomize("opt.gravity", [0, 0, -1])

@@ -130,13 +130,17 @@ def model_of(episode: Episode) -> mujoco.MjModel:
     return model
 
 
-def fields_of(episode: Episode, model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """The checked fields in which the episode differs from the archived model; NaN in floats: the archive's value."""
+def fields_of(episode: Episode, model: mujoco.MjModel, prefix: str = "") -> dict[str, np.ndarray]:
+    """The checked fields in which the episode differs from the archived model; NaN in floats: the archive's value.
+
+    Args:
+        prefix: Beginning of the names of the fields to read.
+    """
     with open_h5(episode.path) as file:
         group = file[episode.trajectory].get("replay/model", {})
         if not hasattr(group, "items"):
             raise ValueError(f"{where(episode)}: replay/model is an array, expected a group")
-        return check_model_fields(group, model, where(episode))
+        return check_model_fields({name: data for name, data in group.items() if name.startswith(prefix)}, model, where(episode))
 
 
 def check_episode(episode: Episode) -> None:

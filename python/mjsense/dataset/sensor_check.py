@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense._options import PREFIX
+from mjsense._randomizable import field_of
 from mjsense.assets import use_installed_meshes
 from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
@@ -23,7 +25,7 @@ from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.hdf5 import Rows, open_h5, text_of
 from mjsense.dataset.limits import TEXT_BYTES
 from mjsense.dataset.places import open_plain
-from mjsense.dataset.playback import ReplayInputs, inputs_of
+from mjsense.dataset.playback import ReplayInputs, fields_of, inputs_of
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
 from mjsense.simulation import Simulation
@@ -77,6 +79,8 @@ class _Rebuilt:
             raise ValueError(f"the recorded state has {stored} numbers, that of the task in this version has {self.sim.state.shape[1]}")
         self.handles: list[Any] = []
         self.reasons: dict[str, str] = {}
+        self._optional: set[str] = set()
+        """Options in which an episode has differed from the task's."""
         for handle, _ in self._rollout.sensors():
             if handle.name.startswith("actions/"):
                 self.reasons[handle.name] = "the action that the policy chose"
@@ -85,6 +89,15 @@ class _Rebuilt:
 
     def begin(self, world: int, episode: Episode) -> None:
         self._rollout.start([world], [episode.number])
+        options = fields_of(episode, self.sim.model, PREFIX)  # of a policy that sets options
+        for name in {*options, *self._optional}:
+            rows = self.sim.model_field(name)
+            rows[world] = field_of(self.sim.model, name)
+            values = options.get(name, rows[world])
+            rows[world] = np.where(np.isnan(values), rows[world], np.reshape(values, rows[world].shape))
+        self._optional |= options.keys()
+        if self._optional:
+            self.sim._core.options_changed()
         self._set(world, inputs_of(episode).state[0])
 
     def evaluations(self) -> tuple[np.ndarray, np.ndarray]:
