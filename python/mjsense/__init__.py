@@ -24,6 +24,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
     making recordings            record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: of any
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
+    editing recordings           delete_episodes, split_dataset, merge_datasets
     files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
                                  export_zarr; import_lerobot, import_robomimic
     in the browser               view: live worlds, tasks, recordings
@@ -81,6 +82,7 @@ from mjsense.dataset import (
     render,
     replay,
 )
+from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
 from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.drawing import DebugShapes
@@ -132,9 +134,10 @@ __all__ = [
     "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
     "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
     "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
-    "WorldState", "attach", "check_replay", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
-    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_lerobot", "import_robomimic", "make", "make_vec", "observations",
-    "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "task_names",
+    "WorldState", "attach", "check_replay", "delete_episodes", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
+    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_lerobot", "import_robomimic", "make", "make_vec",
+    "merge_datasets", "observations",
+    "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "split_dataset", "task_names",
     "view",
     "__version__",
 ]

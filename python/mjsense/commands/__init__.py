@@ -24,6 +24,7 @@ COMMANDS = {
     "replay": "Replay recorded episodes and report every difference.",
     "render": "Render recorded episodes with other cameras and sensors.",
     "quality": "Show how recorded episodes were performed: idle share, jerk, approach, visibility.",
+    "dataset": "Delete episodes of recordings, split them, merge them.",
     "export": "Write a recording in the format of another program.",
     "import": "Write a data set of another program as a recording.",
     "assets": "Install the packages with further objects for scenes.",

@@ -70,6 +70,8 @@ class _Rebuilt:
             options[side] = sizes.pop() if len(sizes) == 1 else None
         for kind in ("depth", "segmentation"):
             options[kind] = bool(cameras) and all(camera.get(kind, False) for camera in cameras)
+        if episode.seed is not None:  # that of the house, which differs from the setting
+            options["seed"] = episode.seed
         if options["meshes"] == "real":
             use_installed_meshes()
         self._rollout = _core.Rollout(options, (None, None, [], None, {}, [], None), Simulation._of)
