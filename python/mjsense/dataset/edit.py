@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 import zlib
@@ -16,7 +15,8 @@ from mjsense._new_output import new_output
 from mjsense._optional import optional
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode import VIDEOS, Episode
-from mjsense.dataset.files import open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5, text_of
+from mjsense.dataset.places import open_plain, plain_name
 
 
 @checked
@@ -119,37 +119,38 @@ def _write(episodes: list[Episode], out: Path) -> Path:
             house = path / f"house_{number}"
             house.mkdir()
             for k, (file, kept) in enumerate(files.items(), 1):
-                _copy_batch(file, [episode.trajectory for episode in kept], house / f"trajectories_batch_{k}_of_{len(files)}.h5")
+                _copy_batch(file, kept, house / f"trajectories_batch_{k}_of_{len(files)}.h5")
     return out
 
 
-def _copy_batch(source: Path, trajectories: list[str], target: Path) -> None:
-    """Copies trajectories of an HDF5 file, their videos and the archive of their model. The bytes of a file of which all are copied stay equal."""
+def _copy_batch(source: Path, episodes: list[Episode], target: Path) -> None:
+    """Copies episodes of an HDF5 file, their videos and the archive of their model. The bytes of a file of which all are copied stay equal."""
+    names = {archive} if (archive := episodes[0]._recording.model_archive) else set()
     with open_h5(source) as file:
         every = [name for name in file if name.startswith("traj_")]
-        videos = {text_of(name[:].tobytes()) for one in trajectories for name in file[one].get(VIDEOS.rstrip("/"), {}).values()}
-        archive = json.loads(text_of(file.attrs.get("recording", "{}"))).get("model_archive", "")
-    for name in sorted(videos | {str(archive)}):
-        if name and not (target.parent / name).exists():
-            _copy_plain(source, name, target.parent / name)
-    if len(trajectories) == len(every):
-        shutil.copyfile(source, target)
+        for group in (file[episode.trajectory] for episode in episodes):
+            for place in group.datasets():
+                rows = group[place]  # checks how it is stored
+                if place.startswith(VIDEOS) and (name := text_of(rows[:])):
+                    names.add(plain_name(name, f"{rows.where}: the video"))
+    for name in sorted(names):
+        if not (target.parent / name).exists():
+            _copy(source.parent / name, target.parent / name)
+    if len(episodes) == len(every):
+        _copy(source, target)
         return
     h5py = optional("h5py", "dataset", "Editing recordings")
-    with open_h5(source) as old, h5py.File(target, "w") as new:
+    with open_plain(source) as plain, h5py.File(f"/proc/self/fd/{plain.fileno()}", "r") as old, h5py.File(target, "w") as new:
         for name, value in old.attrs.items():
             new.attrs[name] = value
-        for k, name in enumerate(trajectories):
-            old.copy(name, new, f"traj_{k}")
+        for k, episode in enumerate(episodes):
+            old.copy(episode.trajectory, new, f"traj_{k}")
     _seal(target)
 
 
-def _copy_plain(source: Path, name: str, target: Path) -> None:
-    """Copies a file of the same folder, which an HDF5 file names."""
-    path = source.parent / name
-    if Path(name).name != name or path.is_symlink() or not path.is_file():
-        raise ValueError(f"{source}: names '{name}', which is not a file next to it; `mjsense verify` checks the files")
-    shutil.copyfile(path, target)
+def _copy(source: Path, target: Path) -> None:
+    with open_plain(source) as old, open(target, "xb") as new:
+        shutil.copyfileobj(old, new)
 
 
 def _seal(path: Path) -> None:
