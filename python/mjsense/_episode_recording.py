@@ -18,13 +18,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from mjsense import _core
 from mjsense._mujoco_envs import MujocoEnvs
-from mjsense._rows import Row, leaves, rows_of_space
+from mjsense._rows import Row, is_rgb, leaves, rows_of_space
 from mjsense._written_rows import WrittenRows
 from mjsense.recorder import FILE_OPTIONS, VIDEO_OPTIONS, recorded_handle
 from mjsense.sensor import encode_json
 
 _OPTIONS = ("house", "batches", "gzip", *VIDEO_OPTIONS)
 """Options of the files, which are those of :class:`mjsense.Recorder`."""
+_RGB = 3  # channels
+
 
 @dataclass
 class _Step:
@@ -70,6 +72,7 @@ class EpisodeRecording:
         fps: float | Fraction | None,
         resume: bool,
         keep_partial: bool,
+        image_videos: bool,
         info_bytes: int,
         settings: Mapping[str, Any] | None,
         options: Mapping[str, Any],
@@ -85,7 +88,7 @@ class EpisodeRecording:
         self._worlds: int = env.num_envs if self._vector else 1
         self._cameras = dict(cameras) if isinstance(cameras, Mapping) else {str(name): name for name in cameras}
         self._size = [int(n) for n in camera_size]
-        self._keep_partial, self._info_bytes = keep_partial, info_bytes
+        self._keep_partial, self._image_videos, self._info_bytes = keep_partial, image_videos, info_bytes
         self._options = {**FILE_OPTIONS, **VIDEO_OPTIONS, **options, "episodes": episodes, "resume": resume}
         self._episodes = episodes
         self.path = Path(out) / f"house_{self._options['house']}"
@@ -250,11 +253,18 @@ class EpisodeRecording:
     def _open(self, images: Mapping[str, np.ndarray]) -> Any:
         streams, written = WrittenRows(self._worlds), self._written
         texts = {"observation": "Observation of the environment.", "actions/action": "Action that led to this row; 0 in the first row."}
+        names: set[str] = set()
         for name, rows in self._rows.items():
             for row in rows:
                 low, high = row.bounds()
-                stream = "/".join((name, *row.path))
-                written[stream] = streams.add(stream, row.kept, row.shape, texts[name], low=low, high=high)
+                stream, shape = self._stream_of(name, row), row.shape
+                if stream in names:
+                    raise ValueError(f"RecordEpisodes: two images of the observation would be the video '{stream}': rename one, or pass image_videos=False")
+                names.add(stream)
+                video = self._is_video(name, row)
+                if video:
+                    low, high, shape = 0.0, 255.0, shape if shape[2] == _RGB else (*shape[1:], _RGB)
+                written[stream] = streams.add(stream, row.kept, shape, texts[name], low=low, high=high, **({"video": True} if video else {}))
         written["info"] = streams.add("info", "uint8", [self._info_bytes], "Infos of the environment.", is_dict=True, low=0.0, high=255.0)
         for name, image in images.items():
             about = f"Image of the camera '{self._cameras[name]}'."
@@ -266,13 +276,23 @@ class EpisodeRecording:
             self._fps.denominator, json.dumps(self._settings, sort_keys=True), {**self._options},
         )  # fmt: skip
 
+    def _is_video(self, name: str, row: Row) -> bool:
+        """Whether a row of the observation is an RGB image that becomes a video."""
+        return self._image_videos and name == "observation" and is_rgb(row.dtype, row.shape)
+
+    def _stream_of(self, name: str, row: Row) -> str:
+        """Name of the stream that stores a row of an observation or action."""
+        return "_".join(row.path) or name if self._is_video(name, row) else "/".join((name, *row.path))
+
     def _write(self, world: int, step: _Step, images: Mapping[str, np.ndarray]) -> None:
         for name, values in (("observation", step.observation), ("actions/action", step.action)):
             for i, row in enumerate(self._rows[name]):
-                stream = "/".join((name, *row.path))
-                if values is not None and np.shape(values[i]) != row.shape:
-                    raise ValueError(f"RecordEpisodes: '{stream}' has the shape {np.shape(values[i])}, expected {row.shape} as in its space")
-                self._written[stream][world] = 0 if values is None else values[i]
+                value = 0 if values is None else values[i]
+                if values is not None and np.shape(value) != row.shape:
+                    raise ValueError(f"RecordEpisodes: '{'/'.join((name, *row.path))}' has the shape {np.shape(value)}, expected {row.shape} as in its space")
+                if values is not None and self._is_video(name, row) and row.shape[2] != _RGB:
+                    value = np.moveaxis(value, 0, -1)
+                self._written[self._stream_of(name, row)][world] = value
         for name, image in images.items():
             if image.shape != self._written[name].shape[1:]:
                 raise ValueError(f"RecordEpisodes: the image of '{name}' was {self._written[name].shape[1:]} and is now {image.shape}")

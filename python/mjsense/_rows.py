@@ -142,13 +142,17 @@ def rows_of_value(value: Any, path: tuple[str, ...] = ()) -> list[Row]:
     return [Row(path, array.shape, array.dtype)]
 
 
-_CHANNELS = 4
-_IMAGE_SIDE = 8  # smallest width and height of an image
+_IMAGE_SIDE = 8  # smallest width and height
 
 
 def is_image(dtype: Any, shape: Sequence[int]) -> bool:
-    """Whether rows are images: uint8 ``[H, W]``, or ``[H, W, C]`` or ``[C, H, W]`` with up to four channels."""
-    sides = shape if len(shape) == 2 else shape[:2] if len(shape) == 3 and shape[2] <= _CHANNELS else shape[1:] if len(shape) == 3 and shape[0] <= _CHANNELS else ()
+    """Whether rows are images: uint8 with three axes, or grey images with two."""
+    return np.dtype(dtype) == np.uint8 and (len(shape) == 3 or (len(shape) == 2 and min(shape) >= _IMAGE_SIDE))
+
+
+def is_rgb(dtype: Any, shape: Sequence[int]) -> bool:
+    """Whether rows are colour images that a video can store: uint8 ``[H, W, 3]`` or ``[3, H, W]``."""
+    sides = () if len(shape) != 3 else shape[:2] if shape[2] == 3 else shape[1:] if shape[0] == 3 else ()
     return np.dtype(dtype) == np.uint8 and len(sides) == 2 and min(sides) >= _IMAGE_SIDE
 
 

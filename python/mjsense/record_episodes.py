@@ -57,13 +57,14 @@ class _Recorded:
         fps: float | Fraction | None = None,
         resume: bool = False,
         keep_partial: bool = False,
+        image_videos: bool = False,
         info_bytes: int = 2000,
         settings: Mapping[str, Any] | None = None,
         **options: Any,
     ) -> None:
         super().__init__(env)  # pyright: ignore[reportCallIssue]  # Gymnasium's
         self.recording = EpisodeRecording(
-            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, info_bytes, settings, options
+            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, image_videos, info_bytes, settings, options
         )
 
     def __enter__(self) -> Any:
@@ -106,6 +107,8 @@ class RecordEpisodes(_Recorded, gymnasium.Wrapper):
         fps: Steps per second; by default ``1 / env.unwrapped.dt``, else ``env.unwrapped.control_freq``, else the metadata's ``render_fps``, else 30.
         resume: Continue an interrupted recording with the same settings.
         keep_partial: Keep episodes that ``reset()`` or ``close()`` cuts short; by default they are discarded.
+        image_videos: Store RGB images in the observation, uint8 ``[H, W, 3]`` or ``[3, H, W]``, as videos, which exports contain and which are
+            smaller, but not exact. By default they are stored exactly, as arrays.
         info_bytes: Maximum length of the JSON text of a step's infos.
         settings: Further settings that produced the data, as JSON: stored in every file, and equal when a recording is resumed.
         options: ``house``, ``batches``, ``gzip``, ``ffmpeg``, ``crf``, ``preset`` and ``molmospaces_depth`` of :class:`mjsense.Recorder`.

@@ -125,6 +125,96 @@ def test_an_export_has_the_observation_without_images_and_the_action(tmp_path):
     np.testing.assert_array_equal(rows["action"], actions)
 
 
+class Pixels(gymnasium.Env):
+    """Random observations of any space; episodes have as many steps as `lengths` says in turn."""
+
+    metadata = {"render_fps": 10}
+
+    def __init__(self, space, lengths=(3, 2)):
+        self.observation_space, self.action_space, self.lengths = space, spaces.Box(-1, 1, (2,), np.float32), lengths
+        self.episode, self.seen = -1, []
+
+    def _observation(self):
+        self.seen.append(self.observation_space.sample())
+        return self.seen[-1]
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.episode, self.t = self.episode + 1, 0
+        self.observation_space.seed(self.episode)
+        return self._observation(), {}
+
+    def step(self, action):
+        self.t += 1
+        return self._observation(), 0.5, self.t >= self.lengths[self.episode % len(self.lengths)], False, {}
+
+
+def smooth(shape):
+    """Images of one colour each, which a video keeps nearly as they are."""
+    class Space(spaces.Box):
+        def sample(self, mask=None, probability=None):
+            colour = self.np_random.integers(40, 200, 3, np.uint8)
+            return np.broadcast_to(colour if shape[2] == 3 else colour[:, None, None], shape).copy()
+
+    return Space(0, 255, shape, np.uint8)
+
+
+def test_images_of_the_observation_as_videos(tmp_path):
+    """Also of channel-first images and of a dict, which also has other entries."""
+    space = spaces.Dict({"eye": spaces.Dict({"left": smooth((16, 24, 3)), "right": smooth((3, 16, 24))}), "grey": spaces.Box(0, 255, (9, 9), np.uint8),
+                         "x": spaces.Box(-1, 1, (2,), np.float32)})  # fmt: skip
+    with mjs.RecordEpisodes(env := Pixels(space), tmp_path / "data", episodes=2, image_videos=True) as recorded:
+        run(recorded)
+    assert "2 episodes, 7 observations, 4 videos" in verified(tmp_path / "data")
+    row = 0
+    for episode in mjs.Dataset(tmp_path / "data").episodes:
+        left, right = episode.video("eye_left"), episode.video("eye_right")
+        for t in range(episode.length):
+            seen = env.seen[row]
+            assert left[t].shape == right[t].shape == (16, 24, 3)
+            assert np.abs(left[t].astype(int) - seen["eye"]["left"]).max() <= 6
+            assert np.abs(right[t].astype(int) - seen["eye"]["right"].transpose(1, 2, 0)).max() <= 6
+            np.testing.assert_array_equal(episode["obs/extra/observation/x"][t], seen["x"])
+            np.testing.assert_array_equal(episode["obs/extra/observation/grey"][t], seen["grey"])
+            row += 1
+    source = Source(tmp_path / "data")
+    assert list(source.cameras) == ["eye_left", "eye_right"] and source.features["state"].streams == ("obs/extra/observation/x",)
+    with mjs.RecordEpisodes(Pixels(smooth((16, 24, 3))), tmp_path / "only", episodes=1, image_videos=True) as recorded:
+        run(recorded)
+    source = Source(tmp_path / "only")
+    assert list(source.cameras) == ["observation"] and "state" not in source.features and source.features["action"].size == 2
+    with pytest.raises(ValueError, match="two images of the observation would be the video 'a_b'"):
+        mjs.RecordEpisodes(Pixels(spaces.Dict({"a_b": smooth((8, 8, 3)), "a": spaces.Dict({"b": smooth((8, 8, 3))})})), tmp_path / "two", episodes=1,
+                           image_videos=True).reset()  # fmt: skip
+
+
+@pytest.mark.parametrize(("space", "size"), (
+    (spaces.Box(-1, 1, (2, 3), np.float64), 6), (spaces.Box(0, 255, (8, 9, 3), np.uint8), None), (spaces.Box(0, 255, (3, 8, 9), np.uint8), None),
+    (spaces.Box(-1, 1, (0,), np.float32), None), (spaces.Dict({"a": spaces.Box(-1, 1, (0,), np.float32), "b": spaces.Discrete(3)}), 1),
+), ids=("matrix", "image", "channel_first", "empty", "partly_empty"))  # fmt: skip
+def test_exports_of_observations_that_are_no_vectors(space, size, tmp_path, capsys):
+    """A matrix becomes a vector; without numbers there is no state, and images that are left out are named."""
+    pq = pytest.importorskip("pyarrow.parquet")
+    with mjs.RecordEpisodes(env := Pixels(space), tmp_path / "data", episodes=2) as recorded:
+        run(recorded)
+    mjs.export_lerobot(tmp_path / "data", tmp_path / "out")
+    table = pq.read_table(tmp_path / "out/data/chunk-000/file-000.parquet").to_pydict()
+    assert len(table["action"]) == 5 and ("observation.state" in table) == (size is not None)
+    if size == 6:
+        np.testing.assert_array_equal(table["observation.state"], [env.seen[i].ravel().astype(np.float32) for i in (0, 1, 2, 4, 5)])
+    assert ("is recorded as an array and left out" in capsys.readouterr().err) == (len(space.shape or ()) == 3)
+    mjs.export_robomimic(tmp_path / "data", tmp_path / "robomimic.hdf5")
+
+
+def test_an_export_says_how_many_episodes_have_no_step(tmp_path, capsys):
+    with mjs.RecordEpisodes(Pixels(spaces.Box(-1, 1, (2,), np.float32)), tmp_path / "data", episodes=3, keep_partial=True) as recorded:
+        recorded.reset()
+        run(recorded)
+    assert sorted(e.length for e in mjs.Dataset(tmp_path / "data").episodes) == [1, 3, 4]
+    mjs.export_lerobot(tmp_path / "data", tmp_path / "out")
+    assert "1 of 3 episodes have one observation and no step; they are left out" in capsys.readouterr().err
+
+
 def test_infos_that_cannot_be_stored_are_named_once(tmp_path):
     env = mjs.RecordEpisodes(Counter(), tmp_path, 1, info_bytes=60)
     env.reset()

@@ -16,10 +16,10 @@ EXAMPLES = [
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("action", choices=["delete", "split", "merge"], help="delete: leave out episodes; split: write parts; merge: join recordings.")
-    parser.add_argument("paths", metavar="IN ... OUT", nargs="+", help="One recording, for merge several, and the output, which must not exist.")
+    parser.add_argument("paths", metavar="PATH", nargs="+", help="IN ... OUT: one recording, for merge several, and the output, which must not exist.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="delete: positions of the episodes to leave out.")
-    parser.add_argument("--parts", nargs="+", metavar="NAME=EPISODES",
-                        help="split: parts by name, with their share of the episodes (0.8) or positions (0-9,12).")  # fmt: skip
+    parser.add_argument("--parts", nargs="+", metavar="PART",
+                        help="split: NAME=0.8, a share of all episodes, or NAME=0-9,12, their positions.")  # fmt: skip
 
 
 def _part(text: str) -> tuple[str, Any]:

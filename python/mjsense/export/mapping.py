@@ -163,8 +163,8 @@ class Source:
         """The distinct instructions, in the order of their first episode."""
         colour = [name[len(VIDEOS) :] for name, stream in chosen.streams.items() if stream.kind == "video" and len(stream.shape) == 3]
         if mapping.state is None:
-            self._notes += [f"the image '{name}' is recorded as an array; it is left out, because videos become images of an export"
-                            for name in known if _observed(name) and _is_image(known[name]) and known[name].kind != "video"]  # fmt: skip
+            self._notes += [f"the image '{name}' is recorded as an array and left out; RecordEpisodes(image_videos=True) records RGB images as videos"
+                            for name in known if _observed(name) and _is_image(known[name])]  # fmt: skip
         self.cameras: dict[str, str] = {camera: camera for camera in colour} if mapping.cameras is None else dict(mapping.cameras)
         """Names of cameras in the recording by exported name."""
         for camera in self.cameras.values():
@@ -304,17 +304,18 @@ def _default_state(known: dict[str, Stream]) -> tuple[str, ...]:
         return ("obs/agent/qpos",)
     observed = [name for name in known if _observed(name)]
     numbers = [name for name in observed if not _is_image(known[name]) and np.prod(known[name].shape)]
-    return tuple(numbers) if observed else ("obs/agent/qpos",)
+    of_environment = any(f"{name}/".startswith("actions/action/") for name in known)
+    return tuple(numbers) if observed or of_environment else ("obs/agent/qpos",)
 
 
 def _observed(name: str) -> bool:
     """Whether the stream belongs to the observation of an environment that :class:`mjsense.RecordEpisodes` recorded."""
-    return f"{name}/".startswith(("obs/extra/observation/", f"{VIDEOS}observation/"))
+    return f"{name}/".startswith("obs/extra/observation/")
 
 
 def _is_image(stream: Stream) -> bool:
     """Whether the rows of an observation are images, or as large as images."""
-    return stream.kind == "video" or is_image(stream.dtype, stream.shape) or stream.dtype.itemsize * int(np.prod(stream.shape)) >= LARGE_ROW
+    return is_image(stream.dtype, stream.shape) or stream.dtype.itemsize * int(np.prod(stream.shape)) >= LARGE_ROW
 
 
 def _default_action(known: dict[str, Stream]) -> tuple[str, ...]:
