@@ -67,7 +67,7 @@ class Gate:
         if not secrets.compare_digest(token.encode(errors="replace"), self._token.encode()):
             return "The address has no valid token. Open the whole address that the program has printed when it was started."
         own = [f"http://{host[0]}".lower(), f"https://{host[0]}".lower()]
-        if any(one.lower() not in own for one in origin) or len(origin) > 1 or (not origin and "Upgrade" in headers):
+        if any(one.lower() not in own for one in origin) or (not origin and "Upgrade" in headers):
             return "The request comes from the page of another server."
         return ""
 

@@ -105,11 +105,11 @@ def _is_name(value: Any) -> bool:
 
 def _number(value: Any, low: float | None, high: float | None, step: float | None, kind: type) -> Any:
     """A number between these limits; None: it is none. A browser rounds to decimals, so that a slider's end may be up to one step outside."""
-    if type(value) not in (int, float) or not math.isfinite(value):
+    if type(value) not in (int, float):
         return None
     low, high = (-_MAX_INTEGER if low is None else low), (_MAX_INTEGER if high is None else high)
     slack = 0 if step is None or kind is int else step
-    if not low - slack <= value <= high + slack or (kind is int and value != int(value)):
+    if not low - slack <= value <= high + slack or (kind is int and value != int(value)):  # NaN is not between the limits
         return None
     return kind(min(max(value, low), high))
 
