@@ -63,6 +63,7 @@ class PyCameraSystem {
   void initialize(PySimulation& sim) {
     sim.change("cameras", [&](sim::Simulation& s) { system_.initialize(s); });
   }
+  void set_size(int camera, int width, int height) { system_.set_size(camera, width, height); }
   bool varies() const { return system_.varies(); }
   std::string place(PySimulation& sim, int world, std::uint64_t seed, std::uint64_t episode,
                     const std::array<double, 3>& centre, const std::vector<int>& objects) {
@@ -90,6 +91,8 @@ void bind_cameras(nb::module_& m) {
                     const std::string&>(),
            nb::arg("name_or_path"), nb::arg("robot_file"), nb::arg("prefix"), nb::arg("base"))
       .def("mounts", &PyCameraSystem::mounts, "Where each camera is mounted.")
+      .def("set_size", &PyCameraSystem::set_size, nb::arg("camera"), nb::arg("width"),
+           nb::arg("height"), "Sets the size of a camera's images, in pixels.")
       .def("initialize", &PyCameraSystem::initialize, nb::arg("simulation"))
       .def_prop_ro("varies", &PyCameraSystem::varies)
       .def("place", &PyCameraSystem::place, nb::arg("simulation"), nb::arg("world"),

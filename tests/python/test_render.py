@@ -180,7 +180,7 @@ def test_sizes_depth_and_segmentation(recorded, tmp_path):
 
 def test_camera_system(tmp_path):
     """The cameras of a system, with its variation, are those of a recording with this system."""
-    about = dict(task="pick", robot="franka", **{**RECORDING, "episodes": 2})
+    about = dict(task="pick", robot="franka", **{**RECORDING, "episodes": 4})
     mjs.record(out=tmp_path / "plain", **about)
     mjs.record(out=tmp_path / "wanted", camera_system="randomized_droid", **about)
     mjs.render(tmp_path / "plain", tmp_path / "made", camera_system="randomized_droid", width=48, height=32, depth=True)

@@ -177,6 +177,12 @@ class CameraSystem:
                 about |= {"camera": m["camera"]}
             self.cameras.append(RenderCamera(**about))
 
+    def resize(self, width: int | None, height: int | None) -> None:
+        """Gives the images another size, on which it depends whether a pose shows the objects well enough."""
+        self.cameras = [sized(camera, width, height) for camera in self.cameras]
+        for i, camera in enumerate(self.cameras):
+            self._system.set_size(i, camera.width, camera.height)
+
     def bind(self, worlds: EpisodeWorlds) -> None:
         self._worlds = worlds
         self._system.initialize(worlds.sim._core)
@@ -227,6 +233,8 @@ def choose(
     system = CameraSystem(camera_system, episode) if camera_system else None
     if cameras is None and system is not None:
         cameras = []
+    if system is not None:
+        system.resize(width, height)
     recorded = recorded_cameras(episode, cameras)
     chosen = [*recorded, *(system.cameras if system else [])]
     every = recorded or recorded_cameras(episode, None)

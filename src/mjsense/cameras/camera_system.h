@@ -60,6 +60,11 @@ class CameraSystem {
   const Mounted& mounted(int camera) const { return mounted_[camera]; }
   int width(int camera) const { return cfg_.cameras[camera].width.value_or(cfg_.width); }
   int height(int camera) const { return cfg_.cameras[camera].height.value_or(cfg_.height); }
+  // The share of an image that an object covers depends on its aspect ratio.
+  void set_size(int camera, int width, int height) {
+    cfg_.cameras[camera].width = width;
+    cfg_.cameras[camera].height = height;
+  }
 
   // Throws KeyError if the model lacks a camera.
   void initialize(sim::Simulation& simulation);
