@@ -123,7 +123,7 @@ def test_options_of_the_program(recording, capfd):
     assert tools.run(["verify", str(recording), "-q"]) == 0 and not capfd.readouterr().out
     for command in ("verify", "repair"):
         assert tools.run([command, str(recording), "--decod"]) == 2
-        assert capfd.readouterr().err.startswith(f"mjsense {command}: no option named '--decod'")
+        assert f"{command}: no option named '--decod'" in capfd.readouterr().err
     shutil.rmtree(recording / "shard_2")
     assert tools.run(["verify", str(recording), "-q"]) == 1 and "shard_2" in capfd.readouterr().out
 
