@@ -22,6 +22,7 @@ from mjsense.dataset.video_decoder import Packets, have_av
 
 _REFUSALS = (ValueError, LookupError, OSError, RuntimeError, ImportError)
 _CACHE_BYTES = 1 << 26
+_NAME_BYTES = 100  # of the name of a video, padded with 0
 
 
 def findings(root: Path, skip: Collection[str] = ()) -> Iterator[tuple[str, str]]:
@@ -97,8 +98,12 @@ def _check_videos(episode: Episode) -> None:
 
 def _check_replay(episode: Episode) -> None:
     with open_h5(episode.path) as file:
-        if "replay" not in file[episode.trajectory] or not episode._recording.model_archive:
+        trajectory: Group = file[episode.trajectory]
+        if "replay" not in trajectory or not episode._recording.model_archive:
             return
+        for _, name in trajectory.get(VIDEOS.rstrip("/"), {}).items():
+            if len(name) != _NAME_BYTES:  # a rendering writes the new name in its place
+                raise ValueError(f"{name.where} has {len(name)} bytes; the name of a video has {_NAME_BYTES}")
     playback.check_episode(episode)
     recorded_cameras(episode, None)
 

@@ -86,15 +86,15 @@ def is_json(dataset: Rows) -> bool:
     return is_bytes and min(dataset.shape) > 0 and dataset[0][0] == ord("{")
 
 
-def _place_of(trajectory: Group, name: str) -> str | None:
-    """The dataset that contains a stream: the stream itself or, for a leaf or a mask, its array of numbers or the JSON rows of a prefix
-    of its name."""
-    if (found := trajectory.get(NUMBERS + name)) is not None:
-        return NUMBERS + name if isinstance(found, Rows) else None
-    while name:
-        if (found := trajectory.get(name)) is not None:
-            return name if isinstance(found, Rows) else None
-        name = name.rpartition("/")[0]
+def _dataset_of(trajectory: Group, name: str) -> tuple[str, Rows] | None:
+    """The dataset that contains a stream, and its place: the stream itself or, for a leaf or a mask, its array of numbers or the JSON rows of
+    a prefix of its name."""
+    places = [NUMBERS + name, name]
+    while "/" in places[-1]:
+        places.append(places[-1].rpartition("/")[0])
+    for place in places:
+        if (found := trajectory.get(place)) is not None:
+            return (place, found) if isinstance(found, Rows) else None
     return None
 
 
@@ -323,7 +323,7 @@ class Episode:
                 if not name or "width" not in at:
                     continue
                 plain_name(name, f"{dataset.where}: its video")
-                width, height = image_size(*(at.integer(side, 1, 2**31) for side in ("width", "height")), dataset.where)
+                width, height = image_size(at.integer("width", 1, 2**31), at.integer("height", 1, 2**31), dataset.where)
                 if (encoding := at.text("encoding")) not in _ENCODINGS:
                     raise ValueError(f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}")
                 videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, width, height, encoding, at.number("metres_per_unit", 0.0),
@@ -409,10 +409,9 @@ class Episode:
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
             for name in missing:
-                place = _place_of(trajectory, name)
-                if place is None:
+                if (there := _dataset_of(trajectory, name)) is None:
                     continue
-                dataset = trajectory[place]
+                place, dataset = there
                 if is_json(dataset):
                     if place not in decoded:
                         decoded.add(place)

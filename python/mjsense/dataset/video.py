@@ -56,7 +56,7 @@ def decoded(info: VideoInfo, pixels: np.ndarray) -> np.ndarray:
         raise RuntimeError(f"{info.path}: a frame has {pixels.shape[1]} x {pixels.shape[0]} pixels, the recording states {info.width} x {info.height}")
     pixels = pixels[: info.height, : info.width]  # odd sizes are stored with one column or row more
     if info.encoding == "rgb":
-        return np.array(pixels, order="C")  # a copy: the array may be in the cache
+        return np.ascontiguousarray(pixels)
     if info.encoding == "depth16":
         return pixels * np.float32(info.metres_per_unit)
     code = (pixels[..., 0].astype(np.float32) * 256) + pixels[..., 1]
@@ -93,7 +93,7 @@ class _Job:
         return [self._image(self.found[t]) for t in self.indices]
 
     def _image(self, frame: Any) -> np.ndarray:
-        return decoded(self.info, frame if isinstance(frame, np.ndarray) else to_array(frame, self.info.pixel_format))
+        return decoded(self.info, frame.copy() if isinstance(frame, np.ndarray) else to_array(frame, self.info.pixel_format))
 
 
 def _no_frame(info: VideoInfo, index: int) -> Exception:

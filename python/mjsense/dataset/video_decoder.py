@@ -63,19 +63,20 @@ def check_sum(file: PlainFile, stated: str, what: str) -> None:
 
 
 @contextmanager
-def open_container(path: Path, crc: str = "") -> Iterator[Any]:
+def open_container(path: Path, crc: str = "", codecs: str = CODECS) -> Iterator[Any]:
     """PyAV's container of a video file, which can open nothing else.
 
     Args:
         crc: Checksum with which the file is compared first.
+        codecs: Codecs that the file may have, separated by commas.
     """
     av = optional("av", "dataset", "Reading videos")
     with open_plain(path) as file:
         check_sum(file, crc, str(path))
         try:
-            with av.open(file, format=container_format(path), options={"codec_whitelist": CODECS, "protocol_whitelist": "none"}) as container:
-                if not container.streams.video or container.streams.video[0].codec_context.name not in CODECS.split(","):
-                    raise RuntimeError(f"{path}: contains no video of {CODECS.replace(',', ' or ')}")
+            with av.open(file, format=container_format(path), options={"codec_whitelist": codecs, "protocol_whitelist": "none"}) as container:
+                if not container.streams.video or container.streams.video[0].codec_context.name not in codecs.split(","):
+                    raise RuntimeError(f"{path}: contains no video of {codecs.replace(',', ' or ')}")
                 yield container
         except av.FFmpegError as error:
             raise RuntimeError(f"{path}: not a video that can be read: {error.strerror}") from None

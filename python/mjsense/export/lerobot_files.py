@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.dataset import Episode, statistics
-from mjsense.dataset.video_decoder import open_container
+from mjsense.dataset.video_decoder import CODECS, open_container
 from mjsense.export import lerobot_depth
 from mjsense.export.mapping import Feature, Source, check_names
 from mjsense.export.output import needs
@@ -128,7 +128,7 @@ def write_json(path: Path, value: Any) -> None:
 
 def codec_of(path: Path) -> dict[str, Any]:
     """The entries of a feature's ``info`` that name the codec of a video."""
-    with open_container(path) as video:
+    with open_container(path, codecs=f"{CODECS},hevc") as video:
         context = video.streams.video[0].codec_context
         return {"video.codec": context.codec.canonical_name, "video.pix_fmt": context.pix_fmt}
 

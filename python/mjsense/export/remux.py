@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from mjsense.dataset.video_decoder import open_container
+from mjsense.dataset.video_decoder import CODECS, open_container
 from mjsense.export.output import needs
 
 
@@ -45,7 +45,7 @@ class Concatenation:
             kept: Number of frames to append, ``frames`` or one less.
         """
         av = needs("av")
-        with open_container(path) as video:
+        with open_container(path, codecs=f"{CODECS},hevc") as video:  # depth is encoded with hevc for LeRobot
             stream = video.streams.video[0]
             packets = [packet for packet in video.demux(stream) if packet.dts is not None]
             if len(packets) != frames:

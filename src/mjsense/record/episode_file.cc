@@ -240,7 +240,7 @@ void EpisodeFile::carry_over(const EpisodeSource& source) {
   const hdf5::H5Lock lock;
   const hdf5::Id file = hdf5::open_file(source.file);
   const hdf5::Id from = hdf5::open_group(file, source.trajectory);
-  hdf5::each_dataset(from, [&](const std::string& path) {
+  const auto carry = [&](const std::string& path) {
     const auto is_inside = [&](std::string_view group) {
       return path.starts_with(group) && (path.size() == group.size() || path[group.size()] == '/');
     };
@@ -254,7 +254,13 @@ void EpisodeFile::carry_over(const EpisodeSource& source) {
                         hdf5::link_properties()),
                 fmt::format("cannot copy '{}' of '{}'", path, source.file.string()));
     if (path.starts_with(kVideos)) carry_video(source.file.parent_path(), path);
-  });
+  };
+  try {
+    hdf5::each_dataset(from, carry);
+  } catch (const Error& e) {
+    throw RuntimeError(
+        fmt::format("'{}' {}: {}", source.file.string(), source.trajectory, e.what()));
+  }
 }
 
 void EpisodeFile::carry_video(const std::filesystem::path& folder, const std::string& path) {

@@ -47,7 +47,7 @@ TEST(DescriptionChecks, WrongValuesAreNamed) {
 
 TEST(DescriptionChecks, PlacesOfStreams) {
   const auto found = listed_places(nlohmann::json::parse(
-      R"j({"streams":["qpos uint8(2000,)","robot/eye uint8(12, 16, 3)","flag bool()",7]})j"));
+      R"json({"streams":["qpos uint8(2000,)","robot/eye uint8(12, 16, 3)","flag bool()",7]})json"));
   ASSERT_EQ(found.size(), 3);
   EXPECT_THAT(found[0].places, ElementsAre("obs/agent/qpos", "obs/sensor_data/qpos"));
   EXPECT_THAT(found[1].places, ElementsAre("obs/extra/robot/eye", "obs/sensor_data/robot_eye"));
