@@ -264,7 +264,7 @@ class EpisodeRecording:
                 video = self._is_video(name, row)
                 if video:
                     low, high, shape = 0.0, 255.0, shape if shape[2] == _RGB else (*shape[1:], _RGB)
-                written[stream] = streams.add(stream, row.kept, shape, texts[name], low=low, high=high, **({"video": True} if video else {}))
+                written[stream] = streams.add(stream, row.kept, shape, texts[name], low=low, high=high, video=video)
         written["info"] = streams.add("info", "uint8", [self._info_bytes], "Infos of the environment.", is_dict=True, low=0.0, high=255.0)
         for name, image in images.items():
             about = f"Image of the camera '{self._cameras[name]}'."
@@ -287,7 +287,7 @@ class EpisodeRecording:
     def _write(self, world: int, step: _Step, images: Mapping[str, np.ndarray]) -> None:
         for name, values in (("observation", step.observation), ("actions/action", step.action)):
             for i, row in enumerate(self._rows[name]):
-                value = 0 if values is None else values[i]
+                value: Any = 0 if values is None else values[i]
                 if values is not None and np.shape(value) != row.shape:
                     raise ValueError(f"RecordEpisodes: '{'/'.join((name, *row.path))}' has the shape {np.shape(value)}, expected {row.shape} as in its space")
                 if values is not None and self._is_video(name, row) and row.shape[2] != _RGB:

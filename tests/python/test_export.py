@@ -370,7 +370,7 @@ def test_a_failed_export_leaves_nothing(root, tmp_path):
 def test_an_export_deletes_nothing_that_it_has_not_made(root, tmp_path):
     (tmp_path / "poetry.lock").write_text("versions")
     (tmp_path / "poetry.part").mkdir()
-    with pytest.raises(FileExistsError, match=r"poetry\.part exists, and no export has made it: rename it, or choose another output"):
+    with pytest.raises(FileExistsError, match=r"poetry\.part exists, and no program of mjsense has made it: rename it, or choose another output"):
         mjs.export_lerobot(root, tmp_path / "poetry", episodes=[0])
     (tmp_path / "poetry.part/thesis.txt").write_text("thesis")
     with pytest.raises(FileExistsError, match=r"poetry\.part exists"):

@@ -211,7 +211,7 @@ def test_rows_are_right(recorded):
 
 def test_environment_observations_equal_the_recording(recorded):
     env = mjs.make_vec(num_envs=3, policy="planner", cameras=[], action_noise=True, sensors=sensors(), **SMALL)
-    env.reset(seed=0)
+    env.reset()
     rows = {w: {name: [env.rows[name][w].copy()] for name in env.rows if name in NAMES} for w in range(3)}
     assert {"counter", "contacts/sums/qacc", "integral"} <= set(rows[0])
     assert env.single_observation_space["contacts"]["sums"]["qacc"].shape == (1,)
@@ -232,7 +232,7 @@ def test_environment_observations_equal_the_recording(recorded):
 
 def test_a_suite_of_the_environments_simulation(recorded):
     env = mjs.make_vec(num_envs=3, policy="planner", cameras=[], action_noise=True, **SMALL)
-    env.reset(seed=0)
+    env.reset()
     suite = mjs.SensorSuite(sensors())
     for step in range(3):
         now = suite.get_observations(env.sim)
@@ -254,7 +254,7 @@ def test_a_suite_of_the_environments_simulation(recorded):
 def test_mj_datas_equal_the_worlds():
     # A scene that is the same in every world, as the model of `fresh` is.
     env = mjs.make_vec(num_envs=2, scene="table", policy="planner", cameras=[], **SMALL)
-    env.reset(seed=0)
+    env.reset()
     sim, peer = env.sim, env.sim.env
     kept = peer.mj_datas[1]
     for _ in range(3):
@@ -285,7 +285,7 @@ def bodies_in(peer, mask):
 
 def test_the_robot_view_agrees_with_the_suite():
     env = mjs.make_vec(num_envs=2, policy="planner", cameras=["wrist_camera"], **SMALL)
-    env.reset(seed=0)
+    env.reset()
     env.step(env.expert_action())
     peer = env.sim.env
     for w in range(2):
@@ -474,7 +474,7 @@ def test_environment_reports_why_an_episode_ended():
             return super().get_observation(env, task, batch_index)
 
     env = mjs.make_vec(num_envs=3, policy="planner", cameras=[], sensors=[AtStep()], **SMALL)
-    env.reset(seed=0)
+    env.reset()
     _, _, _, truncated, infos = env.step(env.expert_action())
     assert not truncated.any()
     _, _, _, truncated, infos = env.step(env.expert_action())

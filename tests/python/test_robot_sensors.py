@@ -73,7 +73,7 @@ def robot(tmp_path, monkeypatch):
 
 def test_sensors_of_a_file(robot):
     env = mjs.make_vec("pick", robot=robot(TABLES + PYTHON), **TASK)
-    observation, _ = env.reset(seed=0)
+    observation, _ = env.reset()
     names = list(observation)
     assert names[-4:] == ["tcp_pose", "finger_contact", "tool_speed", "grip"]
     assert observation["finger_contact"]["force"].shape == (2, 1, 3)
@@ -103,7 +103,7 @@ class Count(mjs.Sensor):
 def test_sensors_of_an_object():
     franka = mjs.Robot("franka", sensors=[Count("grippers"), mjs.TcpPoseSensor(uuid="tool")])
     env = mjs.make_vec("pick", franka, policy="planner", **TASK)
-    observation, _ = env.reset(seed=0)
+    observation, _ = env.reset()
     assert list(observation)[-6:] == ["tcp_pose", "grippers", "tool", "policy_phase", "policy_num_retries", "grasp_pose"]
     np.testing.assert_array_equal(observation["tool"], observation["tcp_pose"])
     assert observation["grippers"].tolist() == [[1], [1]]
@@ -114,7 +114,7 @@ def test_sensors_of_an_object():
             return [Count("grippers")]
 
     env = mjs.make("pick", Lab("franka"), cameras=[], use_sensors=True)
-    assert "grippers" in env.reset(seed=0)[0]
+    assert "grippers" in env.reset()[0]
     env.close()
     with pytest.raises(ValueError, match="'qpos' is a duplicated sensor uuid: from task 'pick' and from robot 'franka'"):
         mjs.make_vec("pick", mjs.Robot("franka", sensors=[Count("qpos")]), **TASK)
