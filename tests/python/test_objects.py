@@ -155,7 +155,9 @@ def test_a_disc_touches_with_a_cylinder(tmp_path, monkeypatch):
     mesh.parent.mkdir(parents=True)
     mesh.write_bytes(box_stl((0.05, 0.05, 0.015)))
     (tmp_path / "scene.toml").write_text(SCENE.format(names='["metaworld_puck"]'))
-    with contextlib.closing(mjs.make_vec("pick", scene=str(tmp_path / "scene.toml"), cameras=[], observations=["qpos"])) as env:
+    with contextlib.closing(
+        mjs.make_vec("pick", scene=str(tmp_path / "scene.toml"), policy="planner", cameras=[], observations=["qpos"])
+    ) as env:
         env.reset(seed=0)
         model, data = env.sim.model, env.sim.data
         body = model.body("metaworld_puck/metaworld_puck").id
@@ -165,7 +167,7 @@ def test_a_disc_touches_with_a_cylinder(tmp_path, monkeypatch):
         assert list(model.geom_size[touched][:2]) == [0.05, 0.015]
         assert model.body_mass[body] == pytest.approx(0.12)
         start = data.xpos[0, body, 2]
-        for _ in range(20):
+        for _ in range(15):
             env.step(env.expert_action(), done=env.expert_done)
         assert abs(data.xpos[0, body, 2] - start) < 5e-4
 

@@ -226,7 +226,7 @@ pad_half_length = 0.02
       path() + ": move group 'gripper': leaf_site 'tool/tip': its z axis must";
   const std::string back = fault_with(R"(euler="180 0 0")");
   EXPECT_THAT(back, StartsWith(begin));
-  EXPECT_THAT(back, HasSubstr("in direction (0.00, -0.00, -1.00) of the hand"));
+  EXPECT_THAT(back, HasSubstr(", -1.00) of the hand and apart along (0.00, "));
   const std::string aside = fault_with(R"(euler="90 0 0")");
   EXPECT_THAT(aside, StartsWith(begin));
   // What the message proposes is accepted.
