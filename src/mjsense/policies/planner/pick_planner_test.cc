@@ -225,7 +225,7 @@ TEST(Grasp, ChecksAreCountedIfThereIsNoGrasp) {
   EXPECT_FALSE(grasps.empty());
   EXPECT_EQ(checks.candidates, static_cast<int>(grasps.size()) + checks.nothing_between +
                                    checks.too_wide + checks.no_faces + checks.in_object);
-  gripper.max_opening = 0.008;  // less than the smallest gaps beside the pads and 4 mm
+  gripper.max_opening = 0.008;  // less than both gaps to the pads and 4 mm
   checks = {};
   EXPECT_TRUE(grasps_all_around(gripper, block.shape, &checks).empty());
   EXPECT_GT(checks.too_wide, 1000);
