@@ -113,7 +113,9 @@ TEST_F(Pick, LyingOnAnotherObjectIsNotSuccess) {
   start(0, 1);
   // On top of another object: high enough, but not held by the robot.
   const int target = task.target(0);
-  const auto& other = task.all_objects()[target == 0 ? 1 : 0];
+  int index = 0;  // of another one that is present
+  while (index == target || !task.present(0, task.all_objects()[index].body)) ++index;
+  const auto& other = task.all_objects()[index];
   const Quat turned = quat(data->xquat + 4 * other.body);
   const double* at = data->xpos + 3 * other.body;
   double top = 0;
