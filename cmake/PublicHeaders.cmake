@@ -76,6 +76,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/robots/scene_robot.h
   mjsense/robots/state_row.h
   mjsense/rollout/action_log.h
+  mjsense/rollout/contact_depth.h
   mjsense/rollout/core_suite.h
   mjsense/rollout/planners.h
   mjsense/rollout/record_job.h

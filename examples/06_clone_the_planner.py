@@ -5,12 +5,14 @@ Minutes on two cores, without a picture: it sees the joints, and where its objec
 table, and grasps come from above: what is easiest to learn.
 
     pip install "mjsense[torch,dataset]"
-    python examples/06_clone_the_planner.py [recorded episodes] [episodes to judge] [passes over the data]
+    python examples/06_clone_the_planner.py [--out clone] [--recorded 200] [--judged 200] [--passes 120]
+
+The folder keeps the recordings of the demonstrations and of the judged episodes, and the network.
 """
 
-import sys
-import tempfile
+import argparse
 import time
+from pathlib import Path
 
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
@@ -97,7 +99,7 @@ def train(x, moves, closed, passes, seed=0):
         optimizer.step()
         schedule.step()
         if step % (steps // 5 + 1) == 0:
-            print(f"  step {step}: loss {loss.item():.4f}")
+            print(f"  step {step}: loss {loss.item():.4f}", flush=True)
     return net.eval()
 
 
@@ -127,26 +129,40 @@ class ClonePolicy(mjs.Policy):
         return {"arm": arm + moves, "gripper": np.where(out[:, 7:].numpy() > 0, CLOSED, 0.0)}
 
 
-def success(policy, episodes):
-    """Share of unseen episodes in which the object was lifted at the last step or before."""
-    with tempfile.TemporaryDirectory() as out:
-        made = mjs.record("pick", scene="table", policy=policy, out=out, episodes=episodes, max_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
-                          cameras=[], action_noise=False, terminate_upon_success=True)  # fmt: skip
-        return made.succeeded / (made.succeeded + made.failed)
+def successes(policy, episodes, out):
+    """In how many unseen episodes the object was lifted at the last step or before."""
+    return mjs.record("pick", scene="table", policy=policy, out=out, overwrite=True, num_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
+                      cameras=[], action_noise=False, terminate_upon_success=True, keep_failures=True).succeeded  # fmt: skip
 
 
-def main(recorded=200, judged=200, passes=120):
-    with tempfile.TemporaryDirectory() as out:
-        begun = time.perf_counter()
-        made = mjs.record("pick", scene="table", policy="top_down_planner", out=out, episodes=recorded, worlds=16, cameras=[])
-        print(f"{made.kept} picks recorded in {time.perf_counter() - begun:.0f} s")
-        x, moves, closed = demonstrations(made.path)
+def wilson(successes, episodes, z=1.96):
+    """Interval that contains the true success rate with 95 % probability: (low, high)."""
+    share, n = successes / episodes, episodes + z * z
+    middle = (successes + z * z / 2) / n
+    half = z / n * np.sqrt(episodes * share * (1 - share) + z * z / 4)
+    return middle - half, middle + half
+
+
+def main(out, recorded=200, judged=200, passes=120):
+    begun = time.perf_counter()
+    made = mjs.record("pick", scene="table", policy="top_down_planner", out=out / "demonstrations", overwrite=True, episodes=recorded,
+                      worlds=16, cameras=[])  # fmt: skip
+    print(f"{made.kept} picks recorded in {time.perf_counter() - begun:.0f} s", flush=True)
+    x, moves, closed = demonstrations(made.path)
     begun = time.perf_counter()
     net = train(x, moves, closed, passes)
-    print(f"trained on {len(x)} steps in {time.perf_counter() - begun:.0f} s")
-    untrained = success(ClonePolicy(Clone(torch.as_tensor(x), torch.as_tensor(moves))), judged)
-    print(f"of {judged} unseen episodes: untrained {untrained:.0%}, trained {success(ClonePolicy(net), judged):.0%}")
+    torch.save(net, out / "network.pt")
+    print(f"trained on {len(x)} steps in {time.perf_counter() - begun:.0f} s", flush=True)
+    for name, network in {"untrained": Clone(torch.as_tensor(x), torch.as_tensor(moves)), "trained": net}.items():
+        count = successes(ClonePolicy(network), judged, out / name)
+        low, high = wilson(count, judged)
+        print(f"{name}: {count} of {judged} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:]))
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--out", type=Path, default=Path("clone"), help="Folder of the recordings and the network.")
+    arguments.add_argument("--recorded", type=int, default=200, help="Number of demonstrations.")
+    arguments.add_argument("--judged", type=int, default=200, help="Number of unseen episodes.")
+    arguments.add_argument("--passes", type=int, default=120, help="Passes over the data in training.")
+    main(**vars(arguments.parse_args()))

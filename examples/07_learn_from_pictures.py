@@ -329,6 +329,14 @@ def evaluate(network, episodes, scene="", seed=10_000, worlds=50):
     return np.array(won), np.array(known)
 
 
+def wilson(successes, episodes, z=1.96):
+    """Interval that contains the true success rate with 95 % probability: (low, high)."""
+    share, n = successes / episodes, episodes + z * z
+    middle = (successes + z * z / 2) / n
+    half = z / n * np.sqrt(episodes * share * (1 - share) + z * z / 4)
+    return middle - half, middle + half
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--episodes", type=int, default=200, help="Number of demonstrations.")
@@ -346,9 +354,12 @@ def main():
         if chosen.network:
             torch.save(network, chosen.network)
     won, known = evaluate(network, chosen.judged, chosen.scene)
-    print(f"trained: {won.mean():.1%} of {len(won)} unseen episodes", flush=True)
+    low, high = wilson(won.sum(), len(won))
+    print(f"trained: {won.sum()} of {len(won)} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
     if not known.all():
-        print(f"  {won[~known].sum()} of {np.sum(~known)} whose instructions have unknown words, {won[known].sum()} of {known.sum()} others")
+        print(
+            f"  {won[~known].sum()} of {np.sum(~known)} whose instructions have unknown words, {won[known].sum()} of {known.sum()} others"
+        )
 
 
 def trained(chosen):

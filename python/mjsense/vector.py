@@ -405,6 +405,7 @@ def make_vec(
     perturb: float = 0.0,
     instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
+    max_penetration: float = 0.004,
     # end of options
     use_sensors: bool = True,
     autoreset_mode: str | AutoresetMode = "next_step",
@@ -456,6 +457,8 @@ def make_vec(
         instructions: Instruction of each episode. ``varied``: paraphrases that describe the objects by what
             distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
+        max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
+            any depth. Pairs of geoms that are deeper at the start do not count. [m]
         Others:
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.

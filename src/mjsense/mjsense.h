@@ -76,6 +76,7 @@
 #include "mjsense/robots/scene_robot.h"
 #include "mjsense/robots/state_row.h"
 #include "mjsense/rollout/action_log.h"
+#include "mjsense/rollout/contact_depth.h"
 #include "mjsense/rollout/core_suite.h"
 #include "mjsense/rollout/planners.h"
 #include "mjsense/rollout/record_job.h"

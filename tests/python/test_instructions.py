@@ -3,12 +3,14 @@
 of the task's object and of no other object that is present."""
 
 import colorsys
+import itertools
 import json
 import re
 import tomllib
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import mjsense as mjs
 
@@ -230,6 +232,32 @@ def test_doors_are_pushed_or_pulled():
         assert ("pull" in sentence.lower() or "towards" in sentence) == (not push), sentence
         sentences.add(sentence)
     assert len(sentences) >= 30
+
+
+@pytest.mark.parametrize("task", ["open", "close"])
+def test_sentences_of_handles_differ(task):
+    sentences = [env.instructions[world] for env, world in starts(task, "kitchen", "franka", 30)][:25]
+    assert len(set(sentences)) >= 24, sorted(sentences)
+
+
+def test_nobody_is_asked_for_a_glass_salt_or_for_the_handle_of_a_handle():
+    """Adjectives are not used with what an object contains, and a door is described by its handle only once."""
+    for env, world in starts("pick", "clutter", "franka", 60):
+        assert not re.search(
+            r"\b(plastic|larger|smaller|largest|smallest|white|black) (glue|salt|milk)\b(?! s)", env.instructions[world]
+        )
+    for env, world in starts("door_opening", "room_with_door", "rby1", 60):
+        assert env.instructions[world].count("handle") <= 1, env.instructions[world]
+
+
+def test_tasks_draw_their_episodes_independently():
+    """With one seed, the kinds of sentence and the targets of two tasks with the same scene are not the same."""
+    targets = {}
+    for task in ("pick", "pick_and_place", "packing"):
+        targets[task] = [json.loads(env._rollout.obs_scene(world))["objects"]["pickup_obj"]["body"]
+                         for env, world in starts(task, "tableware", "franka", 30)]  # fmt: skip
+    for a, b in itertools.combinations(targets.values(), 2):
+        assert sum(x == y for x, y in zip(a, b, strict=True)) < 15
 
 
 def test_canonical_sentences_and_sentences_of_several_tasks():

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue of objects, and the command that installs those of other packages."""
 
+import contextlib
 import itertools
 import json
 import os
@@ -145,6 +146,30 @@ def test_objects_of_several_meshes(tmp_path, monkeypatch):
     assert all(model.geom_contype[g] for g in geoms)
     assert np.allclose(model.geom_pos[geoms], [[0.03, 0, 0.032], [-0.045, 0, -0.06], [0.03, 0, 0.032]], atol=1e-6)
     env.close()
+
+
+def test_a_disc_touches_with_a_cylinder(tmp_path, monkeypatch):
+    """The hull of Meta-World's puck had one contact with the table and sank in by 4.5 mm."""
+    monkeypatch.setenv("MJSENSE_PACKAGES", str(tmp_path))
+    mesh = tmp_path / "metaworld/assets/objects/meshes/puck/puck.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_bytes(box_stl((0.05, 0.05, 0.015)))
+    (tmp_path / "scene.toml").write_text(SCENE.format(names='["metaworld_puck"]'))
+    with contextlib.closing(
+        mjs.make_vec("pick", scene=str(tmp_path / "scene.toml"), policy="planner", cameras=[], observations=["qpos"])
+    ) as env:
+        env.reset(seed=0)
+        model, data = env.sim.model, env.sim.data
+        body = model.body("metaworld_puck/metaworld_puck").id
+        shown, touched = (g for g in range(model.ngeom) if model.geom_bodyid[g] == body)
+        assert not model.geom_contype[shown] and not model.geom_conaffinity[shown] and model.geom_contype[touched]
+        assert model.geom_type[touched] == mujoco.mjtGeom.mjGEOM_CYLINDER
+        assert list(model.geom_size[touched][:2]) == [0.05, 0.015]
+        assert model.body_mass[body] == pytest.approx(0.12)
+        start = data.xpos[0, body, 2]
+        for _ in range(15):
+            env.step(env.expert_action(), done=env.expert_done)
+        assert abs(data.xpos[0, body, 2] - start) < 5e-4
 
 
 def test_install_runs_pip_once_and_says_what_was_added(monkeypatch, capsys):

@@ -83,7 +83,9 @@ def test_every_robot_runs_an_episode(name):
         tools = ["tcp_pose"] if len(grippers) == 1 else [f"tcp_pose_{g.name.split('_')[0]}" for g in grippers]
         assert all(observation[tool].shape == (2, 7) and np.isfinite(observation[tool]).all() for tool in tools)
         # A floating base takes a pose, everything else may be told 0.
-        command = [[0, 0, 0.5, 1, 0, 0, 0] if g.command_unit == "m, wxyz" else [0] * g.num_commands for g in robot.groups.values()]
+        command = [
+            [0, 0, 0.5, 1, 0, 0, 0] if g.command_unit == "m, wxyz" else [0] * g.num_commands for g in robot.groups.values()
+        ]
         action = np.tile(np.concatenate(command), (2, 1)).astype(np.float32)
         assert env.action_space.shape == action.shape
         observation, *_ = env.step(action)
@@ -122,3 +124,41 @@ def test_no_code_knows_a_robot_by_its_name():
             code = line.split("//")[0]
             example = '{"mjsense ' in code  # of a command, in its help
             assert not names.search(code) or example or (path.name, code.strip()) in known, f"{path}: {line}"
+
+
+def test_an_episode_with_a_deep_contact_is_no_success(tmp_path):
+    """Fingers press into what they hold by some 0.1 mm: with a bound below that, no pick is a success; without one, all are."""
+    options = {"scene": "table", "policy": "top_down_planner", "num_attempts": 3, "cameras": [], "keep_failures": True}
+    made = mjs.record("pick", "franka", out=tmp_path / "bound", max_penetration=2e-5, **options)
+    assert made.succeeded == 0 and made.failures == {"no success: a contact was too deep": 3}
+    for episode in mjs.Dataset(made.path).episodes:
+        assert re.fullmatch(r"no success: a contact was too deep \(\d\.\d mm in step \d+: '.+' and '.+'; max_penetration is 0\.02 mm\)",
+                            episode.outcome)  # fmt: skip
+        assert not episode["success"][-1]
+    assert mjs.record("pick", "franka", out=tmp_path / "any", max_penetration=0, **options).succeeded == 3
+
+
+@pytest.mark.parametrize(
+    ("task", "robot", "system", "outer", "wrist", "few"),
+    [("pick", "rby1", "", "camera_follower", "", 2), ("pick", "i2rt_yam", "", "exo_camera_1", "wrist_camera", 0),
+     ("pick", "franka", "gopro_d405_d455", "exo_camera_1", "wrist_camera", 0)],
+)  # fmt: skip
+def test_cameras_show_the_target_at_the_start(task, robot, system, outer, wrist, few):
+    """A disc of the area of the target is at least 20 pixels wide at 640x480 in one outer camera, except in a few episodes in which a
+    hand hides it; and in the wrist camera in most episodes."""
+    cameras = [outer, wrist] if wrist else [outer]
+    with contextlib.closing(
+        mjs.make_vec(task, robot, num_envs=8, policy=None, camera_system=system, segmentation=True, cameras=cameras)
+    ) as env:
+        observation, _ = env.reset(seed=940300)
+        model = env.sim.model
+        wide = dict.fromkeys(cameras, 0)
+        for world in range(8):
+            target = model.body(json.loads(env._rollout.obs_scene(world))["objects"]["pickup_obj"]["body"]).id
+            geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == target]
+            for camera in cameras:
+                pixels = observation[f"{camera}_segmentation"][world]
+                area = (np.isin(pixels[..., 0], geoms) & (pixels[..., 1] == 5)).sum()
+                wide[camera] += 2 * np.sqrt(area / np.pi) >= 20
+    assert wide[outer] >= 8 - few, wide
+    assert not wrist or wide[wrist] >= 6, wide

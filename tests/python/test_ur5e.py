@@ -39,6 +39,8 @@ root_body = "gripper/base_mount"
 closed_command = 255
 max_opening = 0.085
 pad_sites = ["left_face", "right_face"]
+pad_half_width = 0.011
+pad_half_length = 0.019
 """
 
 

@@ -9,8 +9,10 @@
 #include <fstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/robots/robot.h"
+#include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense::robots {
@@ -18,6 +20,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 constexpr const char* kArm = R"(<mujoco>
   <compiler angle="radian"/>
@@ -164,8 +167,71 @@ pad_sites = ["flange", "tool/tip"]
               HasSubstr("the gripper 'gripper' needs root_body"));
   EXPECT_THAT(fault(gripper + "root_body = \"link\"\n"),
               HasSubstr("the gripper 'gripper' needs leaf_site"));
-  EXPECT_EQ(fault(gripper + "leaf_site = \"flange\"\nroot_body = \"link\"\n"), "no error");
+  const std::string sites = gripper + "leaf_site = \"flange\"\nroot_body = \"link\"\n";
+  EXPECT_EQ(fault(sites),
+            path() +
+                ":19: groups[1]: the gripper 'gripper' needs max_opening, the distance "
+                "between its open pads, in m; it is 0: write for example max_opening = "
+                "0.08");
+  EXPECT_THAT(
+      fault(sites + "max_opening = 0.08\npad_half_length = 0.02\n"),
+      HasSubstr("'gripper' needs pad_half_width, half the width of a pad across the approach, "
+                "the tool's x axis, in m; it is 0: write for example pad_half_width = 0.01"));
+  EXPECT_THAT(fault(sites + "max_opening = 0.08\npad_half_width = 0.01\n"),
+              HasSubstr("'gripper' needs pad_half_length"));
+  EXPECT_EQ(fault(sites + "max_opening = 0.08\npad_half_width = 0.01\npad_half_length = 0.02\n"),
+            "no error");
   EXPECT_THAT(fault(with("arm.xml", "amr.xml")), HasSubstr("amr.xml"));
+}
+
+TEST_F(RobotFile, ANameThatAPartRepeatsIsNamedWithItsPart) {
+  EXPECT_EQ(
+      fault(with("[[groups]]",
+                 "[[parts]]\nmodel = \"tool.xml\"\nto = \"flange\"\nprefix = "
+                 "\"tool/\"\n[[groups]]")),
+      path() + ": part '" + (folder.path / "lifter" / "tool.xml").string() +
+          "': its body 'tool/tool' has the name of a body of the models before it; its prefix "
+          "is 'tool/': write another one, for example prefix = \"tool2/\"");
+}
+
+// A hand whose pads are apart along y and whose tool frame is rotated by the site.
+TEST_F(RobotFile, TheToolFrameOfAGripperIsChecked) {
+  const auto fault_with = [&](const std::string& site) {
+    write("tool.xml", R"(<mujoco><worldbody><body name="tool"><geom size=".02" mass=".1"/>
+      <site name="left" pos="0 .02 .1"/><site name="right" pos="0 -.02 .1"/>
+      <site name="tip" pos="0 0 .1" )" +
+                          site + "/></body></worldbody></mujoco>");
+    const RobotCfg cfg = load(std::string(kToml) + R"([[groups]]
+name = "gripper"
+kind = "gripper"
+leaf_site = "tool/tip"
+root_body = "tool/tool"
+pad_sites = ["tool/left", "tool/right"]
+max_opening = 0.08
+pad_half_width = 0.01
+pad_half_length = 0.02
+)");
+    const mjsense::scene::SpecPtr spec = scene::parse_model({.xml = robot_xml(cfg)}, "test");
+    const ModelPtr model(mj_compile(spec.get(), nullptr));
+    try {
+      const Robot robot(cfg, model.get(), 1, "");
+    } catch (const ValueError& e) {
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_EQ(fault_with(""), "no error");
+  EXPECT_EQ(fault_with(R"(euler="0 0 90")"), "no error") << "the pads may be apart along x";
+  const std::string begin =
+      path() + ": move group 'gripper': leaf_site 'tool/tip': its z axis must";
+  const std::string back = fault_with(R"(euler="180 0 0")");
+  EXPECT_THAT(back, StartsWith(begin));
+  EXPECT_THAT(back, HasSubstr(", -1.00) of the hand and apart along (0.00, "));
+  const std::string aside = fault_with(R"(euler="90 0 0")");
+  EXPECT_THAT(aside, StartsWith(begin));
+  // What the message proposes is accepted.
+  for (const std::string& text : {back, aside})
+    EXPECT_EQ(fault_with(text.substr(text.find("quat="))), "no error") << text;
 }
 
 TEST(RobotNames, AreFoundOrTheNearestIsSuggested) {

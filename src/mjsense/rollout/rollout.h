@@ -81,7 +81,7 @@ struct RolloutCfg {
   std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
   bool terminate_upon_success = false;
-  double max_penetration = 0.003;
+  double max_penetration = 0.004;
   double perturb = 0;
   NamedEnum<episode::Instructions> instructions;
   bool use_sensors = true;

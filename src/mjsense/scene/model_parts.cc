@@ -44,6 +44,16 @@ constexpr std::pair<mjtObj, const char*> kNamed[] = {
     {mjOBJ_SITE, "site"},         {mjOBJ_CAMERA, "camera"}, {mjOBJ_LIGHT, "light"},
     {mjOBJ_ACTUATOR, "actuator"}, {mjOBJ_SENSOR, "sensor"}, {mjOBJ_TENDON, "tendon"}};
 
+// A prefix with which the name is not taken: "gripper/" for gripper.xml.
+std::string free_prefix(const std::vector<std::string>& taken, const ModelPart& part,
+                        const std::string& name) {
+  const std::string stem = std::filesystem::path(part.path).stem().string();
+  for (int k = 1;; ++k) {
+    const std::string prefix = k == 1 ? stem : fmt::format("{}{}", stem, k);
+    if (std::ranges::find(taken, prefix + "/" + name) == taken.end()) return prefix;
+  }
+}
+
 // Throws ValueError if the model has an element with the name that one of the part would have.
 void check_names(const mjSpec* model, const mjSpec* child, const ModelPart& part,
                  const std::string& context) {
@@ -57,8 +67,7 @@ void check_names(const mjSpec* model, const mjSpec* child, const ModelPart& part
       throw ValueError(
           fmt::format("{}: its {} '{}' has the name of a {} of the models before it; its prefix is "
                       "'{}': write another one, for example prefix = \"{}/\"",
-                      context, what, full, what, part.prefix,
-                      std::filesystem::path(part.path).stem().string()));
+                      context, what, full, what, part.prefix, free_prefix(taken, part, name)));
     }
   }
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/policies/planner/manipulation_planner.h"
 
+#include <fmt/format.h>
+
 #include "mjsense/policies/planner/phases.h"
 
 namespace mjsense::policies {
@@ -60,8 +62,10 @@ void ManipulationPlanner::make_plan(const World& world, const PlanRequest& reque
     plan.more = plan_pick(world, request, plan);
   } else if (stage == 1 && placing_) {
     plan.more = plan_place(world, request, plan);
-  } else if (task().evaluate(world).success) {
+  } else if (const episode::Evaluation now = task().evaluate(world); now.success) {
     plan.wait(placing_ ? kUnknownPhase : kLift, 0);
+  } else {
+    plan.rejection = fmt::format("after the last motion, {}", now.missing);
   }
 }
 

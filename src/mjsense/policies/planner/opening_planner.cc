@@ -122,7 +122,12 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   const int first = request.attempt > 0 ? 1 : 0;  // stage
   if (request.stage < first) return back_off(world, plan);
   if (request.stage > first + 1) {
-    if (task().evaluate(world).success) plan.wait(kLift, 0);
+    const episode::Evaluation now = task().evaluate(world);
+    if (now.success) {
+      plan.wait(kLift, 0);
+    } else {
+      plan.rejection = fmt::format("after the last motion, {}", now.missing);
+    }
     return;
   }
   const tasks::HandleReach& reach = opening_->reach();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/policies/planner/pick_planner.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -212,6 +213,28 @@ TEST(Grasp, ClosesOnOppositeFacesOfABox) {
     const Vec3 closing = rotate(conjugate(object.q), rotate(grasps[i].pose.q, {0, 1, 0}));
     EXPECT_GT(std::max(std::abs(closing.x), std::abs(closing.y)), std::cos(0.2));
   }
+}
+
+TEST(Grasp, ChecksAreCountedIfThereIsNoGrasp) {
+  Stage stage(1);
+  const robots::Robot& robot = stage.task->robot();
+  GripperShape gripper(stage.scene->model(), robot, robot.gripper());
+  const auto& block = static_cast<tasks::PickTask&>(*stage.task).all_objects()[0];
+  GraspChecks checks;
+  const auto grasps = grasps_all_around(gripper, block.shape, &checks);
+  EXPECT_FALSE(grasps.empty());
+  EXPECT_EQ(checks.candidates, static_cast<int>(grasps.size()) + checks.nothing_between +
+                                   checks.too_wide + checks.no_faces + checks.in_object);
+  gripper.max_opening = 0.008;  // less than both gaps to the pads and 4 mm
+  checks = {};
+  EXPECT_TRUE(grasps_all_around(gripper, block.shape, &checks).empty());
+  EXPECT_GT(checks.too_wide, 1000);
+  EXPECT_TRUE(
+      text_of(checks, gripper)
+          .starts_with(fmt::format(
+              "0 grasps, of {} candidates: {} too wide for the gripper, whose max_opening is 8 mm",
+              checks.candidates, checks.too_wide)))
+      << text_of(checks, gripper);
 }
 
 }  // namespace

@@ -110,10 +110,13 @@ TEST_F(Pick, LiftWithoutTheRobotIsNotSuccess) {
 }
 
 TEST_F(Pick, LyingOnAnotherObjectIsNotSuccess) {
-  start(0, 1);
+  start(0, 0);
+  for (int episode = 1; task.all_objects()[task.target(0)].kind != "blue_cube"; ++episode)
+    start(0, episode);
   // On top of another object: high enough, but not held by the robot.
   const int target = task.target(0);
-  const auto& other = task.all_objects()[target == 0 ? 1 : 0];
+  const auto& other = task.all_objects()[0];
+  ASSERT_EQ(other.kind, "red_block");
   const Quat turned = quat(data->xquat + 4 * other.body);
   const double* at = data->xpos + 3 * other.body;
   double top = 0;

@@ -234,6 +234,59 @@ TEST(PickAndPlace, NextToPlacesAreOnTheTable) {
   EXPECT_GT(far.size(), near.size()) << "on the robot's side, too";
 }
 
+// The first places of many episodes lie all over a tray, and the whole object is above it. They are
+// functions of the episode. In a bowl they are at its bottom, not on its rim.
+TEST(PickAndPlace, PlacesAreSpreadOverTheReceptacle) {
+  Table table(PlaceKind::kInOrOn);
+  std::vector<double> across;  // offset from the middle, as a share of the half size
+  int bowls = 0;
+  for (int episode = 0; episode < 60; ++episode) {
+    table.start(0, episode);
+    const std::string& name = table.task.objects(0)[1].name;
+    std::vector<Vec3> found, again;
+    table.task.places(table.world, {}, found);
+    table.task.places(table.world, {}, again);
+    ASSERT_FALSE(found.empty());
+    EXPECT_EQ(found[0].x, again[0].x);
+    EXPECT_EQ(found[0].y, again[0].y);
+    const Aabb box = world_box(table.world, table.body(1)),
+               object = world_box(table.world, table.body(0));
+    const Vec3 middle = box.center(), half = 0.5 * box.size(), of_object = 0.5 * object.size();
+    if (name.find("bowl") != std::string::npos) {
+      ++bowls;
+      EXPECT_LT(found[0].z, box.low.z + 0.5 * (box.high.z - box.low.z)) << name;
+    }
+    if (name != "wooden tray") continue;
+    EXPECT_LT(std::abs(found[0].x - middle.x) + 0.99 * of_object.x, half.x + 1e-3);
+    EXPECT_LT(std::abs(found[0].y - middle.y) + 0.99 * of_object.y, half.y + 1e-3);
+    across.push_back((found[0].x - middle.x) / half.x);
+    across.push_back((found[0].y - middle.y) / half.y);
+  }
+  ASSERT_GT(across.size(), 8u);
+  EXPECT_GT(bowls, 5);
+  double sum = 0, squares = 0;
+  for (double x : across) sum += x, squares += x * x;
+  const auto n = static_cast<double>(across.size());
+  EXPECT_NEAR(sum / n, 0, 0.3);
+  EXPECT_GT(std::sqrt(squares / n), 0.12) << "one point";
+}
+
+TEST(PickAndPlace, PlacesBesideAnObjectAreOnAllSides) {
+  Table table(PlaceKind::kNextTo);
+  std::array<int, 4> sides{};
+  for (int episode = 0; episode < 40; ++episode) {
+    table.start(0, episode);
+    const Aabb other = world_box(table.world, table.body(1));
+    std::vector<Vec3> found;
+    table.task.places(table.world, {}, found);
+    if (found.empty()) continue;
+    const Vec3 d = found[0] - other.center(), half = 0.5 * other.size();
+    const bool of_x = std::abs(d.x) - half.x > std::abs(d.y) - half.y;
+    ++sides[of_x ? (d.x > 0 ? 0 : 1) : (d.y > 0 ? 2 : 3)];
+  }
+  for (int count : sides) EXPECT_GE(count, 3);
+}
+
 TEST(PickAndPlace, StartThatIsAlreadySolvedIsRejected) {
   Table table(PlaceKind::kNextTo);
   int there = 0;
