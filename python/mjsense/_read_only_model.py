@@ -66,7 +66,8 @@ class _Part:
         return repr(self._part)
 
     @property
-    def __class__(self) -> Any:  # isinstance(model.opt, mujoco.MjOption) holds
+    def __class__(self) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """That of the part: isinstance(model.opt, mujoco.MjOption) holds."""
         return type(self._part)
 
 

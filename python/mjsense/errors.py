@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from mjsense._show import printable
 
@@ -22,6 +22,21 @@ def unexpected_keyword(context: str, name: str, known: Iterable[str]) -> TypeErr
     return TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, [one for one in known if one[0] != '_'], 'it takes')}")
 
 
+def nearest(name: str, known: Iterable[str], cutoff: float = 0.6) -> list[str]:
+    """Up to three names that are similar to ``name``: first those with the same last part (``robot/base`` for ``base``), then those that differ
+    least, whatever the case of their letters; without these, those whose last parts differ least."""
+    known = list(known)
+
+    def close(part: Callable[[str], str]) -> list[str]:
+        spellings: dict[str, list[str]] = {}
+        for one in known:
+            spellings.setdefault(part(one).lower(), []).append(one)
+        return [one for lower in difflib.get_close_matches(name.lower(), spellings, 3, cutoff) for one in spellings[lower]]
+
+    near = [one for one in known if one.endswith(f"/{name}")] + close(str)
+    return list(dict.fromkeys(near or close(lambda one: one.rsplit("/", 1)[-1])))[:3]
+
+
 def did_you_mean(name: str, known: Iterable[str], listing: str = "") -> str:
     """The end of a message about an unknown name: ``"; did you mean 'qpos' or 'qvel'?"``.
 
@@ -30,10 +45,7 @@ def did_you_mean(name: str, known: Iterable[str], listing: str = "") -> str:
             these words the result is then empty.
     """
     known = list(dict.fromkeys(known))
-    spellings: dict[str, list[str]] = {}  # the case of letters is the most frequent mistake
-    for one in known:
-        spellings.setdefault(one.lower(), []).append(one)
-    if near := [one for lower in difflib.get_close_matches(name.lower(), spellings, 3) for one in spellings[lower]][:3]:
+    if near := nearest(name, known):
         return f"; did you mean {' or '.join(map(repr, near))}?"
     names = [*known[:40], "..."] if len(known) > 40 else known or ["none"]
     return f"; {listing} {', '.join(names)}" if listing else ""

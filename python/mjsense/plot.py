@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import fnmatch
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from mjsense._arguments import Seed, checked
 from mjsense._optional import optional
 from mjsense._show import coloured
 from mjsense.dataset import Dataset, Episode
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, did_you_mean
 from mjsense.view.curves import COLOURS, MAX_CURVES
 from mjsense.view.open import source_of
 from mjsense.view.source import LiveSource
@@ -93,10 +92,7 @@ def _expand(names: Iterable[str], known: Iterable[str]) -> list[str]:
         chosen = [one for one in known if one == name] or [one for one in known if one.endswith(f"/{name}")]
         chosen = chosen or [one for one in known if fnmatch.fnmatchcase(one, name) or one.startswith(f"{name}/")]
         if not chosen:
-            by_end = {one.rsplit("/", 1)[-1]: one for one in known}
-            near = difflib.get_close_matches(name, known, 3) or [by_end[end] for end in difflib.get_close_matches(name, by_end, 3)]
-            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(known)}"
-            raise UnknownNameError(f"no stream '{name}'; {hint}")
+            raise UnknownNameError(f"no stream '{name}'{did_you_mean(name, known, 'there are')}")
         found += [one for one in chosen if one not in found]
     return found
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 import warnings
@@ -16,6 +15,7 @@ import numpy as np
 from mjsense import _core, _scene_layout
 from mjsense._arguments import OutputArray, checked
 from mjsense._one_thread import OneThread, guarded
+from mjsense.errors import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,7 +88,7 @@ def camera_of_name(model: mujoco.MjModel, name: str) -> int:
     id = mujoco.mj_name2id(model, kind, name)
     if id == -1:
         names = [mujoco.mj_id2name(model, kind, i) or f"(camera {i}, unnamed)" for i in range(model.ncam)]
-        near = difflib.get_close_matches(name, names, n=3, cutoff=0.0)
+        near = nearest(name, names, cutoff=0.0)
         known = f"Nearest: {', '.join(near)}." if near else "The model has no cameras."
         raise ValueError(f'The camera "{name}" does not exist. {known}')
     return id

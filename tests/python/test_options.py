@@ -155,6 +155,10 @@ def test_timestep_of_sensors_that_count_steps():
     with pytest.raises(ValueError, match=r"timestep: the noise, delays or ray times of sensor 'd' are in steps of 0\.002 s: set SceneCfg\(options="):
         sim.options.timestep = 0.001
     assert sim.options.timestep == 0.002
+    site = mjs.ObjRef("site", "s")
+    simulation(1, sensors=(mjs.ImuSensorCfg(name="imu", site=site),)).options.timestep = 0.001  # an ideal one counts no steps
+    with pytest.raises(ValueError, match="of sensor 'imu' are in steps"):
+        simulation(1, sensors=(mjs.ImuSensorCfg(name="imu", site=site, preset="mpu6050"),)).options.timestep = 0.001
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ its explanation. It imports what it needs in ``run``, so that ``--help`` and com
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import os
 import shutil
@@ -16,6 +15,8 @@ import sys
 import textwrap
 from types import ModuleType
 from typing import Any
+
+from mjsense.errors import did_you_mean
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",
@@ -50,9 +51,7 @@ class _Parser(argparse.ArgumentParser):
     def parse_known_args(self, *args: Any, **kwargs: Any) -> Any:
         arguments, rest = super().parse_known_args(*args, **kwargs)
         for name in (word.partition("=")[0] for word in rest if word.startswith("--")):
-            near = difflib.get_close_matches(name, self._option_string_actions, 3)
-            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"see {self.prog} --help"
-            raise ValueError(f"no option named '{name}'; {hint}")
+            raise ValueError(f"no option named '{name}'{did_you_mean(name, self._option_string_actions) or f'; see {self.prog} --help'}")
         return arguments, rest
 
     def error(self, message: str) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]  # raises instead of exiting

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import bisect
 import copy
-import difflib
 import fnmatch
 import itertools
 from collections import Counter
@@ -329,17 +328,7 @@ class Sample(dict[str, Any]):
     """An observation of a data set: its values by stream. The error for a name that is missing has the nearest names."""
 
     def __missing__(self, name: str) -> Any:
-        raise UnknownNameError(f"the observation has no '{name}'{_nearest(name, self)}")
-
-
-def _nearest(name: str, known: Iterable[str]) -> str:
-    """The end of a message about an unknown stream: those with the same last part come first."""
-    known = list(known)
-    near = difflib.get_close_matches(name, known, 3)
-    same_end = [stream for stream in known if stream.endswith(f"/{name}")]
-    if not near and not same_end:
-        return did_you_mean(name, known, "it has")
-    return f"; did you mean {', '.join(repr(n) for n in dict.fromkeys([*same_end, *near]))}?"
+        raise UnknownNameError(f"the observation has no '{name}'{did_you_mean(name, self, 'it has')}")
 
 
 def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
@@ -349,7 +338,7 @@ def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
     found = [stream for stream in known if stream.startswith(f"{name}/")] or fnmatch.filter(known, name)
     if not found:
         groups = {"/".join(stream.split("/")[:n]) for stream in known for n in range(1, stream.count("/") + 1)}
-        raise UnknownNameError(f"No stream, group or pattern '{name}'{_nearest(name, [*known, *groups])}")
+        raise UnknownNameError(f"No stream, group or pattern '{name}'{did_you_mean(name, [*known, *sorted(groups)])}")
     return found
 
 

@@ -95,7 +95,7 @@ class _Rebuilt:
         for name in {*options, *self._optional}:
             rows = self.sim.model_field(name)
             rows[world] = field_of(self.sim.model, name)
-            values = options.get(name, rows[world])
+            values = options[name] if name in options else rows[world]
             rows[world] = np.where(np.isnan(values), rows[world], np.reshape(values, rows[world].shape))
         self._optional |= options.keys()
         if self._optional:
