@@ -185,7 +185,7 @@ def compile_closed(files: Mapping[str, bytes], about: str) -> mujoco.MjModel:
         if unknown := [name for name in _files_of(spec) if name not in members]:
             raise ValueError(f"it reads the file {unknown[0][:120]!r}, which is not in the archive")
         model = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise ValueError(f"{about}: MuJoCo {mujoco.__version__} cannot compile the model: {' '.join(str(error).split())}") from None
     check_compiled(model, about)
     return model
