@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model archives of strangers: bounded before they are decompressed, and compiled without any other file."""
+"""Untrusted model archives are bounded before they are decompressed, and compiled without any other file."""
 
 import io
 import struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a recording or a program writes into a model is checked against what it indexes, before MuJoCo or mjsense read it."""
+"""Values that a recording or a program writes into a model are checked against what they index, before MuJoCo or mjsense read it."""
 
 import re
 import shutil

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models of strangers: MJCF in a form in which MuJoCo reads the files of an archive and no others.
+"""MJCF of untrusted files in a form in which MuJoCo reads the files of an archive and no others.
 
 MuJoCo reads a file from disk if it is not among those in memory: when it parses (``include``, ``model``, ``flexcomp``) and when it compiles
 (meshes, textures, height fields, skins). Therefore the text that it gets is written here, from the elements that a strict XML parser has found:

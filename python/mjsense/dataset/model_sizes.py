@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the model of a stranger would allocate, counted from its MJCF before MuJoCo compiles it."""
+"""What an untrusted model would allocate, counted from its MJCF before MuJoCo compiles it."""
 
 from __future__ import annotations
 
