@@ -52,7 +52,7 @@ PHRASES = {
 RULES = [(re.compile(pattern, re.IGNORECASE), advice) for pattern, advice in PHRASES.items()]
 
 # Names and words of other languages that codespell takes for mistakes.
-SPELLED = "reacher,kinf,ot,lod,datas,shepperd,fro"
+SPELLED = "reacher,kinf,ot,lod,datas,shepperd,fro,nd"
 SPELLING = ["docs", "src", "python", "tools", "bench", "examples", "models", "cmake", "packaging", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
 SKIPPED = "*_test.cc,test_*.py,*.xml,*.png,*.jpg,*.svg,*.stl,*.obj,*.msh,*.npy,_core.pyi"  # tests misspell on purpose
 

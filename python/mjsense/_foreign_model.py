@@ -24,7 +24,7 @@ _NEW_SENSORS = {"mjSENS_TENDONACTFRC": 17, "mjSENS_INSIDESITE": 38, "mjSENS_CONT
 
 _DEFAULTS: dict[str, Any] = {
     "actuator_ctrlnum": 1, "actuator_outnum": 1, "actuator_historyadr": -1, "cam_output": 1, "dof_length": 1.0, "geom_castshadow": True,
-    "jnt_actuatorid": -1, "jnt_plasticadr": -1, "light_softness": 0.2, "sensor_historyadr": -1, "site_dataid": -1, "tendon_actuatorid": -1, "tendon_plasticadr": -1, "tex_contenttypeadr": -1,
+    "jnt_actuatorid": -1, "jnt_plasticadr": -1, "light_softness": 0.2, "light_texid": -1, "sensor_historyadr": -1, "site_dataid": -1, "tendon_actuatorid": -1, "tendon_plasticadr": -1, "tex_contenttypeadr": -1,
 }  # fmt: skip
 """Values of fields that older series lack; all others are 0."""
 

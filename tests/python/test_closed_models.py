@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model archives of strangers: bounded before they are decompressed, and compiled without any other file."""
+"""Untrusted model archives are bounded before they are decompressed, and compiled without any other file."""
 
 import io
 import struct
@@ -43,8 +43,8 @@ def test_files_of_an_archive(tmp_path):
     ({"../x": b""}, "not the name of a file inside"), ({"/x": b""}, "not the name of a file inside"), ({"a/./b": b""}, "not the name of a file inside"),
     ({"..\\x": b""}, "a character that"), ({"C:x": b""}, "a character that"), ({"a\nb": b""}, "a character that"), ({"d/": b""}, "not the name of a file"),
     ({"x" * 300: b""}, "has 300 characters"), ({info("l", 0o120777): b"/etc"}, "is a link"), ({info("f", 0o010644): b""}, "is a link, a folder or a device"),
-    ({"a": b"", "a/b": b""}, "'a' is both a file and a folder"), ({"zeros": bytes(80 << 20)}, "would grow from .* the limit is a factor of 100"),
-    ({f"z{i}": bytes(2 << 20) for i in range(40)}, "would grow from .* the limit is a factor of 100"),
+    ({"a": b"", "a/b": b""}, "'a' is both a file and a folder"), ({"zeros": bytes(65 << 20)}, "would grow from .* the limit is a factor of 100"),
+    ({f"z{i}": bytes(13 << 20) for i in range(5)}, "would grow from .* the limit is a factor of 100"),
 ], ids=str)  # fmt: skip
 def test_refused_members(tmp_path, files, why):
     with pytest.raises(ValueError, match=f"^the model archive .*a.zip cannot be read: .*{why}") as error:
@@ -138,7 +138,7 @@ def test_folders_of_the_compiler(tmp_path):
     (dict(text="<mujoco><size memory='900G'/></mujoco>"), "memory of 'size' is 900G, the limit is 2147483648 bytes"),
     (dict(text="<mujoco><size memory='x'/></mujoco>"), "expected|limit is a whole number"),
     (dict(text="<mujoco><size nkey='1000000000'/></mujoco>"), "nkey of 'size'"),
-    (dict(body="<replicate count='4000'><replicate count='4000'><geom size='.1'/></replicate></replicate>"), "number of elements after replicate"),
+    (dict(body="<replicate count='4000'><replicate count='4000'><geom size='.1'/></replicate></replicate>"), "number of copies by replicate is 16000000, the limit is 4000"),
     (dict(body="<composite type='cable' count='1000000 1 1'/>"), "number of elements after replicate"),
     (dict(asset="<hfield name='h' nrow='40000' ncol='40000' size='1 1 1 1'/>"), f"6400000000 bytes, the limit is {MAX_PIXELS}"),
     (dict(asset="<texture name='h' type='2d' builtin='flat' width='60000' height='60000'/>"), f"10800000000 bytes, the limit is {MAX_PIXELS}"),
@@ -147,11 +147,13 @@ def test_folders_of_the_compiler(tmp_path):
     (dict(asset="<mesh name='m' builtin='sphere' params='12'/>"), "params of the mesh 'm'"),
     (dict(text="<mujoco><default><texture width='60000' height='60000'/></default><asset><texture name='t' builtin='flat' type='2d'/></asset></mujoco>"), "the limit is"),
     (dict(text="<mujoco><custom><numeric name='n' size='1000000000'/></custom></mujoco>"), "size of 'numeric'"),
+    (dict(text="<mujoco><worldbody><replicate count='40'><geom size='.1'/></replicate></worldbody><sensor><clock/></sensor></mujoco>"), "is 40, the limit is 8 with sensors"),
+    (dict(text="<mujoco><actuator>" + "<muscle joint='j'/>" * 5000 + "</actuator></mujoco>"), "length ranges of muscles"),
     (dict(text="<mujoco><option iterations='2000000000'/></mujoco>"), "iterations of 'option'"),
     (dict(text="<mujoco><compiler><lengthrange inttotal='1e9'/></compiler></mujoco>"), "inttotal / timestep"),
     (dict(body="<camera name='c' resolution='9999999 2'/>"), "resolution of 'camera'"),
     (dict(body="<body>" * 300 + "<joint/>" * 1 + "</body>" * 300 + "".join("<body>" + "<joint/>" * 9000 + "</body>")), "inertia matrix"),
-], ids=range(16))  # fmt: skip
+], ids=range(18))  # fmt: skip
 def test_sizes_are_refused_before_they_are_allocated(given, why):
     with pytest.raises(ValueError, match=why) as error:
         closed(**given)

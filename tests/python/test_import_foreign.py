@@ -3,6 +3,8 @@
 
 import json
 import os
+import subprocess
+import sys
 import zipfile
 from fractions import Fraction
 
@@ -351,3 +353,12 @@ def test_short_and_empty_episodes_are_named(video, tmp_path):
         mjs.import_lerobot(lerobot(tmp_path / "one", video, length=1), tmp_path / "out")
     with pytest.raises(ValueError, match="no episode has rows"):
         mjs.import_lerobot(lerobot(tmp_path / "none", video, episode_value("length", 0)), tmp_path / "other")
+
+
+def test_values_that_are_not_numbers_are_kept_and_intact(video, tmp_path):
+    mjs.import_lerobot(lerobot(tmp_path / "set", video, row_value(STATE, [[float("nan"), 1.0]] * 6)), tmp_path / "out")
+    mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", change=replaced("obs/joint", np.full((5, 2), np.nan))), tmp_path / "out2")
+    for out, name in ((tmp_path / "out", "state"), (tmp_path / "out2", "joint")):
+        assert np.isnan(mjs.Dataset(out).episodes[0][f"obs/extra/observation/{name}"][:, 0]).all()
+        done = subprocess.run([sys.executable, "-m", "mjsense", "verify", out], capture_output=True, text=True)
+        assert done.returncode == 0 and "intact" in done.stdout, done.stdout + done.stderr

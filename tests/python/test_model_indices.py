@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a recording or a program writes into a model is checked against what it indexes, before MuJoCo or mjsense read it."""
+"""Values that a recording or a program writes into a model are checked against what they index, before MuJoCo or mjsense read it."""
 
 import re
 import shutil
@@ -34,6 +34,12 @@ def recorded(tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def worlds(recorded):
+    """A simulation of the archived model, as render and the viewer use it."""
+    return EpisodeWorlds(mjs.Dataset(recorded).episodes[0], 1)
+
+
 def edited(recorded, folder, edit):
     """A copy of the recording, whose group `replay` was edited; and its only episode."""
     shutil.copytree(recorded, folder)
@@ -51,20 +57,20 @@ def put(name, value):
     return edit
 
 
-def refuses(episode, message):
+def refuses(worlds, episode, message):
     """All readers of the model refuse the episode with the same line."""
     place = r"^episode 0 \(trajectories_batch_1_of_1\.h5, traj_0\): "
-    for call in (episode.model, lambda: check_episode(episode), lambda: EpisodeWorlds(episode, 1).begin(0, episode)):
+    for call in (episode.model, lambda: check_episode(episode), lambda: worlds.begin(0, episode)):
         with pytest.raises(ValueError, match=place + message) as error:
             call()
         assert "\n" not in str(error.value)
 
 
-def test_integers_are_refused(recorded, tmp_path):
+def test_integers_are_refused(recorded, worlds, tmp_path):
     model = mjs.Dataset(recorded).episodes[0].model()
     for i, name in enumerate(("geom_bodyid", "body_parentid", "jnt_qposadr", "mesh_face", "tex_adr", "M_colind", "name_bodyadr", "sensor_adr")):
         episode = edited(recorded, tmp_path / str(i), put(f"model/{name}", np.full_like(getattr(model, name), 9999999)))
-        refuses(episode, f"replay/model/{name}: no field of a model that may differ between episodes")
+        refuses(worlds, episode, f"replay/model/{name}: no field of a model that may differ between episodes")
 
 
 @pytest.mark.parametrize("name, index, value, message", [
@@ -75,10 +81,10 @@ def test_integers_are_refused(recorded, tmp_path):
     ("geom_size", (1, 0), -1.0, "values must be at least 0; .* is -1.0"), ("body_quat", (1, slice(None)), 0.0, "values must be quaternions"),
     ("bvh_aabb", (0, 4), -1.0, r"\[0, 4\]: is -1.0, expected a size of at least 0"),
 ], ids=str)  # fmt: skip
-def test_values_are_refused(recorded, tmp_path, name, index, value, message):
+def test_values_are_refused(recorded, worlds, tmp_path, name, index, value, message):
     values = np.array(getattr(mjs.Dataset(recorded).episodes[0].model(), name))
     values[index] = value
-    refuses(edited(recorded, tmp_path / "data", put(f"model/{name}", values)), f"replay/model/{name}.*{message}")
+    refuses(worlds, edited(recorded, tmp_path / "data", put(f"model/{name}", values)), f"replay/model/{name}.*{message}")
 
 
 @pytest.mark.parametrize("name, value, message", [
@@ -86,8 +92,8 @@ def test_values_are_refused(recorded, tmp_path, name, index, value, message):
     ("names", np.zeros(10, np.uint8), "no field of a model"), ("geom_size", np.zeros((2, 3)), r"is float64 \[2, 3\], expected float64 \["),
     ("geom_size", np.zeros((1, 1), "S5"), r"is \|S5 \[1, 1\], expected float64"), ("geom_matid", np.zeros(3), r"is float64 \[3\], expected int32"),
 ], ids=str)  # fmt: skip
-def test_other_fields_are_refused(recorded, tmp_path, name, value, message):
-    refuses(edited(recorded, tmp_path / "data", put(f"model/{name}", value)), f"replay/model/{name}: {message}")
+def test_other_fields_are_refused(recorded, worlds, tmp_path, name, value, message):
+    refuses(worlds, edited(recorded, tmp_path / "data", put(f"model/{name}", value)), f"replay/model/{name}: {message}")
 
 
 @pytest.mark.parametrize("name, value, message", [
@@ -103,9 +109,9 @@ def test_other_fields_are_refused(recorded, tmp_path, name, value, message):
     ("state", np.zeros((2, 10)), r"replay/state: is float64 \[2, 10\], expected float64 with 2 dimensions and 5 rows"),
     ("written", np.zeros((5, 3)), r"replay/written has the shape \[5, 3\], expected"),
 ], ids=str)  # fmt: skip
-def test_inputs_are_refused(recorded, tmp_path, name, value, message):
+def test_inputs_are_refused(recorded, worlds, tmp_path, name, value, message):
     value = value(mjs.Dataset(recorded).episodes[0].model()) if callable(value) else value
-    refuses(edited(recorded, tmp_path / "data", put(name, value)), message)
+    refuses(worlds, edited(recorded, tmp_path / "data", put(name, value)), message)
 
 
 # ---------------------------------------------------------------------------------------------- models of programs

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models of strangers: MJCF in a form in which MuJoCo reads the files of an archive and no others.
+"""MJCF of untrusted files in a form in which MuJoCo reads the files of an archive and no others.
 
 MuJoCo reads a file from disk if it is not among those in memory: when it parses (``include``, ``model``, ``flexcomp``) and when it compiles
 (meshes, textures, height fields, skins). Therefore the text that it gets is written here, from the elements that a strict XML parser has found:
@@ -185,7 +185,7 @@ def compile_closed(files: Mapping[str, bytes], about: str) -> mujoco.MjModel:
         if unknown := [name for name in _files_of(spec) if name not in members]:
             raise ValueError(f"it reads the file {unknown[0][:120]!r}, which is not in the archive")
         model = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise ValueError(f"{about}: MuJoCo {mujoco.__version__} cannot compile the model: {' '.join(str(error).split())}") from None
     check_compiled(model, about)
     return model

@@ -19,7 +19,7 @@ from mjsense._arguments import checked
 from mjsense._input_files import missing, read_text
 from mjsense._optional import optional
 from mjsense.dataset import foreign_values as foreign
-from mjsense.dataset.import_rows import OPTIONS, Rows, archive_of, compile_archive, unique_name
+from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
 from mjsense.dataset.model_sizes import image_size
 from mjsense.errors import UnknownNameError
@@ -461,6 +461,7 @@ class _Writer:
             names[place] = key
             what = "Action that led to this row; 0 in the first row." if key == "action" else f"Feature {key} of the data set."
             what += f" Numbers: {', '.join(feature.names)}." if len(feature.names) > 1 else ""
+            what += NOT_A_NUMBER if feature.dtype.startswith("float") else ""
             self._numbers[key] = streams.add(place, "float32" if feature.dtype == "float16" else feature.dtype, feature.shape, what)
         self._task = None
         if any(len(source.episodes[i].get("tasks") or []) > 1 for i in episodes):

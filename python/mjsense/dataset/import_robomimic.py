@@ -19,7 +19,7 @@ from mjsense import _libmujoco
 from mjsense._arguments import checked
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.hdf5 import open_h5
-from mjsense.dataset.import_rows import OPTIONS, Rows, archive_of, compile_archive, unique_name
+from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
 
 if TYPE_CHECKING:
@@ -263,6 +263,8 @@ class _Writer:
             raise ValueError(f"{demo.about}: {place} and {self._rows[name][1]} are the same camera '{name}'")
         if dtype == "float16":
             dtype = "float32"
+        if dtype.startswith("float") and "video" not in more:
+            description += NOT_A_NUMBER
         self._rows[name] = self._streams.add(name, dtype, shape, description, **more), place
 
     def write(self, number: int, demo: _Demonstration, scene: dict[str, Any]) -> None:

@@ -28,6 +28,8 @@ else:
     mujoco = _libmujoco.shared
 
 OPTIONS = FILE_OPTIONS | VIDEO_OPTIONS
+NOT_A_NUMBER = " NaN: as in the imported file."
+"""The end of the descriptions of its numbers."""
 _WRITTEN = "Values written into the previous state before this step; NaN: not written."
 
 

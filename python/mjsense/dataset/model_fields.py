@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjsense import _libmujoco
 from mjsense._mujoco import Joint
 from mjsense._options import PREFIX
 from mjsense._randomizable import field_of, is_randomizable, valid_values
@@ -128,8 +129,10 @@ def check_inputs(inputs: ReplayInputs, model: mujoco.MjModel, size: int, substep
     """
     found = inputs.state.shape[1]
     if found != size:
-        raise ValueError(f"{about}: the recorded state has {found} numbers, that of the model has {size}. "
+        raise ValueError(f"{about}: the recorded state has {found} numbers, that of MuJoCo {'.'.join(map(str, _libmujoco.SERIES))} has {size}. "
                          "Replay needs a MuJoCo of the series that recorded.")  # fmt: skip
+    if inputs.written.shape != inputs.state.shape:
+        raise ValueError(f"{about}: replay/written has the shape {[*inputs.written.shape]}, expected {[*inputs.state.shape]}")
     if not 0.51 <= substeps <= MAX_SUBSTEPS:
         raise ValueError(f"{about}: a row has {substeps:g} physics steps (policy_dt_ms, timestep), expected 1 to {MAX_SUBSTEPS}")
     for row, joint in enumerate(inputs.held.tolist()):

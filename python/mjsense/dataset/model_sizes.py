@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the model of a stranger would allocate, counted from its MJCF before MuJoCo compiles it."""
+"""What an untrusted model would allocate, counted from its MJCF before MuJoCo compiles it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,21 @@ MAX_ARENA = 2 << 30  # bytes
 MAX_PIXELS = 1 << 30  # bytes of all textures and height fields; 300 textures of 1024 x 1024 have this
 MAX_ELEMENTS = 300_000
 """After ``replicate`` and ``composite``."""
+MAX_COPIES, MAX_COPIES_WITH_SENSORS = 4000, 8
+"""By ``replicate``. MuJoCo 4.0.1 needs time that grows with their square and, with some sensors, doubles with each copy. It writes models without
+``replicate``, so that recordings have none."""
 MAX_NUMBERS = 50_000_000
 """Numbers of sparse matrices, keyframes, histories, user data and tables."""
 MAX_SUBSTEPS = 100_000
+MAX_LENGTH_WORK = 300_000_000
+"""Elements x steps that the compiler simulates to find the ranges of muscles. 80 muscles in a model of 500 elements take a quarter of it."""
 
 _FACTORS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
 _DOFS = {"free": 6, "ball": 3}
 _ACTUATORS = {"general", "motor", "position", "velocity", "intvelocity", "orientation", "pid", "damper", "cylinder", "muscle", "adhesion", "dcmotor", "plugin"}
 _LIMITS: dict[str, dict[str, int]] = {
     "option": dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints"), 10_000),
-    "size": {"njmax": 10_000_000, "nconmax": 1_000_000, "nstack": MAX_ARENA // 8, "nuserdata": 1_000_000, "nkey": 100_000},
+    "size": {"njmax": 10_000_000, "nconmax": 1_000_000, "nstack": MAX_ARENA // 8, "nuserdata": 1_000_000, "nkey": 10_000},
     "numeric": {"size": 1_000_000},
     "user": {"dim": 1_000_000},
     "contact": {"num": 10_000},
@@ -62,8 +67,10 @@ class _Sizes:
         self._check_options(root)
         self._check_images(root)
         self._check_meshes(root)
+        self._max_copies = MAX_COPIES_WITH_SENSORS if any(len(section) for section in root.iter("sensor")) else MAX_COPIES
         dofs = self._tree(root, 1, 0)
         self._check_tables(root, dofs)
+        self._check_muscles(root)
 
     def _fail(self, what: str, found: object, limit: object) -> None:
         raise ValueError(f"{self._about}: {what} is {found}, the limit is {limit}")
@@ -119,6 +126,15 @@ class _Sizes:
             if not 0 <= steps <= MAX_SUBSTEPS:
                 self._fail("inttotal / timestep of 'lengthrange'", f"{steps:g}", f"{MAX_SUBSTEPS} steps")
 
+    def _check_muscles(self, root: Element) -> None:
+        """The compiler simulates the model for each muscle without a length range."""
+        steps = 1000.0
+        for lengths in root.iter("lengthrange"):
+            steps = float(lengths.get("inttotal", "10")) / float(lengths.get("timestep", "0.01"))
+        muscles = sum("lengthrange" not in one.attrib for one in root.iter() if one.tag == "muscle" or "muscle" in (one.get("gaintype"), one.get("biastype")))
+        if (work := 2 * muscles * steps * self._elements) > MAX_LENGTH_WORK:
+            self._fail("the work for the length ranges of muscles (elements x steps)", f"{work:g}", MAX_LENGTH_WORK)
+
     def _check_images(self, root: Element) -> None:
         total = 0
         for element in root.iter():
@@ -157,6 +173,8 @@ class _Sizes:
         """
         if element.tag in ("replicate", "composite", "flexcomp"):
             copies *= max(1, self._value(element, "count", 1))
+            if element.tag == "replicate" and copies > self._max_copies:
+                self._fail("the number of copies by replicate", copies, f"{self._max_copies}{' with sensors' if self._max_copies < MAX_COPIES else ''}")
         self._elements += copies * (10 if element.tag in ("composite", "flexcomp") else 1)
         if self._elements > MAX_ELEMENTS:
             self._fail("the number of elements after replicate and composite", self._elements, MAX_ELEMENTS)

@@ -59,8 +59,6 @@ def inputs_of(episode: Episode) -> ReplayInputs:
     for name in ("state", "written"):
         if arrays[name] is None:
             raise ValueError(f"{where(episode)}: replay/{name} is missing")
-    if arrays["written"].shape != arrays["state"].shape:
-        raise ValueError(f"{where(episode)}: replay/written has the shape {[*arrays['written'].shape]}, expected {[*arrays['state'].shape]}")
     if arrays["held"] is None:
         arrays["held"] = np.zeros(0, np.int32)
     result = ReplayInputs(**arrays)
