@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Readers compare what they read with the checksums in the files, and what they hand out is nobody else's."""
+"""Readers compare what they read with the checksums in the files, and arrays that they return belong to the caller."""
 
 import shutil
 

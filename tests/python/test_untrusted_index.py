@@ -107,7 +107,7 @@ def test_an_index_that_unpacks_to_much_more(root, monkeypatch):
 
 @pytest.mark.parametrize("key", ["house_0/../../../../.bashrc", "house_0/../../ESCAPED", "house_0//x", "house_0/a/../../x", "house_0/./x"])
 def test_a_key_that_leaves_the_folder(root, tmp_path, key):
-    """Keys of object storage are texts: nothing of the folder is copied if one of them is no path inside of it."""
+    """Keys of object storage are texts: nothing of the folder is copied if one of them is not a path inside of it."""
     (tmp_path / "home").mkdir()
     (tmp_path / "home/.bashrc").write_text("mine")
     address = upload(root, "bucket", index_of([ROW]), {key: b"theirs"})

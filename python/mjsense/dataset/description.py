@@ -159,7 +159,7 @@ def named_file(settings: dict[str, Any]) -> str:
 
 
 def _checked_settings(what: str, settings: dict[str, Any]) -> dict[str, Any]:
-    """The settings, without those of other programs that have the name of one of ours. In a recording of ``mjs.record``, a wrong value is an error."""
+    """The settings, without those of other programs that have the name of a known setting. In a recording of ``mjs.record``, a wrong value is an error."""
     known = dict(settings)
 
     def check(key: str, value: Any, rule: tuple[Check, str], name: str = "") -> None:

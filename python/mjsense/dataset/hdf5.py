@@ -2,8 +2,8 @@
 """HDF5 files of recordings, which are not trusted: every object and value passes the checks of this module.
 
 Only hard links are followed, so nothing outside of the file is read. The type, shape and size of a dataset are checked before it is read.
-Chunks are unpacked here, because the HDF5 library reads beyond the end of one that is shorter than its shape says. What is read as a whole
-is compared with the checksum that it carries.
+Chunks are unpacked here, because the HDF5 library reads beyond the end of one that is shorter than its shape says. A dataset that is read as a
+whole is compared with its checksum.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ class Group:
         return f"{self._place}/{path}" if self._place else path
 
     def _links(self, path: str) -> str | None:
-        """What is wrong with a path: one of its links does not exist, or is no hard link. None: nothing."""
+        """The fault of a path: one of its links does not exist, or is not a hard link. None: it has none."""
         parts = path.split("/")
         if len(parts) > limits.GROUP_DEPTH or not all(parts) or "." in parts:
             return "does not exist"

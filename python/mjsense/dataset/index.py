@@ -88,6 +88,6 @@ def checked_row(path: Path | str, number: int, row: Any) -> dict[str, Any]:
             raise ValueError(f"{what}: {name} is '{printable(str(row[name])[:100])}'; it must have the form {shown}")
     for name in ("outcome", "task"):
         if not isinstance(row[name], (str, type(None))):
-            raise ValueError(f"{what}: {name} is no text")
+            raise ValueError(f"{what}: {name} is not a text")
         row[name] = row[name] or ""
     return row

@@ -48,7 +48,7 @@ def decode(rows: np.ndarray, what: str = "a row") -> dict[str, tuple[np.ndarray,
         what: What has the rows, for errors.
 
     Raises:
-        ValueError: A row is no JSON object, the name of a leaf is no plain name, or there are too many leaves.
+        ValueError: A row is not a JSON object, the name of a leaf is not a plain name, or there are too many leaves.
     """
     columns: dict[str, tuple[list[int], list[Any]]] = {}
     for t, row in enumerate(rows):

@@ -191,7 +191,7 @@ class Video:
         return self._info.path
 
     def check(self) -> None:
-        """Raises an error if the file is missing, is no regular file, or differs from what was recorded: for a program that copies it."""
+        """Raises an error if the file is missing, is not a regular file, or differs from what was recorded: for a program that copies it."""
         with open_plain(self.path) as file:
             check_sum(file, self._info.crc, str(self.path))
 

@@ -16,7 +16,7 @@ struct ListedStream {
 };
 [[nodiscard]] std::vector<ListedStream> listed_places(const nlohmann::json& description);
 
-// What is wrong with the values that readers use, one sentence each: "whose fps is \"1/0\", ...".
+// Faults of the values that readers use, one sentence each: "whose fps is \"1/0\", ...".
 [[nodiscard]] std::vector<std::string> description_faults(const nlohmann::json& description);
 
 }  // namespace mjsense::replay
