@@ -2,7 +2,8 @@
 """mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
 The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
-another robosuite, build/mjlab and build/warp. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp makes them.
+another robosuite, build/mjlab, build/warp and build/programs. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,programs makes them.
+MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco and tonyzhaozh/act, whose programs are run.
 """
 
 import os
@@ -40,6 +41,20 @@ PACKAGES = {
     ),
     "mjlab": ("mjlab==1.6.0", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
     "warp": ("mujoco==4.0.0", "mujoco-warp==4.0.0", "gymnasium==1.4.0", "nanobind-backend>=1.0"),
+    "programs": (
+        "mujoco==3.8.1",
+        "dm_control==1.0.41",
+        "gym-hil==0.1.13",
+        "gymnasium==1.4.0",
+        "h5py",
+        "ipython",
+        "matplotlib",
+        "nanobind-backend>=1.0",
+        "pygments",
+        "PyOpenGL",
+        "pyquaternion",
+        "scipy",
+    ),
 }
 """Name -> packages of the environments."""
 
@@ -120,6 +135,28 @@ def test_code_of_the_page_on_mujoco_warp_gives_the_same_with_both_renderers(envi
 
 def test_code_of_the_page_on_mjlab_gives_the_same_with_mjlab_itself(environment):
     run(environment("mjlab"), Path(__file__).parent / "adapters/mjlab_page.py", ROOT / "docs/mjlab.md")
+
+
+def test_gym_hil(environment):
+    run(environment("programs"), Path(__file__).parent / "adapters/gym_hil_images.py")
+
+
+def checkout(path):
+    root = os.environ.get("MJSENSE_TEST_PROGRAMS")
+    if root is None or not Path(root, path).exists():
+        pytest.skip(f"needs the file {path} in the folder $MJSENSE_TEST_PROGRAMS, in a checkout of the repository on GitHub")
+    return Path(root, path)
+
+
+def test_recorder_of_act(environment):
+    folder = checkout("act/record_sim_episodes.py").parent
+    run(environment("programs"), Path(__file__).parent / "adapters/act_recorder.py", folder)
+
+
+@pytest.mark.parametrize("name", ["tutorial", "mjspec"])
+def test_notebooks_of_mujoco(environment, name):
+    notebook = checkout(f"mujoco/python/{name}.ipynb")
+    run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", notebook, "30", notebook.parents[1])
 
 
 def test_every_page_is_tested():
