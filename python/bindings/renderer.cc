@@ -139,6 +139,8 @@ struct BoundRenderer {
     set_rgb(from["fog_rgb"], out.fog.rgb);
     out.line_width = nb::cast<float>(from["line_width"]);
     out.projected_textures = nb::cast<bool>(from["projected_textures"]);
+    out.point_lights_at_camera = nb::cast<bool>(from["point_lights_at_camera"]);
+    out.sized_soft_textures = nb::cast<bool>(from["sized_soft_textures"]);
     return out;
   }
 
@@ -147,8 +149,9 @@ struct BoundRenderer {
     render::SceneMemory scene = memory;
     scene.num_geoms = num_geoms;
     scene.num_lights = num_lights;
-    bool* const all[] = {&scene.shadow, &scene.reflection,    &scene.skybox,     &scene.haze,
-                         &scene.fog,    &scene.flex_vertices, &scene.flex_edges, &scene.flex_skin};
+    bool* const all[] = {&scene.shadow,     &scene.reflection, &scene.skybox,
+                         &scene.haze,       &scene.fog,        &scene.flex_vertices,
+                         &scene.flex_edges, &scene.flex_skin,  &scene.point_lights};
     for (std::size_t i = 0; i < std::size(all); ++i) *all[i] = nb::cast<bool>(flags[i]);
     render::ImageTargets targets;
     targets.rgb = reinterpret_cast<std::uint8_t*>(rgb);

@@ -147,13 +147,14 @@ class Renderer:
         self._batch_guard = OneThread("")
         self._warned: set[str] = set()
         self._mujoco = mujoco
+        self._version = tuple(int(x) for x in mujoco.mj_versionString().split(".")[:2])
         self._model = model
         self._height, self._width = int(height), int(width)
         self._scene = scene
         self._scene_option = mujoco.MjvOption()
         self._fixed_camera = -1
         """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
-        self._depth = self._segmentation = False
+        self._depth = self._segmentation = self._point_lights = False
         self._sizes = self._sizes_of(model)
         flag = mujoco.mjtRndFlag
         self._flags = {name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)}
@@ -182,7 +183,9 @@ class Renderer:
             "fog_rgb": tuple(float(x) for x in rgba.fog[:3]),
             "line_width": float(model.vis.global_.linewidth),
             # 3.12 wraps 2D textures around spheres, cylinders and so on, and repeats those of meshes; earlier versions project them along z.
-            "projected_textures": tuple(int(x) for x in self._mujoco.mj_versionString().split(".")[:2]) < (3, 12),
+            "projected_textures": self._version < (3, 12),
+            "point_lights_at_camera": self._version < (3, 12),
+            "sized_soft_textures": self._version < (3, 13),
         }
         # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.
         geoms = self._mujoco.MjvScene.geoms.fget(scene)
@@ -208,6 +211,16 @@ class Renderer:
     def scene(self) -> mujoco.MjvScene:
         """The abstract scene of the last ``update_scene``. Geoms that are added to it, or edited, appear in the image."""
         return self._scene
+
+    @property
+    def point_lights(self) -> bool:
+        """Whether lights of type ``point`` shine from their position, as in the cameras of scenes, without attenuation. False, the default: as in MuJoCo's
+        OpenGL renderer, which draws point and image lights as lights at the camera before 3.12, and not at all from 3.12 on."""
+        return self._point_lights
+
+    @point_lights.setter
+    def point_lights(self, value: bool) -> None:
+        self._point_lights = bool(value)
 
     @property
     def height(self) -> int:
@@ -408,6 +421,7 @@ class Renderer:
         def draw(pool: _Pool, index: int) -> None:
             renderer = pool.take()
             try:
+                renderer._point_lights = self._point_lights
                 renderer._update(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
             except ValueError as error:
@@ -465,6 +479,7 @@ class Renderer:
             self._check_scene(flags)
         shown = [bool(flags[name]) for name in _SHOWN]
         shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
+        shown.append(self._point_lights)
         images = [image for image in (rgb, depth, segmentation) if image is not None]
         height, width = images[0].shape[:2] if images else (self._height, self._width)
         memory = [0 if image is None else _scene_layout.address(image) for image in (rgb, depth, segmentation)]

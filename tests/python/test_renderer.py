@@ -442,3 +442,44 @@ def test_a_scene_whose_class_has_only_the_geoms_in_use_is_drawn():
     renderer = mjs.Renderer.of_scene(model, scene, 60, 80)
     mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
     np.testing.assert_array_equal(renderer.render(), image_of(model, data, 0))
+
+
+POINT = """<mujoco><visual><headlight {head}/><quality shadowsize="0" offsamples="0"/></visual><statistic extent="2" center="0 0 0"/>
+<asset><texture name="sky" type="cube" builtin="flat" width="8" height="8"/></asset><worldbody>{light}<camera name="view" pos="0 -1.5 1.5" xyaxes="1 0 0 0 .7 .7"/><geom type="plane" size="2 2 .1"/><geom size=".2" pos=".3 0 .3"/></worldbody></mujoco>"""
+OFF = 'ambient="0 0 0" diffuse="0 0 0" specular="0 0 0"'
+
+
+def point_lit(light, head=OFF, version=None, drawn=False):
+    model, data = load(POINT.format(head=head, light=light))
+    with mjs.Renderer(model, 60, 80) as renderer:
+        if version:
+            renderer._version = version
+            renderer._native = renderer._make_native()
+        renderer.point_lights = drawn
+        renderer.update_scene(data, "view")
+        return renderer.render()
+
+
+@pytest.mark.parametrize("kind", ["point", "image"])
+def test_point_and_image_lights_follow_the_version_of_mujoco(kind):
+    if not hasattr(mujoco.MjModel, "light_type"):
+        pytest.skip("this version has no such lights")
+    sky = 'texture="sky"' if kind == "image" else ""
+    light = f'<light type="{kind}" {sky} pos="0 0 1" diffuse=".7 .7 .7" specular=".3 .3 .3"/>'
+    assert not point_lit(light, version=(3, 12)).any()
+    at_camera = point_lit("", head='ambient="0 0 0" diffuse=".7 .7 .7" specular=".3 .3 .3"')
+    np.testing.assert_array_equal(point_lit(light, version=(3, 11)), at_camera)
+
+
+def test_point_lights_are_drawn_on_request():
+    if not hasattr(mujoco.MjModel, "light_type"):
+        pytest.skip("this version has no such lights")
+    light = '<light type="point" pos="0 0 1"/>'
+    drawn = point_lit(light, drawn=True)
+    camera = mjs.CameraSensorCfg(name="camera", camera_name="view", width=80, height=60)
+    scene = mjs.Scene(mjs.SceneCfg(base=POINT.format(head=OFF, light=light), sensors=(camera,)))
+    sim = mjs.Simulation(scene)
+    sim.reset()
+    assert drawn.max() > 60
+    assert np.abs(drawn.astype(int) - scene["camera"].data.rgb[0]).max() <= 2
+    sim.close()

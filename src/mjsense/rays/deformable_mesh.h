@@ -20,6 +20,7 @@ class DeformableMesh {
   void* add_part(RTCDevice device, std::span<const int> faces);
 
   std::span<float> vertices() { return {vertices_.data(), vertices_.size() - 1}; }  // [V, 3]
+  std::span<const float> vertices() const { return {vertices_.data(), vertices_.size() - 1}; }
   // Call after writing vertices(). The cost is linear in the number of faces (0.02 ms for 3400),
   // and Embree makes one small allocation.
   void refit();

@@ -57,7 +57,8 @@ void FlexShapes::add_sheets(RTCDevice device, Flex& flex) {
     const std::span<const int> faces(s.faces.data() + 3 * p.first, 3 * p.count);
     void* scene = s.parts.size() == 1 ? scenes_.back() : flex.mesh.add_part(device, faces);
     const float* normals = flex.normals.empty() ? nullptr : flex.normals.data() + 9 * p.first;
-    parts_.push_back({static_cast<int>(flexes_.size()) - 1, p.element, -1, scene, normals});
+    parts_.push_back({static_cast<int>(flexes_.size()) - 1, p.element, -1, scene, normals,
+                      flex.mesh.vertices().data(), faces.data()});
   }
 }
 
@@ -68,8 +69,8 @@ void FlexShapes::add_capsules(RTCDevice device, Flex& flex) {
   if (!s.edges.empty() && flex.radius > 0) flex.capsules = capsule_scene(device, flex.ends);
   scenes_.push_back(flex.capsules.get());
   for (const FlexSurface::Part& p : s.parts)
-    parts_.push_back(
-        {static_cast<int>(flexes_.size()) - 1, p.element, -1, scenes_.back(), nullptr});
+    parts_.push_back({static_cast<int>(flexes_.size()) - 1, p.element, -1, scenes_.back(), nullptr,
+                      nullptr, nullptr});
 }
 
 void FlexShapes::update(const mjModel* m, const mjData* d) {

@@ -38,6 +38,8 @@ class FlexShapes {
     void* scene;        // RTCScene; null: nothing to draw
     // [faces, 3 corners, 3] unit; null for dimension 1, and if the model has no cameras.
     const float* normals;
+    const float* positions;  // of the flex's surface vertices, m; null for dimension 1
+    const int* faces;        // [faces, 3] of them
   };
   std::span<const Part> parts() const { return parts_; }
 

@@ -9,6 +9,13 @@
 namespace mjsense::rays {
 namespace {
 
+// The elements of the geoms that were hit, -1 in other lanes. A gather reads geom 0 for the lanes
+// without a hit, and a scene without geoms has none.
+Int of_geoms(const int* elements, Mask hit, Int geom) {
+  if (!any(hit)) return int_of(-1);
+  return select(hit, gather(elements, select(hit, geom, int_of(0))), int_of(-1));
+}
+
 void rows(const RayPacket& rays, float nearest, float farthest, const int* bodies,
           const int* materials, HitPacket& hits, RayOutputs& out) {
   for (int k = 0; k < kPacket; k += kWidth) {
@@ -28,9 +35,8 @@ void rows(const RayPacket& rays, float nearest, float farthest, const int* bodie
     store_rows(out.pos + 3 * k, pos[0], pos[1], pos[2]);
     store_rows(out.normal + 3 * k, normal[0], normal[1], normal[2]);
     if (bodies == nullptr) continue;
-    const Int at = select(hit, geom, int_of(0));
-    store(out.body + k, select(hit, gather(bodies, at), int_of(-1)));
-    store(out.material + k, select(hit, gather(materials, at), int_of(-1)));
+    store(out.body + k, of_geoms(bodies, hit, geom));
+    store(out.material + k, of_geoms(materials, hit, geom));
   }
 }
 
@@ -42,6 +48,10 @@ void returns(const LocalPacket& local, const RayPacket& rays, const HitPacket& h
     const Float t = select(hit, load(hits.t + k), Float(0.0f));
     store_rows(out.point + 3 * k, t * load(local.d[0] + k), t * load(local.d[1] + k),
                t * load(local.d[2] + k));
+    if (!any(hit)) {  // see of_geoms
+      store(out.intensity + k, Float(0.0f));
+      continue;
+    }
     const auto part = [&](int i) { return rounded(load(rays.d[i] + k) * load(hits.n[i] + k)); };
     const Float cosine = abs(part(0) + part(1) + part(2));
     const Int at = select(hit, geom, int_of(0)) * int_of(4);

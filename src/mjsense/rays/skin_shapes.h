@@ -33,7 +33,11 @@ class SkinShapes {
   // The skin's frame (at the first bone, world axes) and bounding box. Its type is kSkinType.
   const RayGeom& geom(int skin) const { return skins_[skin].geom; }
   const float* normals(int skin) const { return skins_[skin].normals.data(); }  // [F, 3 corners, 3]
-  void* scene(int skin) const { return skins_[skin].mesh.scene(); }             // RTCScene
+  std::span<const float> positions(int skin) const { return skins_[skin].mesh.vertices(); }
+  const int* faces(int skin) const {  // [F, 3] vertices
+    return model_->skin_face + 3 * model_->skin_faceadr[skin];
+  }
+  void* scene(int skin) const { return skins_[skin].mesh.scene(); }  // RTCScene
 
  private:
   struct Skin {

@@ -17,6 +17,14 @@ void add_sun(mjSpec* spec) {
   std::ranges::copy(dir, sun->dir);
 }
 
+// A light that belongs to the place: a directional one, or one that is fixed in the world. Lights on
+// bodies and lights that follow a body come with a robot and leave its surroundings dark.
+bool lights_the_place(mjSpec* spec, mjsElement* element) {
+  const mjsLight* light = mjs_asLight(element);
+  if (light->type == mjLIGHT_DIRECTIONAL) return true;
+  return light->mode == mjCAMLIGHT_FIXED && mjs_getParent(element) == mjs_findBody(spec, "world");
+}
+
 bool is_sky(mjsElement* texture) { return mjs_asTexture(texture)->type == mjTEXTURE_SKYBOX; }
 
 void add_texture(mjSpec* spec, const char* name, mjtTexture type, mjtBuiltin pattern,
@@ -53,7 +61,9 @@ void set_sky(mjSpec* spec, const char* name, const Rgb3& top, const Rgb3& bottom
 }
 
 void add_daylight(mjSpec* spec) {
-  if (spec_elements(spec, mjOBJ_LIGHT).empty()) add_sun(spec);
+  if (std::ranges::none_of(spec_elements(spec, mjOBJ_LIGHT),
+                           [&](mjsElement* light) { return lights_the_place(spec, light); }))
+    add_sun(spec);
   if (std::ranges::none_of(spec_elements(spec, mjOBJ_TEXTURE), is_sky))
     set_sky(spec, "terrain_sky", kSkyTop, kSkyBottom);
   mjsElement* ground = mjs_findElement(spec, mjOBJ_GEOM, "terrain");

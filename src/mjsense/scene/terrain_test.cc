@@ -226,6 +226,20 @@ TEST(Terrain, DaylightAddsMissingElements) {
     EXPECT_EQ(scene.model()->nmat, 0);
   }
   cfg.spec_fn = {};
+  // Lights that a robot carries or that follow it do not replace the sun; a lamp of the room does.
+  const auto lights = [&](const std::string& lamp, const std::string& torch) {
+    SceneCfg with = cfg;
+    with.entities.emplace_back(
+        "robot",
+        EntityCfg{.model = {.xml = "<mujoco><worldbody>" + lamp + "<body name='b'>" + torch +
+                                   "<freejoint/><geom size='.1'/></body></worldbody></mujoco>"}});
+    return Scene(with).model()->nlight;
+  };
+  EXPECT_EQ(lights("<light mode='trackcom' pos='0 0 2'/>", ""), 2);
+  EXPECT_EQ(lights("<light mode='targetbody' target='b' pos='0 0 2'/>", ""), 2);
+  EXPECT_EQ(lights("", "<light pos='0 0 2'/>"), 2);
+  EXPECT_EQ(lights("", "<light type='directional'/>"), 1);
+  EXPECT_EQ(lights("<light pos='0 0 2'/>", ""), 1);
   cfg.terrain->daylight = false;
   const Scene scene(cfg);
   EXPECT_EQ(scene.model()->nlight + scene.model()->ntex + scene.model()->nmat, 0);

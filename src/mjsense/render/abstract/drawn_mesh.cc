@@ -68,7 +68,7 @@ void DrawnMesh::prepare_surface(bool coordinates) {
   if (tables_ && (surface_.uvs || !coordinates || !has_coordinates())) return;
   check_mesh_indices(*model_, mesh_);
   tables_ = hull_ ? hull_tables(coordinates) : mesh_tables(model_, mesh_, coordinates);
-  surface_ = tables_->surface();
+  surface_ = tables_->surface(vertices_.data(), faces_.data());
 }
 
 // Hulls are shaded flat.
@@ -88,10 +88,8 @@ std::shared_ptr<const MeshTables> DrawnMesh::hull_tables(bool coordinates) const
     for (int corner = 0; corner < 3; ++corner)
       for (float x : n) tables->normals.push_back(length > 0 ? x / std::sqrt(length) : 0);
   }
-  if (coordinates && has_coordinates()) {
-    const float* texcoord = model_->mesh_texcoord + 2 * model_->mesh_texcoordadr[mesh_];
-    add_coordinates(*tables, num_faces, vert, faces_.data(), texcoord, faces_.data());
-  }
+  if (coordinates && has_coordinates())
+    tables->add_coordinates(model_->mesh_texcoord + 2 * model_->mesh_texcoordadr[mesh_], faces_);
   return tables;
 }
 

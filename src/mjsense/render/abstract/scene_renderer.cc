@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <numeric>
 #include <tuple>
 
 #include "mjsense/core/error.h"
@@ -18,7 +19,7 @@ namespace mjsense::render {
 namespace {
 
 constexpr float kEndless = 1e30f;
-constexpr int kSpot = 0, kDirectional = 1;  // mjtLightType, the same in all versions
+constexpr int kSpot = 0, kDirectional = 1, kPoint = 2;  // mjtLightType, the same in all versions
 
 bool finite(std::span<const float> values) {
   return std::ranges::all_of(values, [](float x) { return std::isfinite(x); });
@@ -54,7 +55,8 @@ void set_unrotated(rays::RayGeom& shape) {
 struct SceneRenderer::Soft {
   rays::DeformableMesh mesh;
   std::vector<float> vertices;  // those that the mesh has
-  std::vector<float> normals, density;
+  std::vector<float> normals;
+  std::vector<int> faces;  // of a flex: its corners in order
   MeshSurface surface;
   int num_faces = 0;
   float box[6];
@@ -111,7 +113,8 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                             {settings_.haze_rgb[0], settings_.haze_rgb[1], settings_.haze_rgb[2]}},
                     .haze = scene.haze,
                     .fog = scene.fog ? settings_.fog : Fog{},
-                    .projected_textures = settings_.projected_textures};
+                    .projected_textures = settings_.projected_textures,
+                    .sized_soft_textures = settings_.sized_soft_textures};
     const View& built = builder_->build(view, position_, rotation_, grid_);
     kept_.render(built, images, tiles_, memory_->scratch());
   };
@@ -393,9 +396,9 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
   if (!place || place->num_faces != count) {
     place = std::make_unique<Soft>();
     place->num_faces = count;
-    std::vector<int> faces(3 * static_cast<std::size_t>(count));
-    for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = static_cast<int>(i);
-    place->mesh = rays::DeformableMesh(device_.get(), faces, now);
+    place->faces.resize(3 * static_cast<std::size_t>(count));
+    std::iota(place->faces.begin(), place->faces.end(), 0);
+    place->mesh = rays::DeformableMesh(device_.get(), place->faces, now);
     rays::box_around(now, place->box);
   } else if (!std::ranges::equal(now, place->mesh.vertices())) {
     std::ranges::copy(now, place->mesh.vertices().begin());
@@ -403,17 +406,10 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
     rays::box_around(now, place->box);
   }
   Soft& soft = *place;
-  soft.surface.normals = soft_.flexnormal + 9 * start;
-  soft.surface.uvs = nullptr;
-  if (geom.texcoord && drawn.texture) {
-    soft.surface.uvs = soft_.flextexcoord + 6 * start;
-    MeshTables tables;
-    std::vector<int> order(3 * static_cast<std::size_t>(count));
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-    add_coordinates(tables, count, vertices, order.data(), soft.surface.uvs, order.data());
-    soft.density = std::move(tables.density);
-    soft.surface.density = soft.density.data();
-  }
+  soft.surface = {.normals = soft_.flexnormal + 9 * start,
+                  .uvs = geom.texcoord && drawn.texture ? soft_.flextexcoord + 6 * start : nullptr,
+                  .positions = soft.mesh.vertices().data(),
+                  .faces = soft.faces.data()};
   std::copy_n(soft.box, 3, shape.center);
   std::copy_n(soft.box + 3, 3, shape.half);
   drawn.bvh = soft.mesh.scene();
@@ -447,8 +443,7 @@ void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
     for (int i = 0; i < 3 * num_faces; ++i)
       std::copy_n(normals + 3 * faces[i], 3, &soft.normals[3 * static_cast<std::size_t>(i)]);
   }
-  soft.surface = assets_.skin(id);
-  soft.surface.normals = soft.normals.data();
+  soft.surface = {soft.normals.data(), assets_.skin(id).uvs, soft.mesh.vertices().data(), faces};
   rays::RayGeom& shape = drawn.shape;
   std::copy_n(soft.box, 3, shape.center);
   std::copy_n(soft.box + 3, 3, shape.half);
@@ -483,15 +478,21 @@ static void limit_shadows(const SceneSettings& settings, float cutoff, ViewLight
   }
 }
 
-// As in OpenGL, only the first lights are used, and lights of other types than spot and directional
-// have no effect.
+// As in OpenGL, only the first lights are used. MuJoCo's renderer does not set the position of lights of
+// other types than spot and directional, so that it is OpenGL's default: the camera's direction.
 void SceneRenderer::read_lights(const SceneMemory& scene) {
   lights_.clear();
   for (int i = 0; i < std::min(scene.num_lights, kClassicLights); ++i) {
     AbstractLight light;
     light_reader_.read(scene.lights + i * scene.light_stride, light);
-    const bool directional = light.type < 0 ? light.directional != 0 : light.type == kDirectional;
-    if (!directional && light.type > kSpot) continue;
+    bool directional = light.type < 0 ? light.directional != 0 : light.type == kDirectional;
+    const bool drawn_point = scene.point_lights && light.type == kPoint;
+    if (!directional && light.type > kSpot && !drawn_point) {
+      if (!settings_.point_lights_at_camera) continue;
+      directional = true;
+      light.castshadow = 0;
+      for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(-rotation_[3 * k + 2]);
+    }
     if (!finite(light.pos) || !finite(light.dir) || !finite(light.ambient) ||
         !finite(light.diffuse) || !finite(light.specular) || !finite(light.attenuation))
       throw ValueError(
@@ -506,12 +507,12 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
     std::copy_n(light.diffuse, 3, out.diffuse);
     std::copy_n(light.specular, 3, out.specular);
     out.attenuation[0] = 1;
-    if (out.shadows) limit_shadows(settings_, light.cutoff, out);
+    if (out.shadows && !drawn_point) limit_shadows(settings_, light.cutoff, out);
     if (directional) continue;
-    std::copy_n(light.attenuation, 3, out.attenuation);
+    if (!drawn_point) std::copy_n(light.attenuation, 3, out.attenuation);  // MuJoCo leaves it at 0
     out.exponent = light.exponent;
     out.cos_cutoff = static_cast<float>(std::cos(light.cutoff * std::numbers::pi / 180));
-    if (light.cutoff >= 180) out.kind = LightKind::kPoint;
+    if (drawn_point || light.cutoff >= 180) out.kind = LightKind::kPoint;
   }
 }
 

@@ -25,8 +25,12 @@ struct SceneSettings {
   float shadow_near = 0;                    // m
   float haze_width = 0, haze_rgb[3] = {};
   Fog fog;
-  float line_width = 1;             // pixels
-  bool projected_textures = false;  // DrawnScene::projected_textures
+  float line_width = 1;              // pixels
+  bool projected_textures = false;   // DrawnScene::projected_textures
+  bool sized_soft_textures = false;  // DrawnScene::sized_soft_textures
+  // As in MuJoCo before 3.12, a point or image light shines from the camera's direction. Later
+  // versions do not draw it.
+  bool point_lights_at_camera = false;
 };
 
 // Arrays of an mjvScene that hold flexes and skins; null if there are none.
@@ -52,6 +56,7 @@ struct SceneMemory {
   const char* cameras[2];
   bool shadow, reflection, skybox, haze, fog;  // flags mjRND_*
   bool flex_vertices, flex_edges, flex_skin;
+  bool point_lights;  // draw point lights at their position, unlike MuJoCo
 };
 
 class SceneRenderer {

@@ -27,7 +27,7 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
     // MuJoCo rotates the skybox by 90 degrees about x.
     Rgb color{zero, zero, zero};
     if (view.skybox)
-      color = sample_cube(*view.skybox, m, {w.x, w.z, -w.y},
+      color = sample_cube(*view.skybox, m, CubeFace({w.x, w.z, -w.y}),
                           splat(0.5f * step * view.skybox->width[0]));
     const Float scale = splat(1.0f / 255);
     const Float parts[3] = {color.r * scale, color.g * scale, color.b * scale};

@@ -70,32 +70,107 @@ inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixe
   return {step(n.x, one, zero, view.grid.dx), step(n.y, zero, one, view.grid.dy)};
 }
 
-// Texture coordinates that are computed by scalar code: those of meshes and of curved primitives.
+inline Vec3f load3(const float (*p)[kLanes], int k) {
+  return {load(p[0] + k), load(p[1] + k), load(p[2] + k)};
+}
+
+// What scalar code computes for each lane: the normals of a mesh's faces, and texture coordinates on
+// meshes and curved primitives.
 struct alignas(64) Mapped {
+  float n[3][kLanes];  // unit, geom frame
   float u[kLanes], v[kLanes];
-  float rate_u[kLanes], rate_v[kLanes];  // rates of change, per metre
+  float du[3][kLanes], dv[3][kLanes];  // LaneCoordinates
+
+  void set_normal(int lane, const float* from) {
+    for (int k = 0; k < 3; ++k) n[k][lane] = from[k];
+  }
+  void set(int lane, const LaneCoordinates& at) {
+    u[lane] = at.u;
+    v[lane] = at.v;
+    for (int k = 0; k < 3; ++k) {
+      du[k][lane] = at.du[k];
+      dv[k][lane] = at.dv[k];
+    }
+  }
+  Coordinates coordinates(int k) const {
+    return {load(u + k), load(v + k), load3(du, k), load3(dv, k)};
+  }
 };
 
-inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
-                      const float (*local)[kLanes], const float (*normal)[kLanes], Mapped& out) {
-  for (int i = 0; i < kLanes; ++i) {
-    out.u[i] = out.v[i] = out.rate_u[i] = out.rate_v[i] = 0;
-    if (!(lanes >> i & 1u)) continue;
+// The plane of a triangle: its unit normal, and the gradients of the barycentric coordinates of its
+// second and third corner.
+struct FacePlane {
+  float n[3], second[3], third[3];
+
+  FacePlane(const MeshSurface& mesh, int face) {
+    const int* corners = mesh.faces + 3 * face;
+    const float* p[3];
+    for (int i = 0; i < 3; ++i) p[i] = mesh.positions + 3 * corners[i];
+    float a[3], b[3];
+    for (int k = 0; k < 3; ++k) {
+      a[k] = p[1][k] - p[0][k];
+      b[k] = p[2][k] - p[0][k];
+    }
+    cross(a, b, n);
+    const float square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    const float inverse = square > 0 ? 1 / square : 0, length = __builtin_sqrtf(inverse);
+    cross(b, n, second);
+    cross(n, a, third);
+    for (int k = 0; k < 3; ++k) {
+      second[k] *= inverse;
+      third[k] *= inverse;
+      n[k] *= length;
+    }
+  }
+
+  static void cross(const float* a, const float* b, float* out) {
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      out[k] = a[i] * b[j] - a[j] * b[i];
+    }
+  }
+};
+
+inline void map_mesh(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, Mapped& out) {
+  const MeshSurface& mesh = *g.mesh;
+  for (std::uint32_t todo = lanes; todo;) {
+    const int face = hits.prim[__builtin_ctz(todo)];
+    const FacePlane plane(mesh, face);
+    LaneCoordinates at{};
+    const float* uv = nullptr;
     if (g.surface.mapped) {
-      const float* uv = g.mesh->uvs + 6 * hits.prim[i];
+      uv = mesh.uvs + 6 * face;
+      for (int k = 0; k < 3; ++k) {
+        at.du[k] = plane.second[k] * (uv[2] - uv[0]) + plane.third[k] * (uv[4] - uv[0]);
+        at.dv[k] = plane.second[k] * (uv[3] - uv[1]) + plane.third[k] * (uv[5] - uv[1]);
+      }
+    }
+    for (std::uint32_t rest = todo; rest; rest &= rest - 1) {
+      const int i = __builtin_ctz(rest);
+      if (hits.prim[i] != face) continue;
+      todo &= ~(1u << i);
+      out.set_normal(i, plane.n);
+      if (!uv) continue;
       const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
-      out.u[i] = b0 * uv[0] + b1 * uv[2] + b2 * uv[4];
-      out.v[i] = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
-      out.rate_u[i] = out.rate_v[i] = g.mesh->density[hits.prim[i]];
-    } else {
-      const float p[3] = {local[0][i], local[1][i], local[2][i]};
-      const float n[3] = {normal[0][i], normal[1][i], normal[2][i]};
-      curved_uv(g, p, n, out.u[i], out.v[i], out.rate_u[i], out.rate_v[i]);
+      at.u = b0 * uv[0] + b1 * uv[2] + b2 * uv[4];
+      at.v = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
+      out.set(i, at);
     }
   }
 }
 
-// Samples the texture for `lanes`, which all show geom g.
+inline void map_curved(const ViewGeom& g, std::uint32_t lanes, const float (*local)[kLanes],
+                       const float (*normal)[kLanes], Mapped& out) {
+  for (; lanes; lanes &= lanes - 1) {
+    const int i = __builtin_ctz(lanes);
+    const float p[3] = {local[0][i], local[1][i], local[2][i]};
+    const float n[3] = {normal[0][i], normal[1][i], normal[2][i]};
+    out.set(i, curved_uv(g, p, n));
+  }
+}
+
+// Samples the texture for `lanes`, which all show geom g. The mip level follows from the surface's own
+// plane, not from the normal by which it is shaded.
 inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pixels,
                           const Hits& hits, std::uint32_t lanes, const float (*local)[kLanes],
                           const float (*normal)[kLanes], Surfaces& out) {
@@ -104,53 +179,67 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   const float width = texture.width[0], height = texture.height[0];
   const bool plane = g.type == mjGEOM_PLANE;
   const bool round = g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
-  const bool curved =
-      !s.from_above && (round || g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID);
+  const bool curved = !texture.cube && !s.from_above &&
+                      (round || g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID);
+  const bool seen_through = g.transparent && texture.alpha;
   Mapped mapped;
-  if (!texture.cube && (curved || s.mapped)) map_lanes(g, hits, lanes, local, normal, mapped);
+  if (g.mesh || curved) mapped = {};
+  if (g.mesh) map_mesh(g, hits, lanes, mapped);
+  if (curved) map_curved(g, lanes, local, normal, mapped);
   for (int k = 0; k < kLanes; k += kWidth) {
     const Mask m = mask_of(lanes >> k & kAllLanes);
     if (!any(m)) continue;
-    const Vec3f q{load(local[0] + k), load(local[1] + k), load(local[2] + k)};
-    const Vec3f n{load(out.n[0] + k), load(out.n[1] + k), load(out.n[2] + k)};
+    const Vec3f q = load3(local, k);
+    const Vec3f n = g.mesh ? from_geom(g.rot, load3(mapped.n, k)) : load3(out.n, k);
     const Steps steps = pixel_steps(view, g, pixels, hits, k, n);
-    const Float length = sqrt(max(dot(steps.x, steps.x), dot(steps.y, steps.y)));
-    Rgb color;
+    const auto store_sample = [&](auto sample_as) {
+      const Rgb color = sample_as(Rgb{});
+      const Float scale = splat(1.0f / 255);
+      store(out.texture[0] + k, select(m, color.r * scale, load(out.texture[0] + k)));
+      store(out.texture[1] + k, select(m, color.g * scale, load(out.texture[1] + k)));
+      store(out.texture[2] + k, select(m, color.b * scale, load(out.texture[2] + k)));
+      if (!seen_through) return;
+      const Float alpha = load(out.alpha + k);
+      store(out.alpha + k, select(m, alpha * sample_as(Alpha{}).a * scale, alpha));
+    };
     if (texture.cube) {
-      const Vec3f d{q.x * s.stretch[0], q.y * s.stretch[1], q.z * s.stretch[2]};
-      const Float maximum = max(max(abs(d.x), max(abs(d.y), abs(d.z))), splat(kTiny));
-      const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
-      color = sample_cube(texture, m, d, length * splat(0.5f * width * stretch) / maximum);
-    } else {
-      Float u, v, footprint;
-      if (plane || s.from_above) {
-        const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
-        const float size_y = round ? g.size[0] : g.size[1];
-        const float sy = size_y > 0 ? 0.5f / size_y : 0.5f;
-        u = fma(q.x, splat(sx), splat(!s.from_above && g.size[0] > 0 ? 0.5f : 0.0f));
-        v = fma(q.y, splat(-sy), splat(!s.from_above && g.size[1] > 0 ? 0.5f : 0.0f));
-        const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
-        // Maximum component, as in Mesa; it gives a sharper image than the length of the vector.
-        const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
-        footprint = max(texels(steps.x), texels(steps.y));
-      } else {
-        const Coordinates at =
-            curved || s.mapped
-                ? Coordinates{load(mapped.u + k), load(mapped.v + k), load(mapped.rate_u + k),
-                              load(mapped.rate_v + k)}
-                : box_uv(g, q, {load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)});
-        u = at.u;
-        v = at.v;
-        footprint = length * max(at.rate_u * splat(s.repeat[0] * width),
-                                 at.rate_v * splat(s.repeat[1] * height));
-      }
-      color = sample(texture, m, int_of(0), fma(u, splat(s.repeat[0]), splat(s.shift[0])),
-                     fma(v, splat(s.repeat[1]), splat(s.shift[1])), footprint);
+      const auto stretched = [&](Vec3f v) -> Vec3f {
+        return {v.x * s.stretch[0], v.y * s.stretch[1], v.z * s.stretch[2]};
+      };
+      const CubeFace face(stretched(q));
+      const Float footprint =
+          max(face.texels(stretched(steps.x), width), face.texels(stretched(steps.y), width));
+      store_sample(
+          [&](auto texel) { return sample_cube<decltype(texel)>(texture, m, face, footprint); });
+      continue;
     }
-    const Float scale = splat(1.0f / 255);
-    store(out.texture[0] + k, select(m, color.r * scale, load(out.texture[0] + k)));
-    store(out.texture[1] + k, select(m, color.g * scale, load(out.texture[1] + k)));
-    store(out.texture[2] + k, select(m, color.b * scale, load(out.texture[2] + k)));
+    // The maximum component, as in Mesa; it gives a sharper image than the length of the vector.
+    Float u, v, footprint;
+    if (plane || s.from_above) {
+      const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
+      const float size_y = round ? g.size[0] : g.size[1];
+      const float sy = size_y > 0 ? 0.5f / size_y : 0.5f;
+      u = fma(q.x, splat(sx), splat(!s.from_above && g.size[0] > 0 ? 0.5f : 0.0f));
+      v = fma(q.y, splat(-sy), splat(!s.from_above && g.size[1] > 0 ? 0.5f : 0.0f));
+      const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
+      const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
+      footprint = max(texels(steps.x), texels(steps.y));
+    } else {
+      const Coordinates at =
+          curved || s.mapped ? mapped.coordinates(k) : box_uv(g, q, load3(normal, k));
+      u = at.u;
+      v = at.v;
+      const Float ku = splat(s.repeat[0] * width), kv = splat(s.repeat[1] * height);
+      const auto texels = [&](Vec3f w) {
+        return max(abs(ku * dot(at.du, w)), abs(kv * dot(at.dv, w)));
+      };
+      footprint = max(texels(steps.x), texels(steps.y));
+    }
+    const Float place_s = fma(u, splat(s.repeat[0]), splat(s.shift[0])),
+                place_t = fma(v, splat(s.repeat[1]), splat(s.shift[1]));
+    store_sample([&](auto texel) {
+      return sample<decltype(texel)>(texture, m, int_of(0), place_s, place_t, footprint);
+    });
   }
 }
 

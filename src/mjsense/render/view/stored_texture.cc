@@ -261,6 +261,7 @@ Texture texture_levels(const mjModel* model, int id) {
   const int channels = model->tex_nchannel[id];
   // Textures with another number of channels are encoded for another renderer and ignored.
   if (channels != 3 && channels != 4) return texture;
+  texture.alpha = channels == 4;
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
   // A cube texture with a square image repeats that image on all faces.
   texture.same_faces = texture.cube && model->tex_width[id] == model->tex_height[id];

@@ -28,6 +28,7 @@ class TextureOnDemand {
 struct Texture {
   static constexpr int kMaxLevels = 15;
   bool cube = false;
+  bool alpha = false;       // it has an alpha channel
   bool same_faces = false;  // a cube map with one image for all faces, which is stored once
   int levels = 0;           // 0: the texture cannot be drawn
   int finest = 0;           // the first level that is stored

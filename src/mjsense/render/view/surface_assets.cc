@@ -23,29 +23,12 @@ float cross(const float* a, const float* b, const float* c, float* out) {
   return std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
 }
 
-// position(f, k), m, and texcoord(f, k) return the data of corner k of face f.
-template <class Position, class Texcoord>
-void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord texcoord) {
-  tables.uvs.resize(static_cast<std::size_t>(faces) * 6);
-  tables.density.resize(faces);
-  for (int f = 0; f < faces; ++f) {
-    float* uv = tables.uvs.data() + 6 * f;
-    for (int k = 0; k < 3; ++k) std::copy_n(texcoord(f, k), 2, uv + 2 * k);
-    float normal[3];
-    const float area = cross(position(f, 0), position(f, 1), position(f, 2), normal);
-    const float uv_area =
-        std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
-    tables.density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
-  }
-}
-
 }  // namespace
 
-void add_coordinates(MeshTables& tables, int count, const float* vert, const int* faces,
-                     const float* texcoord, const int* texcoords) {
-  add_coordinates(
-      tables, count, [&](int f, int k) { return vert + 3 * faces[3 * f + k]; },
-      [&](int f, int k) { return texcoord + 2 * texcoords[3 * f + k]; });
+void MeshTables::add_coordinates(const float* texcoord, std::span<const int> texcoords) {
+  uvs.resize(2 * texcoords.size());
+  for (std::size_t i = 0; i < texcoords.size(); ++i)
+    std::copy_n(texcoord + 2 * texcoords[i], 2, uvs.data() + 2 * i);
 }
 
 std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id, bool coordinates) {
@@ -89,20 +72,19 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id, bool coo
         if (cosine < kCrease) std::copy_n(flat, 3, smooth);
       }
     }
-    if (has_uv && coordinates)
-      add_coordinates(*tables, faces, vert.data(), vertices.data(), texcoord.data(),
-                      texcoords.data());
+    if (has_uv && coordinates) tables->add_coordinates(texcoord.data(), texcoords);
     return tables;
   });
 }
 
-MeshSurface MeshTables::surface() const {
+MeshSurface MeshTables::surface(const float* positions, const int* faces) const {
   const auto data = [](const std::vector<float>& v) { return v.empty() ? nullptr : v.data(); };
-  return {data(normals), data(uvs), data(density)};
+  return {data(normals), data(uvs), positions, faces};
 }
 
-void SurfaceAssets::keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface) {
-  surface = tables->surface();
+void SurfaceAssets::keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface,
+                         const float* positions, const int* faces) {
+  surface = tables->surface(positions, faces);
   tables_.push_back(std::move(tables));
 }
 
@@ -116,7 +98,9 @@ SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
     textures_[i] = stored_.emplace_back(stored_texture(model, i))->texture;
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
-  for (int i = 0; i < model->nmesh && meshes; ++i) keep(mesh_tables(model, i, true), meshes_[i]);
+  for (int i = 0; i < model->nmesh && meshes; ++i)
+    keep(mesh_tables(model, i, true), meshes_[i], model->mesh_vert + 3 * model->mesh_vertadr[i],
+         model->mesh_face + 3 * model->mesh_faceadr[i]);
 }
 
 void SurfaceAssets::add_flex(const mjModel* model, int id, bool textures) {
@@ -125,23 +109,18 @@ void SurfaceAssets::add_flex(const mjModel* model, int id, bool textures) {
     flex_parts_.emplace_back();
     if (s.texcoords.empty() || !textures) continue;
     auto tables = std::make_shared<MeshTables>();
-    const float* texcoord = model->flex_texcoord + 2 * model->flex_texcoordadr[id];
-    const auto corner = [&](int f, int k) { return 3 * (part.first + f) + k; };
-    add_coordinates(
-        *tables, part.count,
-        [&](int f, int k) { return &s.rest[3 * (s.faces[corner(f, k)] % s.num_vertices)]; },
-        [&](int f, int k) { return texcoord + 2 * s.texcoords[corner(f, k)]; });
+    tables->add_coordinates(model->flex_texcoord + 2 * model->flex_texcoordadr[id],
+                            std::span(s.texcoords).subspan(3 * part.first, 3 * part.count));
     keep(std::move(tables), flex_parts_.back());
   }
 }
 
 void SurfaceAssets::add_skin(const mjModel* model, int id) {
   if (model->skin_texcoordadr[id] < 0) return;
-  const float* vert = model->skin_vert + 3 * model->skin_vertadr[id];
-  const float* texcoord = model->skin_texcoord + 2 * model->skin_texcoordadr[id];
-  const int* face = model->skin_face + 3 * model->skin_faceadr[id];
   auto tables = std::make_shared<MeshTables>();
-  add_coordinates(*tables, model->skin_facenum[id], vert, face, texcoord, face);
+  tables->add_coordinates(
+      model->skin_texcoord + 2 * model->skin_texcoordadr[id],
+      {model->skin_face + 3 * model->skin_faceadr[id], 3 * std::size_t(model->skin_facenum[id])});
   keep(std::move(tables), skins_[id]);
 }
 

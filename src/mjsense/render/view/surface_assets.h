@@ -18,37 +18,37 @@ namespace mjsense::render {
 struct MeshSurface {
   const float* normals = nullptr;  // [F, 3 corners, 3]
   const float* uvs = nullptr;      // [F, 3 corners, 2]
-  const float* density = nullptr;  // [F] texture units per metre
+  // For textures: the vertices' current positions, m, and the corners of the faces, [F, 3] vertices.
+  const float* positions = nullptr;
+  const int* faces = nullptr;
 };
 
 // Storage of MeshSurface; a table that does not exist is empty.
 struct MeshTables {
   std::vector<float> normals;  // [F, 3 corners, 3]
   std::vector<float> uvs;      // [F, 3 corners, 2]
-  std::vector<float> density;  // [F]
-  MeshSurface surface() const;
+
+  MeshSurface surface(const float* positions, const int* faces) const;
+  // Fills the uvs: corner i of the faces, three for each, has the coordinates texcoord[texcoords[i]].
+  void add_coordinates(const float* texcoord, std::span<const int> texcoords);
 };
 
-// Fills uvs and density of `count` faces. Corner k of face f has the position vert[faces[3 f + k]]
-// (m) and the texture coordinates texcoord[texcoords[3 f + k]].
-void add_coordinates(MeshTables& tables, int count, const float* vert, const int* faces,
-                     const float* texcoord, const int* texcoords);
-
 // Tables of the model's mesh `id`, shared by all models of the process that have an equal mesh.
-// `coordinates`: also uvs and density, if the mesh has texture coordinates.
+// `coordinates`: also uvs, if the mesh has texture coordinates.
 std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id, bool coordinates);
 
 class SurfaceAssets {
  public:
   // `meshes`: prepare all meshes, including those that no geom uses, because a world may change a
   // geom's mesh or group. False for views that need no normals.
+  // `model` must outlive this object, which refers to the positions and faces of its meshes.
   SurfaceAssets(const mjModel* model, bool meshes, bool textures);
   SurfaceAssets(const SurfaceAssets&) = delete;
   SurfaceAssets& operator=(const SurfaceAssets&) = delete;
 
   const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
   const MeshSurface* mesh(int id) const { return &meshes_[id]; }
-  // Without normals, which change with the shape.
+  // Without normals, positions and faces of flexes and skins, which change with the shape.
   // index as in flex_parts()
   const MeshSurface* flex_part(int index) const { return &flex_parts_[index]; }
   int num_flex_parts() const { return static_cast<int>(flex_parts_.size()); }
@@ -58,7 +58,8 @@ class SurfaceAssets {
  private:
   void add_flex(const mjModel* model, int id, bool textures);
   void add_skin(const mjModel* model, int id);
-  void keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface);
+  void keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface,
+            const float* positions = nullptr, const int* faces = nullptr);
 
   std::vector<Texture> textures_;
   std::vector<MeshSurface> meshes_, flex_parts_, skins_;

@@ -242,6 +242,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   view_.grid = grid;
   view_.backs = true;
   projected_ = scene.projected_textures;
+  sized_soft_ = scene.sized_soft_textures;
   view_.near = scene.near;
   view_.far = scene.far;
   view_.shadows = scene.shadows;
@@ -370,13 +371,15 @@ void ViewBuilder::set_shape(const rays::RayWorld& world, const rays::SharedGeome
     const rays::FlexShapes::Part& shape = world.flexes()->parts()[part];
     g.object = mjOBJ_FLEX;
     g.bvh = shape.scene;
-    g.mesh = soft_surface(part, *assets_->flex_part(part), shape.normals);
+    g.mesh =
+        soft_surface(part, *assets_->flex_part(part), shape.normals, shape.positions, shape.faces);
   } else if (g.type == rays::kSkinType) {
     const int id = source.data;
     g.object = mjOBJ_SKIN;
     g.bvh = world.skins()->scene(id);
-    g.mesh = soft_surface(assets_->num_flex_parts() + id, *assets_->skin(id),
-                          world.skins()->normals(id));
+    const rays::SkinShapes& skins = *world.skins();
+    g.mesh = soft_surface(assets_->num_flex_parts() + id, *assets_->skin(id), skins.normals(id),
+                          skins.positions(id).data(), skins.faces(id));
   }
   if (g.object != mjOBJ_GEOM) {
     g.object_id = source.data;
@@ -385,12 +388,12 @@ void ViewBuilder::set_shape(const rays::RayWorld& world, const rays::SharedGeome
   }
 }
 
-// Combines the world's normals with the shared texture coordinates.
+// Combines the world's shape with the shared texture coordinates.
 const MeshSurface* ViewBuilder::soft_surface(int index, const MeshSurface& shared,
-                                             const float* normals) {
+                                             const float* normals, const float* positions,
+                                             const int* faces) {
   MeshSurface& surface = soft_surfaces_[index];
-  surface = shared;
-  surface.normals = normals;
+  surface = {normals, shared.uvs, positions, faces};
   return &surface;
 }
 
@@ -419,7 +422,9 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
     s.texture = nullptr;
     return;
   }
-  const std::array<float, 3> extent = drawn_extent(g);
+  const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
+  const std::array<float, 3> extent =
+      soft && !sized_soft_ ? std::array<float, 3>{} : drawn_extent(g);
   s.from_above = (g.mesh && !s.mapped) || g.height_field || (projected_ && !g.mesh);
   const bool endless = g.type == mjGEOM_PLANE && (g.size[0] <= 0 || g.size[1] <= 0);
   for (int i = 0; i < 2; ++i) {
@@ -428,15 +433,21 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
     if (uniform && extent[i] > 0) s.repeat[i] *= extent[i];
     if (projected_ && s.mapped) s.repeat[i] = 1;
     if (s.from_above || endless) s.shift[i] = -0.5f;
-    if (s.from_above && g.object == mjOBJ_SKIN)  // the texture stays fixed in the world
-      s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
+    if (s.from_above && g.object == mjOBJ_SKIN) {
+      if (!sized_soft_) {
+        s.repeat[i] = s.shift[i] = 0;
+      } else {  // the texture stays fixed in the world; kernels divide by the size
+        s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
+        if (g.size[i] > 0) s.repeat[i] *= g.size[i];
+      }
+    }
   }
   // Cube maps: MuJoCo uses directions in the unit shape that it scales; for meshes and planes, in
   // metres.
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
   for (int i = 0; i < 3; ++i) {
     if (in_meters) {
-      s.stretch[i] = uniform ? extent[i] : 1.0f;
+      s.stretch[i] = uniform && !soft ? extent[i] : 1.0f;
     } else {
       s.stretch[i] = uniform || extent[i] <= 0 ? 1.0f : 1.0f / extent[i];
     }

@@ -63,6 +63,10 @@ struct DrawnScene {
   // 2D textures are projected along z onto all shapes, except onto triangles with texture coordinates,
   // where they are not repeated, as MuJoCo did before 3.12.
   bool projected_textures;
+  // As in MuJoCo before 3.13: with texuniform, textures of flexes and skins are repeated by their
+  // geom's size; the texture of a skin without coordinates is projected along z of the world, instead
+  // of showing one point of it.
+  bool sized_soft_textures;
 };
 
 // Computes Surface::dull: the value below which the kernels' power() returns 0, with a margin for
@@ -104,7 +108,8 @@ class ViewBuilder {
                  const rays::RayGeom& source, ViewGeom& g);
   // Ids of markers follow those of all other objects.
   int first_marker() const { return static_cast<int>(unsorted_.size() - options_.markers); }
-  const MeshSurface* soft_surface(int index, const MeshSurface& shared, const float* normals);
+  const MeshSurface* soft_surface(int index, const MeshSurface& shared, const float* normals,
+                                  const float* positions, const int* faces);
   void set_surface(const rays::RayGeom& source, const float* rgba, const Material* material,
                    const Texture* texture, ViewGeom& g) const;
   // shape(g) sets the fields that depend on the kind of object.
@@ -140,6 +145,7 @@ class ViewBuilder {
   // By flex part, then by skin, with the world's normals.
   std::vector<MeshSurface> soft_surfaces_;
   bool projected_ = false;                 // DrawnScene::projected_textures
+  bool sized_soft_ = false;                // DrawnScene::sized_soft_textures
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int excluded_geom_ = -1;                 // geom that is not shown: the mirror itself
   bool own_headlight_ = true;  // otherwise headlight_, the viewing direction of the real camera

@@ -111,6 +111,21 @@ TEST(Lidar, IntensityIsAlbedoTimesCosine) {
   EXPECT_NEAR(points[3 * 4], -2, 1e-6);
 }
 
+// There is no element of a geom to read, and every ray misses.
+TEST(Lidar, SeesNothingInASceneWithoutGeoms) {
+  Lab lab;
+  lab.cfg->frame = {{"site", "s", ""}};
+  lab.cfg->scan = SpinningScan{.channels = 2, .elevations_deg = {-10, 10}, .samples = 21};
+  scene::SceneCfg s;
+  s.base = {.xml = "<mujoco><worldbody><site name='s' pos='1 2 3'/></worldbody></mujoco>"};
+  s.sensors = {lab.cfg};
+  lab.scene = std::make_shared<scene::Scene>(std::move(s));
+  lab.sim = std::make_unique<sim::Simulation>(lab.scene, sim::SimulationCfg{});
+  EXPECT_THAT(lab.read("distances"), Each(-1));
+  EXPECT_THAT(lab.read("intensity"), Each(0));
+  EXPECT_THAT(lab.read("points"), Each(0));
+}
+
 // A return that noise moves above max_distance or below min_distance is lost.
 TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
   Lab lab;
