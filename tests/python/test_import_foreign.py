@@ -133,12 +133,12 @@ def test_links_and_bombs(tmp_path):
     def image(_, demo):
         demo["obs"].create_dataset("big_image", (5, 40000, 40000, 3), "u1", chunks=(1, 1000, 40000, 3), compression="gzip")
 
-    for change, message in ((external, "'joint' is a link to '/?x'"), (storage, "'joint' is stored in another file"), (virtual, "'joint' is stored in another file"),
-                            (rows, "'actions' has 10000000000 rows"), (image, "'big_image' has 5 rows of 4800000000 bytes")):  # fmt: skip
+    for change, message in ((external, "obs/joint is an external link"), (storage, "obs/joint is stored in other files"), (virtual, "obs/joint is a virtual dataset"),
+                            (rows, "actions has 10000000000 rows"), (image, "obs/big_image has rows of 4800000000 bytes")):  # fmt: skip
         with pytest.raises(ValueError, match=message):
             mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", change=change), tmp_path / "out")
     for name in ("..\\x_image", "a\nb_image", "-i_image"):
-        with pytest.raises(ValueError, match="cannot be used, expected letters"):
+        with pytest.raises(ValueError, match="cannot be used, expected letters|is not a plain name"):
             mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", change=lambda _, demo: demo["obs"].create_dataset(name, data=np.zeros((5, 4, 4, 3), np.uint8))), tmp_path / "o")
 
 

@@ -5,7 +5,6 @@ ValueError with one line that names the file, the place, what was found and what
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import stat
@@ -16,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from mjsense._input_files import unreadable
+from mjsense.dataset.hdf5 import Group, Rows
 
 MAX_JSON = 16 << 20  # bytes
 MAX_BYTES = 1 << 30  # of one array, or of one file that is read as a whole
-MAX_CHUNK = 256 << 20  # bytes of a part of an array that HDF5 decompresses at once
 MAX_ROWS = 10_000_000
 MAX_SIDE, MAX_PIXELS = 16_384, 1 << 25
 """Of an image; 8K video has 2^25 pixels."""
@@ -135,11 +134,11 @@ def read_bytes(path: Path, about: str, limit: int = MAX_BYTES) -> bytes:
 # ---------------------------------------------------------------------------------------------- HDF5
 
 
-def attribute(owner: Any, name: str, about: str, otherwise: str = "") -> str:
+def attribute(owner: Group, name: str, about: str, otherwise: str = "") -> str:
     """A text attribute of a group."""
-    if name not in owner.attrs:
+    value = owner.attrs.get(name)
+    if value is None:
         return otherwise
-    value = owner.attrs[name]
     if isinstance(value, np.ndarray) and value.dtype == np.uint8 and value.ndim == 1:
         value = value.tobytes()
     if isinstance(value, bytes):
@@ -152,49 +151,17 @@ def attribute(owner: Any, name: str, about: str, otherwise: str = "") -> str:
     return value
 
 
-def group_at(parent: Any, name: str, about: str) -> Any:
-    """A group of the same file; None if there is none."""
-    value = _own(parent, name, about)
-    if value is not None and hasattr(value, "dtype"):
+def group_at(parent: Group, name: str, about: str) -> Group | None:
+    """A group; None if there is none."""
+    value = parent.get(name)
+    if isinstance(value, Rows):
         raise ValueError(f"{about}: '{name}' is an array, expected a group")
     return value
 
 
-def dataset_at(parent: Any, name: str, about: str) -> Any:
-    """An array of numbers that is stored in the same file, with at most ``MAX_ROWS`` rows of a bounded size; None if there is none."""
-    value = _own(parent, name, about)
-    if value is None:
-        return None
-    place = f"{about}: '{name}'"
-    if not hasattr(value, "dtype") or value.dtype.kind not in "biuf" or value.ndim < 1:
-        raise ValueError(f"{place} is {getattr(value, 'dtype', 'a group')}, expected an array of numbers")
-    if value.external or value.is_virtual:
-        raise ValueError(f"{place} is stored in another file, expected an array in this file")
-    row, chunk = math.prod(value.shape[1:]) * value.dtype.itemsize, math.prod(value.chunks or ()) * value.dtype.itemsize
-    if len(value) > MAX_ROWS or row > MAX_CHUNK or chunk > MAX_CHUNK:
-        raise ValueError(f"{place} has {len(value)} rows of {row} bytes in chunks of {chunk}, the limits are {MAX_ROWS} rows and {MAX_CHUNK} bytes")
+def dataset_at(parent: Group, name: str, about: str) -> Rows | None:
+    """An array of numbers; None if there is none."""
+    value = parent.get(name)
+    if value is not None and not (isinstance(value, Rows) and value.is_number and value.shape):
+        raise ValueError(f"{about}: '{name}' is {getattr(value, 'dtype', 'a group')}, expected an array of numbers")
     return value
-
-
-def all_of(dataset: Any, about: str) -> np.ndarray:
-    """The values of an array that is small enough to be read as a whole."""
-    if dataset.size * dataset.dtype.itemsize > MAX_BYTES:
-        raise ValueError(f"{about}: '{dataset.name}' has {dataset.size} numbers, the limit is {MAX_BYTES} bytes")
-    try:
-        return dataset[()]
-    except OSError as error:
-        raise ValueError(f"{about}: '{dataset.name}' cannot be read: {' '.join(str(error).split())}") from None
-
-
-def _own(parent: Any, name: str, about: str) -> Any:
-    import h5py
-
-    link = parent.get(name, getlink=True)
-    if link is None:
-        return None
-    if not isinstance(link, h5py.HardLink):
-        raise ValueError(f"{about}: '{name}' is a link to {found(getattr(link, 'path', ''))}, expected an object of this file")
-    try:
-        return parent[name]
-    except (KeyError, OSError) as error:
-        raise ValueError(f"{about}: '{name}' cannot be read: {' '.join(str(error).split())}") from None

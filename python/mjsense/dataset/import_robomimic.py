@@ -201,7 +201,7 @@ def _stored(assets: Any, file: str, about: str) -> bytes | None:
     content = foreign.dataset_at(group, name, f"{about}: assets")
     if content.dtype != np.uint8 or content.ndim != 1:
         raise ValueError(f"{about}: assets: {foreign.found(file)} is {content.dtype} {[*content.shape]}, expected uint8 with one dimension")
-    return foreign.all_of(content, about).tobytes()
+    return content[()].tobytes()
 
 
 def _find(path: Path, file: str, folder: str, assets: str | Path | None, about: str) -> Path:
@@ -270,14 +270,14 @@ class _Writer:
     def write(self, number: int, demo: _Demonstration, scene: dict[str, Any]) -> None:
         scene = scene | ({"text": demo.language} if demo.language else {})
         length, arrays = demo.length, demo.arrays
-        rewards, ended = (foreign.all_of(arrays[key], demo.about).reshape(length) if key in arrays else np.zeros(length) for key in ("rewards", "dones"))
+        rewards, ended = (arrays[key][()].reshape(length) if key in arrays else np.zeros(length) for key in ("rewards", "dones"))
         if not np.isfinite(rewards).all():
             raise ValueError(f"{demo.about}: rewards[{int(np.argmin(np.isfinite(rewards)))}] is not finite, expected a number")
         self._check(demo)
         states = self._states(demo, self._model) if self._model is not None else None
         # Arrays are read as a whole, images one by one.
         values: dict[str, Any] = {
-            place: arrays[place] if arrays[place].ndim == 4 else foreign.all_of(arrays[place], demo.about) for _, place in self._rows.values()
+            place: arrays[place] if arrays[place].ndim == 4 else arrays[place][()] for _, place in self._rows.values()
         }
         self._core.begin_episode(0, number, demo.seed)
         for t in range(length):
@@ -312,11 +312,11 @@ class _Writer:
         assert place is not None
         whole = demo.arrays.get("integration_states")
         if whole is not None and whole.shape[1:] == place.shape[1:]:
-            return _finite(foreign.all_of(whole, demo.about), f"{demo.about}: integration_states")
+            return _finite(whole[()], f"{demo.about}: integration_states")
         stored, size = demo.arrays["states"], 1 + model.nq + model.nv
         if stored.shape[1:] != (size,):
             raise ValueError(f"{demo.about}: states have {int(np.prod(stored.shape[1:]))} numbers; time, qpos and qvel of its model are {size}")
-        states = _finite(foreign.all_of(stored, demo.about), f"{demo.about}: states")
+        states = _finite(stored[()], f"{demo.about}: states")
         data, result = mujoco.MjData(model), np.empty((len(states), place.shape[1]))
         for t, state in enumerate(states):
             data.time, data.qpos[:], data.qvel[:] = state[0], state[1 : 1 + model.nq], state[1 + model.nq :]
