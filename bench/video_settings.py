@@ -17,7 +17,7 @@ import time
 from fractions import Fraction
 
 import numpy as np
-from mjsense.dataset.video_decoder import Decoder, Packets
+from mjsense.dataset.video_decoder import Decoder, Packets, open_container
 
 import mjsense as mjs
 
@@ -48,7 +48,10 @@ def decoded(folder: pathlib.Path) -> list[pathlib.Path]:
 
 
 def random_ms(path: pathlib.Path) -> float:
-    decoder = Decoder(packets := Packets(path, Fraction(500, 33)))
+    with open_container(path) as container:
+        stream = container.streams.video[0]
+        frames, size = stream.frames, (stream.width, stream.height)
+    decoder = Decoder(packets := Packets(path, Fraction(500, 33), frames, size, ""))
     order = np.random.default_rng(0).permutation(len(packets.sizes))
     times = []
     for _ in range(3):

@@ -496,7 +496,7 @@ def processes_with(name: str, value: str) -> list[int]:
         try:
             if f"{name}={value}" in (folder / "environ").read_text(errors="replace").split("\0"):
                 found.append(int(folder.name))
-        except OSError:  # it has ended, or belongs to somebody else
+        except OSError:  # it has ended, or belongs to another user
             continue
     return found
 

@@ -138,7 +138,7 @@ def test_links_and_bombs(tmp_path):
         with pytest.raises(ValueError, match=message):
             mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", change=change), tmp_path / "out")
     for name in ("..\\x_image", "a\nb_image", "-i_image"):
-        with pytest.raises(ValueError, match="cannot be used, expected letters|is not a plain name"):
+        with pytest.raises(ValueError, match=r"cannot be used, expected letters|is not a plain name"):
             mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", change=lambda _, demo: demo["obs"].create_dataset(name, data=np.zeros((5, 4, 4, 3), np.uint8))), tmp_path / "o")
 
 

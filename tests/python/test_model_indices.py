@@ -108,7 +108,7 @@ def test_other_fields_are_refused(recorded, worlds, tmp_path, name, value, messa
     ("state", lambda model: np.full((5, 10), np.nan), r"replay/state\[0, 0\]: is nan"),
     ("state", np.zeros((2, 10)), r"replay/state: is float64 \[2, 10\], expected float64 with 2 dimensions and 5 rows"),
     ("written", np.zeros((5, 3)), r"replay/written has the shape \[5, 3\], expected"),
-], ids=str)  # fmt: skip
+])  # fmt: skip
 def test_inputs_are_refused(recorded, worlds, tmp_path, name, value, message):
     value = value(mjs.Dataset(recorded).episodes[0].model()) if callable(value) else value
     refuses(worlds, edited(recorded, tmp_path / "data", put(name, value)), message)

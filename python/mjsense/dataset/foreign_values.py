@@ -151,7 +151,7 @@ def attribute(owner: Group, name: str, about: str, otherwise: str = "") -> str:
     return value
 
 
-def group_at(parent: Group, name: str, about: str) -> Group | None:
+def group_at(parent: Group, name: str, about: str) -> Any:
     """A group; None if there is none."""
     value = parent.get(name)
     if isinstance(value, Rows):
@@ -159,7 +159,7 @@ def group_at(parent: Group, name: str, about: str) -> Group | None:
     return value
 
 
-def dataset_at(parent: Group, name: str, about: str) -> Rows | None:
+def dataset_at(parent: Group, name: str, about: str) -> Any:
     """An array of numbers; None if there is none."""
     value = parent.get(name)
     if value is not None and not (isinstance(value, Rows) and value.is_number and value.shape):

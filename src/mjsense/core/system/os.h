@@ -24,7 +24,7 @@ std::vector<int> open_files(int first);
 
 // File descriptors that child programs do not inherit. If the result is empty, errno has the
 // reason.
-std::pair<Fd, Fd> make_pipe();  // read end, write end
+std::pair<Fd, Fd> make_pipe();         // read end, write end
 Fd make_eventfd();                     // eventfd: readable after a write of 8 bytes
 void widen_pipe(int pipe, int bytes);  // best effort
 // Reserves disk space without changing the file's size; false: see errno.
