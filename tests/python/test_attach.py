@@ -12,6 +12,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
+from test_renderer_threads import run_all
 
 import mjsense as mjs
 
@@ -385,34 +386,13 @@ def test_attaching_a_thousand_times_leaks_nothing():
 BUSY = "attached sensors: another thread is updating them; update them in one thread"
 
 
-def runtime_errors(*works):
-    """Messages of RuntimeErrors of functions that run in threads at the same time."""
-    messages, others = set(), []
-
-    def run(work):
-        try:
-            work()
-        except RuntimeError as error:
-            messages.add(str(error))
-        except Exception as error:
-            others.append(error)
-
-    threads = [threading.Thread(target=run, args=(work,)) for work in works]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not others
-    return messages
-
-
 @pytest.mark.parametrize("call", ["update", "reset", "reload", "replace"])
 def test_one_thread_at_a_time(call):
     model, datas = started(2)
     with mjs.attach(model, datas, sensors()[1:9], threads=1) as attached:
         work = getattr(attached, call) if call != "replace" else lambda: attached.replace(1, datas[1])
         with attached._guard:
-            assert runtime_errors(work) == {BUSY}
+            assert run_all(work) == {BUSY}
             work()  # of the same thread
 
 
@@ -428,12 +408,14 @@ def test_threads_update_read_and_close():
             attached.update()
         updated.set()
 
+    found = [attached[name] for name in attached]  # looking a sensor up would warn that the data are ahead of it
+
     def read():
         while not updated.is_set():
-            for name in attached:
-                attached[name].data
+            for sensor in found:
+                sensor.data
 
-    assert runtime_errors(update, read, read) == set()
+    assert run_all(update, read, read) == set()
 
     def until_closed(work):
         while True:
@@ -443,5 +425,5 @@ def test_threads_update_read_and_close():
         time.sleep(0.2)
         attached.close()
 
-    messages = runtime_errors(lambda: until_closed(attached.update), lambda: until_closed(attached.reset), close)
+    messages = run_all(lambda: until_closed(attached.update), lambda: until_closed(attached.reset), close)
     assert messages and all(message == BUSY or "closed" in message for message in messages)

@@ -68,7 +68,7 @@ def test_errors(made, tmp_path, capsys):
     (tmp_path / "old/meta/info.json").write_text(json.dumps({"codebase_version": "v2.1"}))
     with pytest.raises(ValueError, match=r"has the version 'v2.1', expected v3.0"):
         mjs.import_lerobot(tmp_path / "old", tmp_path / "a")
-    for text, wrong in [("[]", "is \\[\\], expected a JSON object"), ("{", "not valid JSON"), ('{"codebase_version": "v3.0", "features": {}}', "has no 'fps'")]:
+    for text, wrong in [("[]", "is a list, not an object"), ("{", "is not JSON text"), ('{"codebase_version": "v3.0", "features": {}}', "has no 'fps'")]:
         (tmp_path / "old/meta/info.json").write_text(text)
         with pytest.raises(ValueError, match=f"info.json.*{wrong}"):
             mjs.import_lerobot(tmp_path / "old", tmp_path / "a")

@@ -4,7 +4,6 @@ ValueError with one line that names the file, the place, what was found and what
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import stat
@@ -30,19 +29,6 @@ def found(value: Any) -> str:
     """A value as messages show it."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def json_object(text: str | bytes, about: str) -> dict[str, Any]:
-    """The object of a JSON text."""
-    if len(text) > MAX_JSON:
-        raise ValueError(f"{about}: has {len(text)} bytes, the limit is {MAX_JSON}")
-    try:
-        value = json.loads(text)
-    except RecursionError:
-        raise ValueError(f"{about}: not valid JSON: it is nested too deeply") from None
-    except ValueError as error:
-        raise ValueError(f"{about}: not valid JSON: {' '.join(str(error).split())}") from None
-    return mapping(value, about)
 
 
 def mapping(value: Any, about: str) -> dict[str, Any]:

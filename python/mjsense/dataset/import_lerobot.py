@@ -18,6 +18,7 @@ from mjsense import _libmujoco
 from mjsense._arguments import checked
 from mjsense._input_files import missing, read_text
 from mjsense._optional import optional
+from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
@@ -116,7 +117,7 @@ class _Source:
             raise FileNotFoundError(f"{root} is not a LeRobot data set: it has no meta/info.json")
         place = str(root / "meta/info.json")
         content = foreign.read_bytes(foreign.file_inside(root, "meta/info.json", place), place, foreign.MAX_JSON)
-        self.info = foreign.json_object(content, place)
+        self.info = bounded_json.parse_object(content, place, foreign.MAX_JSON)
         if not str(self.info.get("codebase_version", "")).startswith("v3."):
             raise ValueError(f"{root} has the version {foreign.found(self.info.get('codebase_version'))}, expected v3.0; "
                              "python -m lerobot.datasets.v30.convert_dataset_v21_to_v30 converts v2.1")  # fmt: skip

@@ -17,6 +17,7 @@ import numpy as np
 
 from mjsense import _libmujoco
 from mjsense._arguments import checked
+from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
@@ -121,7 +122,7 @@ class _About:
     def __init__(self, path: Path, data: Any) -> None:
         def read(name: str) -> dict[str, Any]:
             text = foreign.attribute(data, name, f"{path}: data")
-            return foreign.json_object(text, f"{path}: {name}") if text else {}
+            return bounded_json.parse_object(text, f"{path}: {name}", foreign.MAX_JSON) if text else {}
 
         self.arguments = read("env_args") or read("env_info")
         name = self.arguments.get("env_name") or foreign.attribute(data, "env", f"{path}: data") or path.stem
@@ -164,7 +165,7 @@ class _Demonstration:
             if key in ("rewards", "dones") and array.ndim != 1 and array.shape != (self.length, 1):
                 raise ValueError(f"{self.about}: {key} has the shape {[*array.shape]}, expected [{self.length}]")
         text = foreign.attribute(demo, "ep_meta", self.about)
-        meta = foreign.json_object(text, f"{self.about}: ep_meta") if text else {}
+        meta = bounded_json.parse_object(text, f"{self.about}: ep_meta", foreign.MAX_JSON) if text else {}
         self.language = foreign.text(meta.get("lang") or "", f"{self.about}: lang of ep_meta")
         self.outcome = foreign.text(meta.get("outcome") or "", f"{self.about}: outcome of ep_meta", 1000)
         self.seed = foreign.whole(meta.get("seed") or 0, f"{self.about}: seed of ep_meta", 0, 2**63 - 1)
