@@ -181,4 +181,7 @@ def new_spec(base: str | None) -> Any:
     spec = _libmujoco.shared.MjSpec
     if base is None:
         return spec()
-    return spec.from_string(base) if base.lstrip().startswith("<") else spec.from_file(base)
+    try:
+        return spec.from_string(base) if base.lstrip().startswith("<") else spec.from_file(base)
+    except UnicodeDecodeError as error:  # MuJoCo has cut its message inside of a character
+        raise ValueError(error.object.decode(errors="replace")) from None

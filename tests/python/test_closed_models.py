@@ -45,7 +45,7 @@ def test_files_of_an_archive(tmp_path):
     ({"x" * 300: b""}, "has 300 characters"), ({info("l", 0o120777): b"/etc"}, "is a link"), ({info("f", 0o010644): b""}, "is a link, a folder or a device"),
     ({"a": b"", "a/b": b""}, "'a' is both a file and a folder"), ({"zeros": bytes(65 << 20)}, "would grow from .* the limit is a factor of 100"),
     ({f"z{i}": bytes(13 << 20) for i in range(5)}, "would grow from .* the limit is a factor of 100"),
-], ids=str)  # fmt: skip
+])  # fmt: skip
 def test_refused_members(tmp_path, files, why):
     with pytest.raises(ValueError, match=f"^the model archive .*a.zip cannot be read: .*{why}") as error:
         archive.read_archive(written(tmp_path / "a.zip", {"model.xml": b"<mujoco/>", **files}))

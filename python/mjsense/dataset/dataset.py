@@ -18,7 +18,7 @@ import numpy as np
 from mjsense import _show
 from mjsense._arguments import checked
 from mjsense.dataset import statistics
-from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name
+from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name, is_mask
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.places import printable
 from mjsense.dataset.remote import resolved
@@ -151,7 +151,7 @@ class Dataset:
             frames = episode._frames(self._videos, [[rows] if single else rows for rows, single in places])
             sample |= {name: images[0] if single else np.stack(images) for name, images, (_, single) in zip(self._videos, frames, places)}
         for name, steps in self._windows.items():
-            if not _is_mask(name):
+            if not is_mask(name):
                 sample[f"{name}_is_pad"] = np.array([not 0 <= t + step < episode.length for step in steps])
         sample |= {"episode_index": episode.index, "frame_index": t, "index": i, "timestamp": float(t / self._fps), "task": episode.task}
         return sample
@@ -198,7 +198,7 @@ class Dataset:
             return {}
         known = dict(self.streams) if streams is None else self._known_streams()
         names = list(known) if streams is None else self._expand_all(streams, known)
-        arrays = [name for name in names if self._in_memory(known[name]) and known[name].dtype != object and not _is_mask(name)]
+        arrays = [name for name in names if self._in_memory(known[name]) and known[name].dtype != object and not is_mask(name)]
         masks = {name: mask for name in arrays if (mask := given_name(name))}
         parts: dict[str, list[np.ndarray]] = {name: [] for name in arrays}
         for episode in self.episodes:
@@ -296,11 +296,6 @@ def by_house(episodes: Iterable[Episode]) -> list[list[Episode]]:
 
 def _row_bytes(stream: Stream) -> int:
     return int(np.prod(stream.shape, dtype=np.int64)) * stream.dtype.itemsize
-
-
-def _is_mask(name: str) -> bool:
-    parts = name.split("/")
-    return parts[0] == "actions" and len(parts) > 3 and parts[2] == "given"
 
 
 def _numbers(episodes: Iterable[int], count: int, root: Path) -> list[int]:

@@ -65,6 +65,12 @@ def _own(values: np.ndarray) -> np.ndarray:
     return copy.deepcopy(values) if values.dtype == object else values.copy()
 
 
+def is_mask(stream: str) -> bool:
+    """Whether a stream says in which rows an action is given."""
+    parts = stream.split("/")
+    return parts[0] == "actions" and len(parts) > 3 and parts[2] == "given"
+
+
 def _video_name(camera: str) -> str:
     return camera if camera.startswith(VIDEOS) else VIDEOS + camera
 
@@ -367,6 +373,8 @@ class Episode:
                     if mask := given_name(leaf):
                         streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
             else:
+                if is_mask(name) and dataset.dtype != bool:
+                    raise ValueError(f"{dataset.where} is {dataset.dtype}; it must be bool, whether each action is given")
                 stream = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
                 streams[name] = known[place] = stream
 

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from mjsense._input_files import missing
 from mjsense.dataset import index
 from mjsense.dataset.description import Description
-from mjsense.dataset.hdf5 import Group, open_h5
+from mjsense.dataset.hdf5 import Group, Rows, open_h5
 from mjsense.dataset.limits import DESCRIPTION_BYTES
 from mjsense.dataset.places import plain_folder, printable
 
@@ -158,9 +158,11 @@ def _episodes(file: Group, path: Path, recording: int) -> Iterator[EpisodeEntry]
             raise ValueError(f"{path} has a trajectory named '{printable(name[:100])}'; it must be traj_0, traj_1 and so on")
     for name in sorted(names, key=lambda name: int(name[5:])):
         trajectory = file[name]
+        if not isinstance(trajectory, Group):
+            raise ValueError(f"{trajectory.where} is an array; it must be a group")
         flags = trajectory["success"]
-        if flags.ndim != 1 or not flags.is_number:
-            raise ValueError(f"{flags.where} is {flags.dtype} {list(flags.shape)}; it must be one bool for each observation")
+        if not isinstance(flags, Rows) or flags.ndim != 1 or not flags.is_number:
+            raise ValueError(f"{flags.where} is {getattr(flags, 'dtype', 'a group')} {list(getattr(flags, 'shape', ()))}; it must be one bool for each observation")
         outcome = trajectory.attrs.text("outcome") if "outcome" in trajectory.attrs else None
         if outcome is None:  # MolmoSpaces' files have no attributes
             outcome = _OUTCOMES[bool(len(flags) and flags[-1])]
