@@ -121,7 +121,8 @@ std::vector<std::string> description_faults(const Json& description) {
   for (const Rule& rule : video_rules())
     require(*video, rule.key, rule.holds, rule.expected, fmt::format("video.{}", rule.key));
   for (const auto& [key, value] : video->items()) {
-    if (std::ranges::none_of(video_rules(), [&](const Rule& rule) { return rule.key == key; }))
+    const std::string& name = key;  // lambdas of C++20 in clang 14 cannot name a structured binding
+    if (std::ranges::none_of(video_rules(), [&name](const Rule& rule) { return rule.key == name; }))
       faults.push_back(
           fmt::format("with video.{}, which is never recorded", printable(key.substr(0, kShown))));
   }
