@@ -7,6 +7,7 @@ import shutil
 from fractions import Fraction
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -126,6 +127,10 @@ def test_videos_with_b_frames_also_have_one_frame_for_each_row(root, tmp_path):
             for image in images:
                 file.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
             file.mux(stream.encode(None))
+    for path in (tmp_path / "house_0").glob("*.h5"):
+        with h5py.File(path, "a") as file:
+            for trajectory in file.values():
+                del trajectory["obs/sensor_data/wrist_camera"].attrs["crc32"]  # of the former video
     out = mjs.export_lerobot(tmp_path / "house_0", tmp_path / "v3")
     assert_frames_by_row(tmp_path / "house_0", out)
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer: its triangles, and what it sends. test_view_page.py tests its page."""
 
+import html
 import importlib.util
 import os
 import re
@@ -318,7 +319,7 @@ def test_wrong_things_are_named(live, tmp_path):
 @needs_viser
 def test_recordings(recording, port):
     with mjs.view(recording, port=port, block=False, open_browser=False) as viewer:
-        assert "Pick up" in viewer._about.content and viewer._time.max == 30
+        assert html.escape(viewer._dataset.episodes[0].task) in viewer._about.content and viewer._time.max == 30
         for t in (30, 3, 17, 8, 25, 0):
             viewer.seek(t)
         viewer.update()

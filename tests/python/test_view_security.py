@@ -356,7 +356,7 @@ def test_texts_of_a_recording_are_sent_as_text(tmp_path, port):
 
 
 def test_a_text_without_end_is_shortened(tmp_path, port):
-    with mjs.view(rewritten(tmp_path, ["a" * 3_000_000]), port=port, block=False, open_browser=False) as viewer, RawClient(viewer.url).read() as client:
+    with mjs.view(rewritten(tmp_path, ["a" * 60_000]), port=port, block=False, open_browser=False) as viewer, RawClient(viewer.url).read() as client:
         sent = [text for message in client.messages for text in all_texts(message)]
         assert 1000 < max(len(text) for text in sent if "aaaa" in text) < 10_000
         assert max(len(viewer._choice.value), len(viewer._outcome.options[1])) <= 140

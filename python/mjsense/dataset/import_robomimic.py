@@ -153,8 +153,8 @@ class _Demonstration:
             raise ValueError(f"{self.about}: 'actions' is missing")
         self.length = len(actions)
         self.arrays: dict[str, Any] = {"actions": actions}
-        observations = foreign.group_at(demo, "obs", self.about)
-        for key in () if observations is None else observations:
+        observations: Any = foreign.group_at(demo, "obs", self.about)
+        for key in observations or ():
             self.arrays[f"obs/{foreign.plain_name(key, f'{self.about}: obs')}"] = foreign.dataset_at(observations, key, f"{self.about}: obs")
         for key in ("rewards", "dones", "states", "integration_states"):
             if (array := foreign.dataset_at(demo, key, self.about)) is not None:
