@@ -289,7 +289,7 @@ def test_failures_are_kept_only_on_request(mjsense):
 
 def test_recording_contains_the_reason_of_a_failure(mjsense):
     args = ("record", "pick", "--scene", "shelf", "--cameras", "none", "--episodes", 3, "--max-attempts", 3, "--keep-failures", "-q")
-    mjsense(*args, "--horizon", 60, "--out", "data")
+    mjsense(*args, "--horizon", 30, "--out", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
         outcomes = {name: traj.attrs["outcome"] for name, traj in file.items()}
         assert {name for name, outcome in outcomes.items() if outcome == "success"} == {
@@ -308,7 +308,7 @@ def test_recording_contains_the_reason_of_a_failure(mjsense):
         names = [name for name, other in counted.items() if other == outcome]
         assert f"    {len(names)} x {outcome} ({', '.join(names)})\n" in shown
     assert " x success" not in shown
-    mjsense(*args, "--horizon", 60, "--worlds", 1, "--out", "one")
+    mjsense(*args, "--horizon", 30, "--worlds", 1, "--out", "one")
     name = "house_0/trajectories_batch_1_of_1.h5"
     assert (mjsense.folder / "one" / name).read_bytes() == (mjsense.folder / "data" / name).read_bytes()
 

@@ -75,6 +75,9 @@ def test_task_with_its_own_scene_accepts_no_other():
         def scene(self):
             return bench()
 
+        def evaluate(self, sim):
+            return np.zeros(sim.num_worlds), np.zeros(sim.num_worlds, bool)
+
     with pytest.raises(ValueError, match="makes its scene itself"):
         mjs.make_vec(Mine, robot="franka", scene=bench)
 
