@@ -28,7 +28,7 @@ class Words(mjs.Sensor):
 @pytest.mark.parametrize("name", ["mjsense/Pick-v0", "mjsense/DoorOpening-v0"])
 def test_a_default_view_without_cameras(name):
     env = gymnasium.make(name, **SMALL)
-    observation, _ = env.reset(seed=1)
+    observation, _ = env.reset(seed=3)
     assert not any(rows.ndim == 3 for rows in observation.values() if isinstance(rows, np.ndarray))
     picture = env.render()
     assert picture.shape == (40, 64, 3) and picture.std() > 10
