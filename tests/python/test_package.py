@@ -81,7 +81,7 @@ def test_configurations_are_dataclasses():
     with pytest.raises(TypeError, match="unhashable type: 'SceneCfg'"):
         hash(mjs.SceneCfg())
     assert list(inspect.signature(mjs.ObjRef).parameters) == [f.name for f in dataclasses.fields(mjs.ObjRef)]
-    with pytest.raises(TypeError, match=r"ObjRef.__init__\(\) got an unexpected keyword argument 'nam'"):
+    with pytest.raises(TypeError, match=r"ObjRef\(\) got an unexpected keyword argument 'nam'; did you mean 'name'"):
         mjs.ObjRef(nam="x")
 
     @dataclasses.dataclass
