@@ -160,7 +160,9 @@ def _episodes(file: Group, path: Path, recording: int) -> Iterator[EpisodeEntry]
         trajectory = file[name]
         if not isinstance(trajectory, Group):
             raise ValueError(f"{trajectory.where} is an array; it must be a group")
-        flags = trajectory["success"]
+        flags = trajectory.get("success")
+        if flags is None:
+            raise ValueError(f"{trajectory.where} has no dataset 'success'")
         if not isinstance(flags, Rows) or flags.ndim != 1 or not flags.is_number:
             raise ValueError(f"{flags.where} is {getattr(flags, 'dtype', 'a group')} {list(getattr(flags, 'shape', ()))}; it must be one bool for each observation")
         outcome = trajectory.attrs.text("outcome") if "outcome" in trajectory.attrs else None

@@ -22,6 +22,7 @@ from mjsense._input_files import unreadable
 from mjsense._optional import optional
 from mjsense.dataset import limits
 from mjsense.dataset.places import is_plain_name, open_plain, printable
+from mjsense.errors import UnknownNameError
 
 _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
 _FILTERS = (_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF)
@@ -79,7 +80,7 @@ class Attributes:
 
     def __getitem__(self, name: str) -> Any:
         if (value := self.get(name)) is None:
-            raise KeyError(f"{self._place} has no attribute '{name}'")
+            raise UnknownNameError(f"{self._place} has no attribute '{name}'")
         return value
 
     def text(self, name: str, default: str = "", most: int = limits.TEXT_BYTES) -> str:
@@ -133,7 +134,7 @@ class Group:
     def __getitem__(self, path: str) -> Any:
         where = f"{self._file} {self._below(path)}"
         if wrong := self._links(path):
-            raise (KeyError if wrong == "does not exist" else ValueError)(f"{where} {wrong}")
+            raise (UnknownNameError if wrong == "does not exist" else ValueError)(f"{where} {wrong}")
         with _reading(where):
             found = self._group[path]
         if hasattr(found, "dtype") and hasattr(found, "shape"):
