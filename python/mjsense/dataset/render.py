@@ -22,7 +22,7 @@ from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.hdf5 import open_h5, text_of
-from mjsense.dataset.playback import archive_of, inputs_of
+from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.recorder import FILE_OPTIONS, recorded_sensors
@@ -169,7 +169,7 @@ class _House:
             show_states(worlds.sim, ids, [inputs_of(p.episode).state[p.t] for _, p in active])
             recorder.append(ids, *([p.steps[name][p.t].item() for _, p in active] for name in _STEP_FIELDS))
             if failed := worlds.sim.failures:
-                raise RuntimeError(f"episode {playing[failed[0][0]].episode.index}: {failed[0][1]}")  # pyright: ignore[reportOptionalMemberAccess]
+                raise RuntimeError(f"{where(playing[failed[0][0]].episode)}: {failed[0][1]}")  # pyright: ignore[reportOptionalMemberAccess]
             finished = 0
             for w, p in active:
                 p.t += 1

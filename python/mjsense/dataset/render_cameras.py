@@ -17,6 +17,7 @@ from mjsense.configs import CameraSensorCfg
 from mjsense.core_sensors import CameraImageSensor, CameraParameterSensor
 from mjsense.dataset.description import is_known_thing
 from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.playback import where
 from mjsense.errors import UnknownNameError, did_you_mean
 
 if TYPE_CHECKING:
@@ -203,7 +204,7 @@ class CameraSystem:
         centre = sum(points, np.zeros(3)) * (1.0 / len(points)) if points else np.zeros(3)
         why = self._system.place(sim._core, world, episode.seed or 0, episode.number, list(centre), [b for b in bodies if b >= 0])
         if why:
-            raise ValueError(f"episode {episode.index}: {why}")
+            raise ValueError(f"{where(episode)}: {why}")
 
 
 def sized(camera: RenderCamera, width: int | None, height: int | None) -> RenderCamera:
