@@ -82,6 +82,7 @@ def _array(rng: random.Random, shape: tuple[int, ...]) -> np.ndarray:
 
 # ----------------------------------------------------------------------------------------------------------------- changes
 
+_TRAJECTORIES = ("traj_0", "traj_1")
 _CHANGES: list[Callable[[Path, random.Random, Path], str]] = []
 
 
@@ -191,7 +192,7 @@ def dataset(house: Path, rng: random.Random, secret: Path) -> str:
 def group(house: Path, rng: random.Random, secret: Path) -> str:
     with h5py.File(_file(house), "r+") as file:
         name = rng.choice([n for n in _objects(file) if n != "/"])
-        new = rng.choice(["traj_x", "traj_-1", "traj_99999999999999999999", "traj_1", "traj_0/obs/extra/" + rng.choice(["a", ".", "ü", "x" * 2000, "\x1b[31m"]),
+        new = rng.choice(["traj_x", "traj_-1", "traj_99999999999999999999", "traj_1", "traj_2", "traj_0/obs/extra/" + rng.choice(["a", ".", "ü", "x" * 2000, "\x1b[31m"]),
                           "traj_0/replay/model/" + rng.choice(["nq", "opt", "__class__", "names", "geom_dataid"])])  # fmt: skip
         try:
             if rng.random() < 0.5:
@@ -240,22 +241,23 @@ def recording_text(house: Path, rng: random.Random, secret: Path) -> str:
 @_change
 def scene_text(house: Path, rng: random.Random, secret: Path) -> str:
     with h5py.File(_file(house), "r+") as file:
-        stored = file["traj_0/obs_scene"][()]
+        place = f"{rng.choice(_TRAJECTORIES)}/obs_scene"
+        stored = file[place][()]
         scene = json.loads(stored if isinstance(stored, str) else bytes(stored).split(b"\0")[0])
         what = _change_json(scene, rng, secret)
-        attributes = dict(file["traj_0/obs_scene"].attrs)
-        del file["traj_0/obs_scene"]
+        attributes = dict(file[place].attrs)
+        del file[place]
         text = json.dumps(scene)
-        file["traj_0/obs_scene"] = text
+        file[place] = text
         for key, value in attributes.items():
-            file["traj_0/obs_scene"].attrs[key] = f"{zlib.crc32(text.encode()):08x}" if key == "crc32" else value
-    return f"obs_scene: {what}"
+            file[place].attrs[key] = f"{zlib.crc32(text.encode()):08x}" if key == "crc32" else value
+    return f"{place}: {what}"
 
 
 @_change
 def video_name(house: Path, rng: random.Random, secret: Path) -> str:
     with h5py.File(_file(house), "r+") as file:
-        videos = file["traj_0/obs/sensor_data"]
+        videos = file[f"{rng.choice(_TRAJECTORIES)}/obs/sensor_data"]
         camera = rng.choice(sorted(videos))
         name = rng.choice([*_texts(secret), "pipe.mp4", "link.mp4", "folder.mp4", "list.mp4", _file(house).name])
         attributes = {key: value for key, value in videos[camera].attrs.items() if rng.random() < 0.5 or key not in ("crc32", "bytes")}
@@ -286,7 +288,7 @@ def model_field(house: Path, rng: random.Random, secret: Path) -> str:
             value = rng.choice([v for v in _numbers() if values.dtype.kind == "f" or (v == v and abs(v) < 2**31)])
             flat[rng.randrange(flat.size)] = np.float64(value) if values.dtype.kind == "f" else np.int64(value).astype(values.dtype)
     with h5py.File(_file(house), "r+") as file:
-        fields = file["traj_0"].require_group("replay/model")
+        fields = file[rng.choice(_TRAJECTORIES)].require_group("replay/model")
         if name in fields:
             del fields[name]
         fields[name] = values
@@ -586,9 +588,9 @@ _PICTURE = _png(4, 4)
 
 
 def make_base(folder: Path) -> Path:
-    """A small recording with a color and a depth video and data for replay."""
+    """A small recording of two episodes with color and depth videos and data for replay."""
     out = folder / "base"
-    options = "--episodes 1 --worlds 1 --threads 1 --horizon 5 --keep-failures --cameras wrist_camera --size 32x24 --depth --no-shadows --seed 3 -q --no-sheet"
+    options = "--episodes 2 --worlds 1 --threads 1 --horizon 4 --keep-failures --cameras wrist_camera --size 32x24 --depth --no-shadows --seed 3 -q --no-sheet"
     # A process of its own, so that this one has no threads when it forks.
     subprocess.run([sys.executable, "-m", "mjsense", "record", "pick", "--robot", "franka", *options.split(), "--out", out], check=True)
     # Small textures: decoding them takes most of the time of reading the model.

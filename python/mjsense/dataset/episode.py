@@ -114,6 +114,8 @@ class Store:
         self.models = Cache(4)  # one unit per model
         self.known: dict[int, dict[str, Stream | None]] = {}
         """Arrays of each recording by their places in a trajectory; None: no stream."""
+        self.compared: set[tuple[int, str]] = set()
+        """Streams with large rows of which the checksum was compared, by the index of their episode."""
         self.leaves: set[str] | None = None
         """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
 
@@ -436,8 +438,11 @@ class Episode:
         """Rows of the recording, of a stream whose rows are too large to keep all of them."""
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
-            dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name]
-            return np.stack([dataset.rows_of(self._entry.length)[t] for t in rows])
+            dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name].rows_of(self._entry.length)
+            if not dataset.has_chunk_checksums and (self.index, name) not in self._store.compared:
+                dataset.compare()
+                self._store.compared.add((self.index, name))
+            return np.stack([dataset[t] for t in rows])
 
     # Replay
 

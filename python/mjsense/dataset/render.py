@@ -111,12 +111,12 @@ class _House:
         new_cameras = [camera for camera in cameras if camera not in copied]
         self._frames = sum(1 + camera.depth for camera in new_cameras)
         handles = self._make_worlds(new_cameras, images, brightness, options)
+        self._skip = _replaced_streams(first, copied)
         changed = {"cameras": [camera.settings() for camera in cameras], **images,
-                   "render": {"of": first._recording.provenance, "episodes": [episode.number for episode in episodes], "brightness": brightness,
-                              "camera_system": options["camera_system"]}}  # fmt: skip
+                   "render": {"of": first._recording.provenance, "carried": _carried_streams(first, self._skip), "episodes": [episode.number for episode in episodes],
+                              "brightness": brightness, "camera_system": options["camera_system"]}}  # fmt: skip
         self._recorder = self._make_recorder(out, handles, settings | changed, options)
         self.path = Path(self._recorder.path)
-        self._skip = _replaced_streams(first, copied)
         for number in () if self._recorder.enough else others:
             if not self._recorder.decided(number):
                 self._recorder.skip_episode(number, "not in the rendering")
@@ -203,6 +203,24 @@ def _replaced_streams(episode: Episode, copied: list[RenderCamera]) -> list[str]
     names = [camera.name for camera in render_cameras.recorded_cameras(episode, None) if camera not in copied]
     places = ("sensor_data/{}", "sensor_data/{}_depth", "sensor_data/{}_depth_16bit", "sensor_param/{}", "extra/{}_segmentation")
     return [f"obs/{place.format(name)}" for name in names for place in places]
+
+
+def _carried_streams(episode: Episode, replaced: list[str]) -> list[str]:
+    """Streams of the recording that are carried over, as its description lists them. ``verify`` reports one that is missing."""
+    stated = episode._recording.provenance
+    rendered = stated.get("settings", {}).get("render", {})
+    listed = [*_texts(stated.get("streams")), *(_texts(rendered.get("carried")) if isinstance(rendered, dict) else ())]
+
+    def is_replaced(entry: str) -> bool:
+        name = entry[: entry.rfind("(")].rpartition(" ")[0].replace("sensor_param_", "obs/sensor_param/", 1)  # of "qpos uint8(2000,)"
+        places = [name] if name.startswith("obs/") else [f"obs/extra/{name}", f"obs/sensor_data/{name.replace('/', '_')}"]
+        return any(place == prefix or place.startswith(f"{prefix}/") for place in places for prefix in replaced)
+
+    return [entry for entry in listed if not is_replaced(entry)]
+
+
+def _texts(value: Any) -> list[str]:
+    return [text for text in value if isinstance(text, str)] if isinstance(value, list) else []
 
 
 def _key_of(sensor: Any) -> str:
