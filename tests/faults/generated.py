@@ -37,7 +37,7 @@ CPU_SECONDS = 10  # that a reader may use
 MEMORY = 1500 << 20  # bytes that a process of readers may use
 _ADDRESS_SPACE = 12 << 30  # protects the machine; mappings of libraries and thread stacks count too
 _NO_END = 300  # s
-_MODULES = ("mjsense.__main__", "mjsense.export", "mjsense.view.open", "h5py", "av", "pyarrow.parquet", "viser", "PIL.PngImagePlugin", "asyncio", "xml.etree.ElementTree")
+_MODULES = ("mjsense.__main__", "mjsense.exporting", "mjsense.viewer.open", "h5py", "av", "pyarrow.parquet", "viser", "PIL.PngImagePlugin", "asyncio", "xml.etree.ElementTree")
 
 # ------------------------------------------------------------------------------------------------------------------ values
 
