@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from mjsense.export import Source
+from mjsense.exporting import Source
 
 import mjsense as mjs
 

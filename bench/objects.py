@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mjsense._png import png_of
-from mjsense.assets import name_package_folders
+from mjsense.core.png import png_of
+from mjsense.tasks.assets import name_package_folders
 
 import mjsense as mjs
 from mjsense import _core

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from mjsense.export import record_lerobot
+from mjsense.exporting import record_lerobot
 
 import mjsense as mjs
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mjsense._arrays import on_host
+from mjsense.core.arrays import on_host
 from warp_scenes import STATE, OfTask, SceneOfCheck
 
 import mjsense as mjs

@@ -35,7 +35,7 @@ def judge(task, act, worlds=128, steps=500):
 
 def with_rsl(task, env):
     """(policy, what trains it for some iterations)"""
-    from mjsense.rl.rsl import RslRlVecEnv
+    from mjsense.tasks.rl.rsl import RslRlVecEnv
     from rsl_rl.runners import OnPolicyRunner
 
     torch.manual_seed(0)
@@ -63,7 +63,7 @@ def with_rsl(task, env):
 
 def with_sb3(task, env):
     """(policy, what trains it for some iterations)"""
-    from mjsense.rl.sb3 import SB3VecEnv
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecNormalize
 

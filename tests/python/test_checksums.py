@@ -10,7 +10,7 @@ from edited_recordings import changed, file_of
 
 pytest.importorskip("av")
 
-from mjsense.export import export_lerobot, export_robomimic
+from mjsense.exporting import export_lerobot, export_robomimic
 
 import mjsense as mjs
 

@@ -8,7 +8,7 @@ import zipfile
 import mujoco
 import numpy as np
 import pytest
-from mjsense._png import png_of
+from mjsense.core.png import png_of
 from mjsense.dataset import archive
 from mjsense.dataset.closed_model import check_archive, closed_model, compile_closed
 from mjsense.dataset.model_sizes import MAX_PIXELS

@@ -140,7 +140,7 @@ class TestExport:
     def test_it_equals_that_of_one_process(self, format, library, index, tmp_path, monkeypatch):
         pytest.importorskip(library, reason=f"needs {library}")
         monkeypatch.setattr(exporting, "_CHUNK", 2)  # three parts
-        monkeypatch.setattr("mjsense.export.rlds._SHARD_BYTES", 50_000)
+        monkeypatch.setattr("mjsense.exporting.rlds._SHARD_BYTES", 50_000)
         shown = []
         (tmp_path / "ray").mkdir()
         ours = export_on_ray(format, index, tmp_path / "ray/data", progress=lambda *now: shown.append(now))

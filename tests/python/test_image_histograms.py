@@ -12,8 +12,8 @@ pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
 from mjsense.dataset import Episode, statistics
-from mjsense.export import frame_statistics
-from mjsense.export.frame_statistics import image_histograms
+from mjsense.exporting import frame_statistics
+from mjsense.exporting.frame_statistics import image_histograms
 
 import mjsense as mjs
 

@@ -11,7 +11,7 @@ from fractions import Fraction
 import h5py
 import numpy as np
 import pytest
-from mjsense._png import png_of
+from mjsense.core.png import png_of
 
 import mjsense as mjs
 

@@ -9,7 +9,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
-from mjsense._png import png_of as png
+from mjsense.core.png import png_of as png
 
 import mjsense as mjs
 

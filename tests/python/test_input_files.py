@@ -3,8 +3,8 @@
 
 import pytest
 from mjsense.dataset.sensor_tables import sensors_of
-from mjsense.export.mapping import Mapping
-from mjsense.export.record_lerobot import converted
+from mjsense.exporting.mapping import Mapping
+from mjsense.exporting.record_lerobot import converted
 
 import mjsense as mjs
 from mjsense import commands

@@ -23,7 +23,7 @@ from waiting import MOVES, WAITS, Waiting
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
-from mjsense.export import Source
+from mjsense.exporting import Source
 
 import mjsense as mjs
 

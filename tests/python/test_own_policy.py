@@ -4,7 +4,7 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
-from mjsense.policy import FunctionPolicy
+from mjsense.tasks.policy import FunctionPolicy
 from tasks import CART, Cart, Driver
 from test_own_task import json_rows, record, trajectories
 

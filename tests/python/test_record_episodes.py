@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from mjsense.export.mapping import Source
+from mjsense.exporting.mapping import Source
 
 import mjsense as mjs
 

@@ -13,8 +13,8 @@ import pytest
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
-from mjsense.export.output import part_of
-from mjsense.export.record_lerobot import CompleteError
+from mjsense.exporting.output import part_of
+from mjsense.exporting.record_lerobot import CompleteError
 
 import mjsense as mjs
 

@@ -12,7 +12,7 @@ import zlib
 import gymnasium
 import numpy as np
 import pytest
-from mjsense._code_checksums import checksums
+from mjsense.tasks.code_checksums import checksums
 
 import mjsense as mjs
 

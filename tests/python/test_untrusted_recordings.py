@@ -19,7 +19,7 @@ pytest.importorskip("av")
 from mjsense.cluster import tools
 from mjsense.dataset.description import Description
 from mjsense.dataset.places import is_plain_name, open_plain
-from mjsense.export import export_lerobot, export_robomimic
+from mjsense.exporting import export_lerobot, export_robomimic
 
 import mjsense as mjs
 

@@ -153,7 +153,7 @@ def test_what_is_missing_is_a_clear_error(drive):
 
 def test_rsl_rl_learns_without_a_copy_to_the_host(drive, monkeypatch):
     pytest.importorskip("rsl_rl")
-    from mjsense.rl.rsl import RslRlVecEnv
+    from mjsense.tasks.rl.rsl import RslRlVecEnv
     from rsl_rl.runners import OnPolicyRunner
 
     class Coarse(drive):
@@ -215,7 +215,7 @@ def played(worlds, policy):
 
 def test_stable_baselines3_gets_arrays(drive):
     pytest.importorskip("stable_baselines3")
-    from mjsense.rl.sb3 import SB3VecEnv
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
     from stable_baselines3 import PPO
 
     rows = []
