@@ -15,14 +15,14 @@ pytest.importorskip("av")
 pq = pytest.importorskip("pyarrow.parquet")
 
 import av
+
+import mjsense as mjs
+from mjsense import commands
 from mjsense.dataset import statistics
 from mjsense.exporting import Mapping, Source, frame_statistics, lerobot, lerobot_depth, lerobot_files, mapping
 from mjsense.exporting.mapping import _filled
 from mjsense.exporting.output import new_output
 from mjsense.exporting.remux import Concatenation
-
-import mjsense as mjs
-from mjsense import commands
 
 SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
 

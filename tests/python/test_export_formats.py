@@ -13,6 +13,8 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+
+import mjsense as mjs
 from mjsense.core.png import png_of
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.model_xml import model_xml
@@ -21,8 +23,6 @@ from mjsense.exporting import FORMATS, Source
 from mjsense.exporting import zarr as zarr_format
 from mjsense.exporting.images import depth_unit, to_uint16
 from mjsense.exporting.scene import bodies
-
-import mjsense as mjs
 
 ROOT = Path(__file__).parents[2]
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION

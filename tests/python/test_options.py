@@ -11,12 +11,12 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from mjsense.dataset import sensor_check
-from mjsense.dataset.model_xml import model_xml
 from tasks import Cart, Driver
 
 import mjsense as mjs
 from mjsense.core import libmujoco, mujoco_views
+from mjsense.dataset import sensor_check
+from mjsense.dataset.model_xml import model_xml
 from mjsense.scene import physics_options
 
 WORLD = """

@@ -7,11 +7,11 @@ import sys
 
 import numpy as np
 import pytest
-from mjsense.viewer.plots import _expand
 from scenes import ball_scene, feet_cfg
 
 import mjsense as mjs
 from mjsense.core import progress_line, representations
+from mjsense.viewer.plots import _expand
 
 
 @pytest.fixture(scope="module")

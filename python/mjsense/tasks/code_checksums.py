@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+
 from mjsense.sensors.sensor import Sensor
 from mjsense.tasks.policy import Policy
 from mjsense.tasks.task import Task

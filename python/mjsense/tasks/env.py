@@ -7,6 +7,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+
 from mjsense.core.arguments import Seed, checked
 from mjsense.scene.scene import Scene
 from mjsense.scene.written_values import numbers

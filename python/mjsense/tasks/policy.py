@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from mjsense import _core
 from mjsense.sensors.foreign_sensor import list_of_sensors
 from mjsense.sensors.nested_streams import choose_streams, nest, stream_path
 from mjsense.tasks.task import episode_rng, group_slices, snake_case
-
-from mjsense import _core
 
 if TYPE_CHECKING:
     from mjsense.sim.simulation import Simulation

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mjsense import _core
+from mjsense.core import representations
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.progress_line import line_of, of_recording
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
 from mjsense.sim.simulation import Simulation
 from mjsense.tasks.assets import use_installed_meshes
 from mjsense.tasks.parts import parts_of
-
-from mjsense import _core
-from mjsense.core import representations
 
 PARTS: dict[str, Any] = {"task": "pick", "robot": None, "policy": "planner", "scene": "", "resume": False, "append": False}
 """Defaults of the options that decide which parts a recording has."""

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, checked
 from mjsense.core.errors import UnknownNameError
 from mjsense.sensors.configs import EntityCfg
-
-from mjsense import _core
 
 
 @dataclass(frozen=True)

@@ -8,19 +8,20 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from mjsense import _core
+from mjsense.core import mujoco_names
 from mjsense.core.arguments import checked
 from mjsense.core.arrays import on_host
 from mjsense.core.errors import did_you_mean
 from mjsense.scene.scene import prepared
 from mjsense.scene.written_values import numbers, write_component
 from mjsense.sensors.foreign_sensor import list_of_sensors
-
-from mjsense import _core
-from mjsense.core import mujoco_names
 from mjsense.tasks import gymnasium_registry
 
 if TYPE_CHECKING:
     import mujoco
+
     from mjsense.sensors.configs import SceneCfg
     from mjsense.sim.simulation import Simulation
 

@@ -12,6 +12,9 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+
+from mjsense import _core
+from mjsense.core import mujoco_names
 from mjsense.core.arguments import Seed, checked
 from mjsense.scene.scene import Scene
 from mjsense.scene.written_values import numbers
@@ -21,9 +24,6 @@ from mjsense.sim.simulation import Simulation, warp_module
 from mjsense.tasks.assets import use_installed_meshes
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense.tasks.task import group_slices
-
-from mjsense import _core
-from mjsense.core import mujoco_names
 
 _VIEW = "default_view"
 """Camera sensor that is added to the scene if there is a render_mode."""

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
+
 from mjsense.sensors.nested_streams import choose_streams
 from mjsense.tasks.vector import TaskVectorEnv
 

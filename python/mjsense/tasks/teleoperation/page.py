@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+
 from mjsense.sim.simulation import Simulation
 from mjsense.tasks.teleoperation.pose import Pose
 from mjsense.viewer.pictures import Pictures

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from mjsense.core.rotations import inverse, product, rotation_by, rotation_of
 
 
