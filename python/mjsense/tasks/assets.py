@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 _PACKAGE = "package:"
-_GENERATORS = {"scene_synthesizer": "mjsense.tasks.scene_synthesizer"}
+_GENERATORS = {"scene_synthesizer": "mjsense.tasks.synthesized_objects"}
 """Modules that write the files of a source's objects with its packages."""
 
 
