@@ -268,6 +268,11 @@ def short_chunk(group, rows):
     group.create_dataset("evil", shape=(rows, 1000), dtype="f8", chunks=(rows, 1000), compression="gzip").id.write_direct_chunk((0, 0), b"x\x9ccddd\xe4\x02\x00\x00\x1e\x00\x0a")
 
 
+def short_plain_chunk(group, rows):
+    """The same without a filter: h5py gives what was in the memory after its only byte."""
+    group.create_dataset("evil", shape=(rows, 1000), dtype="f8", chunks=(rows, 1000)).id.write_direct_chunk((0, 0), b"x")
+
+
 def json_rows(row):
     def make(group, rows):
         made = group.create_dataset("evil", data=np.tile(np.frombuffer(row, np.uint8), (rows, 1)), compression="gzip")
@@ -285,6 +290,7 @@ def json_rows(row):
         (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 10**6, 8), chunks=(n, 10**6, 8), dtype="f8", compression="gzip")), "has chunks of 320000000 bytes"),
         (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 4 * 10**6), chunks=(1, 10**6), dtype="f8", compression="gzip")), "declares 160000000 bytes but stores 0"),
         (dataset_of(short_chunk), "is damaged: one of its chunks does not"),
+        (dataset_of(short_plain_chunk), "is damaged: one of its chunks does not"),
         (dataset_of(lambda g, n: g.create_dataset("evil", data=np.zeros((n + 1, 3)))), f"has {6} rows"),
         (json_rows(b'{"a":' * 20000 + b"1" + b"}" * 20000), "evil row 0 is"),
         (json_rows(b'{"../../escaped": [1.0]}'), "has the key '../../escaped', which is not a plain name"),
@@ -308,6 +314,21 @@ def test_hdf5(root, tmp_path, change, text):
     found = refusals(root, tmp_path, ("read", "robomimic"))
     assert found and text in found["read"], found
     assert errors_of(root)
+
+
+def test_every_episode_is_checked(root):
+    """Also the one whose streams are, by their names, those of the episode before."""
+    with changed(file_of(root)) as file:
+        file.copy("traj_0", "traj_1")
+        file["traj_1"].attrs["episode"] = 1
+        for name in file["traj_1/obs/sensor_data"].values():
+            video = file_of(root).with_name(name[:].tobytes().rstrip(b"\0").decode())
+            shutil.copy(video, video.with_name(f"copied_{video.name}"))
+            name[:] = np.frombuffer(f"copied_{video.name}".encode().ljust(len(name), b"\0"), np.uint8)
+        file["traj_1/obs/extra/tcp_pose"].attrs["unit"] = np.arange(3)
+    with pytest.raises(ValueError, match=r"traj_1/obs/extra/tcp_pose: the attribute 'unit' is .* not a text"):
+        _ = mjs.Dataset(root).episodes[1].streams
+    assert any("traj_1/obs/extra/tcp_pose: the attribute 'unit'" in text for text in errors_of(root)), errors_of(root)
 
 
 @pytest.mark.parametrize("kind", ["external", "soft", "hard loop", "reference", "opaque"])

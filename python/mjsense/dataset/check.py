@@ -52,6 +52,7 @@ def findings(root: Path, skip: Collection[str] = ()) -> Iterator[tuple[str, str]
         known = len(store.recordings)
         store.recordings += descriptions
         for entry in entries:
+            store.known.clear()  # the streams of each episode are checked, not only those of the first
             episode = Episode(replace(entry, recording=known + entry.recording), next(numbers), store)
             for check in _CHECKS:
                 try:

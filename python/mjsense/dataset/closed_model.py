@@ -40,6 +40,7 @@ _MESHES = (".stl", ".obj", ".msh")
 _CONTENT = {"image/png", "image/ktx", "image/vnd.mujoco.texture", "image/vnd.mujoco.hfield", "model/stl", "model/obj", "model/vnd.mujoco.msh"}
 _CONVERSION = re.compile(r"%[-+ #0'*.$\dhlLqjztw]*[A-Za-z]")
 """MuJoCo 4.0.1 uses a name that it does not know as the format of a message: ``%n`` ends the process."""
+_ERRORS: tuple[type[Exception], ...] = (ValueError, RuntimeError, *((mujoco.FatalError,) if libmujoco.shared else ()))
 _REFUSED = {"include": "reads other files", "attach": "reads other files", "model": "reads other files"}
 
 
@@ -195,7 +196,7 @@ def compiling(about: str) -> Iterator[None]:
     """Errors of MuJoCo as one line with the name of the archive."""
     try:
         yield
-    except (ValueError, RuntimeError, *([] if mujoco is None else [mujoco.FatalError])) as error:
+    except _ERRORS as error:
         raise ValueError(f"{about}: MuJoCo cannot compile the model: {' '.join(str(error).split())}") from None
 
 

@@ -289,7 +289,7 @@ class Episode:
         info = videos.get(_video_name(camera))
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
-            raise UnknownNameError(f"Episode {self.index} has no video '{camera}'; it has {cameras or 'no videos'}")
+            raise UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no video '{camera}'; it has {cameras or 'no videos'}")
         return info
 
     def _frames(self, cameras: list[str], rows: list[list[int]]) -> list[list[np.ndarray]]:

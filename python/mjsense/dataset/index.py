@@ -33,9 +33,9 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with open_plain(path) as plain:
         try:
+            _check_columns(path, parquet.ParquetFile(arrow.PythonFile(plain, "r")))
             # Dictionaries of texts: a text that occurs in many rows is not copied for each of them.
             file = parquet.ParquetFile(arrow.PythonFile(plain, "r"), read_dictionary=list(_TEXTS))
-            _check_columns(path, file)
             for batch in file.iter_batches(_ROWS, columns=[*_TEXTS, *_NUMBERS, "success"]):
                 _check_texts(path, batch)
                 rows += [checked_row(path, len(rows) + i, row) for i, row in enumerate(batch.to_pylist())]
