@@ -474,7 +474,7 @@ _ERRORS = ("ValueError", "OSError", "FileNotFoundError", "IsADirectoryError", "N
 
 def _is_clear(reader: str, text: str) -> bool:
     """Whether a refusal is one line that names the file. (``verify`` has a line for each finding.)"""
-    names = any(name in text for name in ("trajectories_batch_", "model_", "house_0"))
+    names = any(name in text for name in ("trajectories_batch_", "model_", "house_0", "/recording"))
     return names and "Traceback" not in text and (reader == "verify" or "\n" not in text.strip())
 
 

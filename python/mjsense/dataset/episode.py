@@ -81,6 +81,10 @@ def _unit_of(unit: str, leaf: str) -> str:
     return by_group.get(leaf, "") if by_group else unit
 
 
+_OF_STEPS = {"rewards": ("biuf", "number"), **dict.fromkeys(("success", "fail", "terminated", "truncated"), ("b", "bool"))}
+"""Kinds of NumPy types, and the word for them, of the datasets that every trajectory has."""
+
+
 def is_json(dataset: Rows) -> bool:
     """Whether a dataset contains JSON rows."""
     is_bytes = dataset.dtype == np.uint8 and dataset.ndim == 2
@@ -104,6 +108,13 @@ def _dataset_of(trajectory: Group, name: str) -> tuple[str, Rows] | None:
     return None
 
 
+def check_of_steps(name: str, dataset: Rows) -> None:
+    """Raises an error if rewards or flags are not one number or bool for each observation."""
+    kinds, word = _OF_STEPS.get(name, ("", ""))
+    if kinds and (dataset.ndim != 1 or dataset.dtype.kind not in kinds):
+        raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be one {word} for each observation")
+
+
 class Store:
     """What all episodes of a data set share: the recordings' descriptions and the caches."""
 
@@ -114,6 +125,8 @@ class Store:
         self.models = Cache(4)  # one unit per model
         self.known: dict[int, dict[str, Stream | None]] = {}
         """Arrays of each recording by their places in a trajectory; None: no stream."""
+        self.videos: dict[tuple[int, str], str] = {}
+        """Encoding and size of each video of a recording."""
         self.compared: set[tuple[int, str]] = set()
         """Streams with large rows of which the checksum was compared, by the index of their episode."""
         self.leaves: set[str] | None = None
@@ -334,8 +347,14 @@ class Episode:
                 width, height = image_size(at.integer("width", 1, 2**31), at.integer("height", 1, 2**31), dataset.where)
                 if (encoding := at.text("encoding")) not in _ENCODINGS:
                     raise ValueError(f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}")
+                rate = rate_of(at.text("fps"), f"{dataset.where}: fps")
+                if (stated := self._recording.fps) is not None and rate != stated:
+                    raise ValueError(f"{dataset.where}: fps is {rate}; that of its recording is {stated}")
+                about = f"{encoding} {width} x {height}"
+                if (first := self._store.videos.setdefault((self._entry.recording, key), about)) != about:
+                    raise ValueError(f"{dataset.where} is {about}; in another episode of the recording it is {first}")
                 videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, width, height, encoding, at.number("metres_per_unit", 0.0),
-                                                 rate_of(at.text("fps"), f"{dataset.where}: fps"), at.text("crc32"))  # fmt: skip
+                                                 rate, at.text("crc32"))  # fmt: skip
         return videos, 500 * len(videos)
 
     def _find_streams(self) -> tuple[dict[str, Stream], int]:
@@ -360,6 +379,7 @@ class Episode:
                 return
             about = {key: dataset.attrs.text(key) for key in ("unit", "frame", "description")}
             name = place.removeprefix(NUMBERS)
+            check_of_steps(name, dataset)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
@@ -429,16 +449,25 @@ class Episode:
                     if (values := cache.find((self.index, name))) is not None:
                         found[name] = values
                 elif place.removeprefix(NUMBERS) == name:
-                    found[name] = dataset.rows_of(self._entry.length).read()
+                    found[name] = self._checked(place, dataset).read()
                     if found[name].nbytes < LARGE_ROW * max(1, self._entry.length):
                         cache.add((self.index, name), found[name], found[name].nbytes)
         return {name: found[name] for name in names if name in found}
+
+    def _checked(self, place: str, dataset: Rows) -> Rows:
+        """The dataset of a stream, if it has a row for each observation, and the type and shape that it has in other episodes of the recording."""
+        check_of_steps(place, dataset)
+        stream = self._store.known.get(self._entry.recording, {}).get(place)
+        if stream is not None and (dataset.dtype, dataset.shape[1:]) != (stream.dtype, stream.shape):
+            raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}")
+        return dataset.rows_of(self._entry.length)
 
     def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:
         """Rows of the recording, of a stream whose rows are too large to keep all of them."""
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
-            dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name].rows_of(self._entry.length)
+            place = NUMBERS + name if NUMBERS + name in trajectory else name
+            dataset = self._checked(place, trajectory[place])
             if not dataset.has_chunk_checksums and (self.index, name) not in self._store.compared:
                 dataset.compare()
                 self._store.compared.add((self.index, name))

@@ -182,9 +182,7 @@ class _House:
 
     def _begin(self, world: int, episode: Episode) -> _Playing:
         self._worlds.begin(world, episode)
-        with open_h5(episode.path) as file:
-            trajectory = file[episode.trajectory]
-            steps = {name: trajectory[name].rows_of(episode.length).read() for name in _STEP_FIELDS}
+        steps = {name: episode[name] for name in _STEP_FIELDS}
         if self._system:
             show_states(self._worlds.sim, [world], [inputs_of(episode).state[0]])
             self._system.place(world, episode)
