@@ -357,11 +357,12 @@ def with_shape(place, shape, dtype):
         (with_shape("traj_1/numbers/actions/joint_pos/arm", (), "f8"), r"joint_pos/arm is float64 \[7?\]; in another episode", ("read", "lerobot", "robomimic")),
         (with_shape("traj_1/rewards", (2,), "f4"), r"traj_1/rewards is float32 \[\d, 2\]; it must be one number for each observation", ("read", "lerobot", "robomimic", "render")),
         (with_shape("traj_0/terminated", (), "f4"), r"traj_0/terminated is float32 \[\d\]; it must be one bool for each observation", ("read", "lerobot", "robomimic", "render")),
+        (with_shape("traj_1/obs/sensor_param/wrist_camera/intrinsic_cv", (2, 3), "f8"), r"intrinsic_cv is float64 \[\d, 2, 3\]; it must be a matrix of 3 x 3 numbers", ("read",)),
         (lambda file: file["traj_1/obs/sensor_data/wrist_camera"].attrs.__setitem__("width", 64), r"is rgb (32|64) x 24; in another episode of the recording it is rgb (32|64) x 24", ("read", "lerobot", "render")),
         (lambda file: file["traj_1/obs/sensor_data/wrist_camera"].attrs.__setitem__("fps", "15"), "fps is 15; that of its recording is 500/33", ("read", "lerobot", "render")),
         (lambda file: file.__delitem__("traj_1/numbers/actions/joint_pos/arm"), "has no 'numbers/actions/joint_pos/arm', which another episode of the recording has", ()),
     ],
-    ids=range(9),
+    ids=range(10),
 )  # fmt: skip
 def test_episodes_of_a_recording_have_the_same_streams(root, tmp_path, change, text, who):
     with with_second_episode(root) as file:

@@ -83,6 +83,8 @@ def _unit_of(unit: str, leaf: str) -> str:
 
 _OF_STEPS = {"rewards": ("biuf", "number"), **dict.fromkeys(("success", "fail", "terminated", "truncated"), ("b", "bool"))}
 """Kinds of NumPy types, and the word for them, of the datasets that every trajectory has."""
+_OF_CAMERAS = {"intrinsic_cv": (3, 3), "extrinsic_cv": (3, 4), "cam2world_gl": (4, 4)}
+"""Shapes of the parameters of cameras."""
 
 
 def is_json(dataset: Rows) -> bool:
@@ -108,11 +110,14 @@ def _dataset_of(trajectory: Group, name: str) -> tuple[str, Rows] | None:
     return None
 
 
-def check_of_steps(name: str, dataset: Rows) -> None:
-    """Raises an error if rewards or flags are not one number or bool for each observation."""
+def check_known(name: str, dataset: Rows) -> None:
+    """Raises an error if rewards or flags are not one number or bool for each observation, or parameters of cameras no matrices."""
     kinds, word = _OF_STEPS.get(name, ("", ""))
     if kinds and (dataset.ndim != 1 or dataset.dtype.kind not in kinds):
         raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be one {word} for each observation")
+    shape = _OF_CAMERAS.get(name.rpartition("/")[2]) if name.startswith("obs/sensor_param/") else None
+    if shape and dataset.shape[1:] != shape:
+        raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be a matrix of {shape[0]} x {shape[1]} numbers for each observation")
 
 
 class Store:
@@ -379,7 +384,7 @@ class Episode:
                 return
             about = {key: dataset.attrs.text(key) for key in ("unit", "frame", "description")}
             name = place.removeprefix(NUMBERS)
-            check_of_steps(name, dataset)
+            check_known(name, dataset)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
@@ -456,7 +461,7 @@ class Episode:
 
     def _checked(self, place: str, dataset: Rows) -> Rows:
         """The dataset of a stream, if it has a row for each observation, and the type and shape that it has in other episodes of the recording."""
-        check_of_steps(place, dataset)
+        check_known(place, dataset)
         stream = self._store.known.get(self._entry.recording, {}).get(place)
         if stream is not None and (dataset.dtype, dataset.shape[1:]) != (stream.dtype, stream.shape):
             raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}")
