@@ -47,11 +47,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from mjsense.core.field_docs import show_field_docs
 from mjsense.core.lazy_dataclass import dataclass
 from mjsense.sensors import config_methods
+from mjsense.sensors.effects import Effect
 
 if TYPE_CHECKING:
     import mujoco
-
-    from mjsense.sensors.effects import Effect
 ''',
     "effects": '''# SPDX-License-Identifier: Apache-2.0
 """Effects: errors of real sensors. An effect sensor applies them in this order to the rows of a sensor of the scene, in the unit
@@ -76,7 +75,6 @@ from typing import ClassVar, Literal
 from mjsense.core.field_docs import show_field_docs
 from mjsense.core.lazy_dataclass import dataclass
 from mjsense.sensors import config_methods
-from mjsense.sensors.configs import SensorCfg
 ''',
 }
 
@@ -298,8 +296,9 @@ class Generator:
         return found
 
     def python(self, module: str) -> str:
-        wanted = [n for n, s in self.structs.items() if (s["module"] or "configs") == module and "." not in n
-                  and n not in ("RecordJobCfg", "RolloutCfg", "VideoCfg")]  # fmt: skip
+        # EffectSensorCfg too is derived from SensorCfg, in configs, which imports effects.
+        own = {n: "configs" if s.get("bases") else s["module"] or "configs" for n, s in self.structs.items()}
+        wanted = [n for n in own if own[n] == module and "." not in n and n not in ("RecordJobCfg", "RolloutCfg", "VideoCfg")]
         done: set[str] = set()
         parts: list[str] = []
 

@@ -18,7 +18,7 @@ from mjsense import _core
 from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.storage import Storage
 from mjsense.dataset import Episode, bounded_json, index
-from mjsense.dataset.episode import Store
+from mjsense.dataset.episode_rows import Store
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.limits import SCENE_BYTES
 from mjsense.tasks.assets import use_installed_files

@@ -6,10 +6,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, TypeVar
-
-if TYPE_CHECKING:
-    from mjsense.tasks.record_job import RecordProgress
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 _PERIOD = 0.1  # s between two updates of a line that is overwritten
@@ -90,12 +87,3 @@ def clock(seconds: float) -> str:
     minutes, s = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{s:02}" if hours else f"{minutes}:{s:02}"
-
-
-def of_recording(p: RecordProgress) -> str:
-    """``3/10 episodes  75 % success  412 steps/s  0:41 left``, as the program shows it."""
-    ended, seconds = p.succeeded + p.failed, max(p.seconds, 1e-9)
-    parts = [f"{p.kept}/{p.wanted} episodes", f"{100 * p.succeeded / ended:.0f} % success" if ended else "", f"{p.steps / seconds:.0f} steps/s"]
-    parts.append(f"{p.frames / seconds:.0f} frames/s" if p.frames else "")
-    parts.append(f"{clock(p.seconds_left)} left" if p.seconds_left == p.seconds_left and p.kept < p.wanted else "")
-    return "  ".join(filter(None, parts))

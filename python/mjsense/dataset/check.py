@@ -13,7 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from mjsense.dataset import playback
-from mjsense.dataset.episode import NUMBERS, REPLAY, VIDEOS, Episode, Store, is_json
+from mjsense.dataset.episode import Episode
+from mjsense.dataset.episode_rows import NUMBERS, REPLAY, VIDEOS, Store, is_json
 from mjsense.dataset.files import batches, entries_of
 from mjsense.dataset.hdf5 import Group, open_h5
 from mjsense.dataset.json_rows import decode
