@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium
 import mujoco
 import numpy as np
 import pytest
@@ -328,7 +329,7 @@ class Height(mjs.Sensor):
     """Height of the ball, and the number of control steps of the episode."""
 
     uuid = "height"
-    observation_space = mjs.native_sensor.gymnasium.spaces.Box(0, 10, (1,), np.float32)
+    observation_space = gymnasium.spaces.Box(0, 10, (1,), np.float32)
 
     def initialize(self, sim):
         self.steps = np.zeros(sim.num_worlds, int)

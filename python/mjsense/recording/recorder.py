@@ -34,6 +34,7 @@ class WarpSimulation(Protocol):
     scene: Any
     num_worlds: int
     step_dt: float
+    _core: Any
 
     def refresh(self, sensors: Sequence[Any]) -> None: ...
     def _host_rows(self, sensors: Sequence[Any]) -> Any: ...

@@ -5,7 +5,7 @@ libraries in the same way."""
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mjsense.core.later_rooms import provided
@@ -25,7 +25,7 @@ class Values(NamedTuple):
 class EachWorld(NamedTuple):
     """Values that are computed one world at a time, when they are taken: ``(world, value)``, or an error instead of the value."""
 
-    values: Iterator[tuple[int, Any]]
+    values: Generator[tuple[int, Any]]
     method: str
     """Name of the method for errors."""
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from typing import Any
 
 from mjsense.compat import mjlab_methods
@@ -95,7 +95,7 @@ class PerWorldCalls(Calls):
                 yield env, world
 
     def compute(self, sim: Any, world_ids: list[int], seeds: Sequence[int] = ()) -> EachWorld:
-        def values() -> Iterator[tuple[int, Any]]:
+        def values() -> Generator[tuple[int, Any]]:
             for env, world in self._each(sim, world_ids, seeds, 0):
                 yield world, self._value(env, world)
 
