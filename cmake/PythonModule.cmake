@@ -27,7 +27,7 @@ add_custom_target(mjsense_python_hdf5 DEPENDS ${MJSENSE_PY_HDF5})
 add_dependencies(mjsense_python mjsense_python_hdf5)
 
 # The extension needs libmj_mjsense.so, a copy of libmujoco under a name of its own (cmake/private_mujoco.py). Where the environment's
-# mujoco is of the same series, mjsense/_libmujoco.py loads that one's libmujoco and shared/libmj_mjsense.so, an empty library of the same
+# mujoco is of the same series, mjsense/core/libmujoco.py loads that one's libmujoco and shared/libmj_mjsense.so, an empty library of the same
 # name, before the extension: the dynamic linker then takes the functions from the libmujoco that `import mujoco` uses.
 set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
 set(MJSENSE_PY_LIB ${MJSENSE_PY_DIR}/_lib)
@@ -44,7 +44,9 @@ set_target_properties(mjsense_shared_mujoco PROPERTIES OUTPUT_NAME mj_mjsense LI
 add_custom_target(mjsense_private_mujoco DEPENDS ${MJSENSE_PY_LIB}/libmj_mjsense.so)
 add_dependencies(mjsense_private_mujoco mjsense_shared_mujoco)
 add_dependencies(mjsense_python mjsense_private_mujoco)
-target_link_libraries(mjsense_python PRIVATE mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_PRIVATE_LIBS} ${MJSENSE_PY_LIB}/libmj_mjsense.so)
+# The three libraries are named, so that CMake puts these HDF5 libraries behind them and before the ones that they link otherwise.
+target_link_libraries(mjsense_python PRIVATE mjsense_app mjsense_tasks mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_ALL_LIBS}
+                                             ${MJSENSE_PY_LIB}/libmj_mjsense.so)
 target_link_options(mjsense_python PRIVATE -Wl,--exclude-libs,ALL -Wl,-Bsymbolic)
 if(MJSENSE_STATIC)
   target_sources(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR}/packaging/old_glibc.cc)

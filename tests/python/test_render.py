@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 import tasks
 from edited_recordings import changed, file_of
-from mjsense.dataset import render_cameras
 
 import mjsense as mjs
+from mjsense.dataset import render_cameras
 
 RECORDING = dict(worlds=2, episodes=3, keep_failures=True, horizon=8, seed=5, width=48, height=32, depth=True)
 TOP = {"pos": (0.5, 0, 1.6), "lookat": (0.5, 0, 0)}
@@ -80,7 +80,7 @@ def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
 
 def test_image_options_are_those_that_the_recorder_gives_to_its_cameras():
     """An option that is added to the recorder is kept by render, whose table follows from the declarations."""
-    source = (Path(__file__).parents[2] / "src/mjsense/rollout/episode_cameras.cc").read_text()
+    source = (Path(__file__).parents[2] / "src/mjsense_tasks/rollout/episode_cameras.cc").read_text()
     given = {option: field for field, option in re.findall(r"out\.(\w+) = cfg\.(\w+);", source)}
     assert render_cameras.image_options() == given and {"shadows", "samples", "shadow_samples"} <= given.keys()
     assert not {"width", "height"} & given.keys()
