@@ -80,7 +80,8 @@ def test_every_field_equals_that_of_the_cpu(scene):
     import warp_compare
     from warp_scenes import SCENES
 
-    assert not warp_compare.beyond(warp_compare.run("cpu", 3, 6, {scene: SCENES[scene]}))
+    # With fewer worlds, one ray that grazes a thin capsule would be more than a thousandth of the values.
+    assert not warp_compare.beyond(warp_compare.run("cpu", 8, 6, {scene: SCENES[scene]}))
 
 
 @needs_warp
@@ -210,7 +211,7 @@ def test_a_written_time_is_the_simulations_and_the_physics_and_does_not_disturb_
             sim.set_state([1], time=5)
             np.testing.assert_allclose(host(sim.time), [0.015, 5, 0.015])
         if step == 6:
-            sim.set_state(time=sim.time - 1)
+            sim.set_state(time=host(sim.time) - 1)
         for name in ("eye", "touch"):
             for field, values in alone.scene[name].fields.items():
                 np.testing.assert_array_equal(host(sim.scene[name].fields[field]), host(values), err_msg=f"{step} {field}")
@@ -292,6 +293,20 @@ def test_arrays_share_the_device_memory():
     sim.step()
     assert sim.scene["touch"].data.force is array
     assert found.ctypes.data == (array.data_ptr() if hasattr(array, "data_ptr") else array.ptr)
+
+
+@needs_warp
+def test_read_only_values_are_copied():
+    torch = pytest.importorskip("torch")
+    sim = simulation()
+    values = np.full(1, 0.5, np.float32)
+    values.flags.writeable = False
+    torch.set_warn_always(True)  # torch warns once in a process otherwise
+    try:
+        sim.ctrl = values
+    finally:
+        torch.set_warn_always(False)
+    np.testing.assert_array_equal(host(sim.ctrl), np.full((sim.num_worlds, 1), 0.5))
 
 
 @needs_warp
@@ -476,5 +491,7 @@ def test_options_of_a_running_simulation_are_for_the_cpu():
     sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=xml)), num_worlds=2, backend="warp", device="cpu")
     with pytest.raises(NotImplementedError, match=r"Simulation\.options is not available with backend='warp'; use backend='cpu'"):
         sim.options
-    with pytest.raises(NotImplementedError, match=r"randomize\('opt\.gravity'\) is not available with backend='warp': set SceneCfg\(options="):
+    with pytest.raises(
+        NotImplementedError, match=r"randomize\('opt\.gravity'\) is not available with backend='warp': set SceneCfg\(options="
+    ):
         sim.randomize("opt.gravity", [0, 0, -1])
