@@ -12,7 +12,6 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Iterable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -47,15 +46,6 @@ def use_installed_meshes() -> None:
 
     for variable, folder in installed_meshes(map(_core.robot_text, _core.robot_names())).items():
         os.environ.setdefault(variable, str(folder))
-
-
-def use_installed_files(words: list[str]) -> None:
-    """Makes the C++ program, run with these arguments in this process, use the meshes and the ffmpeg of installed packages."""
-    from mjsense.ffmpeg import use_installed_ffmpeg  # this file also runs alone
-
-    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
-        use_installed_meshes()
-    use_installed_ffmpeg()
 
 
 def name_package_folders() -> None:

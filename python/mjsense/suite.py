@@ -11,8 +11,7 @@ import gymnasium
 from mjsense._arguments import KnownAttributes, checked
 from mjsense._arrays import ids_of_worlds
 from mjsense._foreign_sensor import as_sensor
-from mjsense._show import printable
-from mjsense.errors import UnknownNameError
+from mjsense.errors import UnknownNameError, printable
 from mjsense.sensor import Sensor
 
 

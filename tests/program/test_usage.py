@@ -155,7 +155,7 @@ def test_unwritable_stdout_is_an_error_of_every_command(mjsense):
     mjsense("record", "pick", "--cameras", "none", "--horizon", 2, "--keep-failures", "-q", "--out", "data")
     for word in WORDS:
         with open("/dev/full", "w") as full:
-            done = subprocess.run([mjsense.program, *word.split()], cwd=mjsense.folder, stdout=full, stderr=subprocess.PIPE, text=True)
+            done = subprocess.run([*mjsense.program, *word.split()], cwd=mjsense.folder, stdout=full, stderr=subprocess.PIPE, text=True)
         assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: No space left on device\n"), word
 
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/app/schema.h"
+#include "python/bindings/schema.h"
 
 #include <fmt/format.h>
 
@@ -8,12 +8,15 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/fields/fields.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/record_job.h"
+#include "mjsense/rollout/registry.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/scene_file.h"
 #include "mjsense/sensors/all_sensors.h"
 
-namespace mjsense::app {
+namespace mjsense::python {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -65,7 +68,13 @@ class Schema {
   const std::map<std::string, const StructDecl*, std::less<>>& decls() const { return decls_; }
 
   std::string text() const {
-    return Json{{"structs", structs_}, {"data", data_}, {"data_of_kind", data_of_kind_}}.dump(1);
+    const Json names{{"tasks", rollout::task_names()},
+                     {"robots", robots::robot_names()},
+                     {"policies", rollout::policy_names()},
+                     {"scenes", scenes::scene_names()}};
+    return Json{
+        {"structs", structs_}, {"data", data_}, {"data_of_kind", data_of_kind_}, {"names", names}}
+        .dump(1);
   }
 
  private:
@@ -85,6 +94,7 @@ class Schema {
       out["above_low"] = field.above_low;
       out["words"] = field.words;
       out["option"] = field.option_name();
+      out["flag"] = field.flag_name();
       out["hidden"] = field.is_hidden;
     }
     out["unit"] = field.unit_;
@@ -190,4 +200,4 @@ const StructDecl* find_struct(std::string_view name) {
   return found == schema().decls().end() ? nullptr : found->second;
 }
 
-}  // namespace mjsense::app
+}  // namespace mjsense::python
