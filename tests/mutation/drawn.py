@@ -17,6 +17,7 @@ SLOW_S = 2  # a test that takes longer is slow
 # Seconds of tests, as measured without a mutant, that judge one mutant: slow ones of its own room, fast ones of other rooms.
 SLOW_OWN_S, OTHERS_S = 20, 30
 PYTHON_S = 120  # seconds of the clock after which no further pytest file judges a mutant of python/
+EXTENSION = "python/mjsense/_core.abi3.so"  # the program and the Python package
 OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
 
 
@@ -54,8 +55,8 @@ class Judge:
     def baseline(self, cache: Path) -> None:
         """The time of each test without a mutant. Tests that fail so are left out."""
         known = json.loads(cache.read_text()) if cache.exists() else {}
-        self.runner.build([*(f"{room}_test" for room in self.rooms), "golden_test", "mjsense_program", "record_fake", "mjsense_python"])
-        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", "mjsense"]:
+        self.runner.build([*(f"{room}_test" for room in self.rooms), "golden_test", "record_fake", "mjsense_python"])
+        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", EXTENSION]:
             self.original[program] = self.digest(program)
         for room in self.rooms:
             program = f"{room}_test"
@@ -129,8 +130,8 @@ class Judge:
                     same = False
                     if failed := self.runner.golden():
                         return "noticed", failed
-            self.runner.build(["mjsense_program"])
-            same = same and self.digest("mjsense") == self.original["mjsense"]
+            self.runner.build(["mjsense_python"])
+            same = same and self.digest(EXTENSION) == self.original[EXTENSION]
             if not same and (paths := self.pytests.get(file.split("/")[2])):
                 self.runner.build(["record_fake"])
                 if failed := self.runner.pytest(paths):

@@ -45,8 +45,7 @@ PYTESTS = {
     "record": ["tests/record", "tests/program", "tests/faults"],
     "rollout": ["tests/program", "tests/python"],
     "replay": ["tests/record", "tests/program", "tests/faults"],
-    "app": ["tests/program"],
-    "python": ["tests/python", "tests/conformance"],
+    "python": ["tests/python", "tests/program", "tests/conformance"],
 }
 LIMIT_S = 600  # a judge that takes longer has noticed: nothing takes a tenth of this
 MEMORY = 64 << 30  # bytes of address space of a test: a mutant may allocate without end; two thousand worlds take half of it
@@ -57,7 +56,6 @@ QUICK_PYTESTS = {
     "record": ["tests/record/test_files.py"],
     "rollout": ["tests/program/test_record.py"],
     "replay": ["tests/record/test_files.py", "tests/program/test_usage.py"],
-    "app": ["tests/program/test_usage.py", "tests/program/test_streams.py", "tests/program/test_scan.py"],
 }
 
 
@@ -209,7 +207,7 @@ class Runner:
             if i == 0:
                 yield "golden", ["golden_test"], self.golden
         paths = PYTESTS.get(room, ["tests/conformance", "tests/python"])
-        yield "pytest", ["mjsense_program", "record_fake", "mjsense_python"], lambda: self.pytest(paths)
+        yield "pytest", ["record_fake", "mjsense_python"], lambda: self.pytest(paths)
 
     def configure(self) -> None:
         if not (BUILD / "build.ninja").exists():

@@ -133,6 +133,8 @@ def repair(path: str) -> dict[str, list[str]]:
     Returns:
         ``actions`` and ``failures``: sentences.
     """
+    if not is_address(path) and not (_fetched(path)[0] / "job.json").exists():
+        return json.loads(_core.repair(_fetched(path)[0]))
     address = path if is_address(path) else str(resolved(path)[0])
     address = address.rstrip("/").removesuffix(f"/{INDEX}")
     storage = Storage(address)

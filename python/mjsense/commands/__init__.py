@@ -8,6 +8,7 @@ its explanation. It imports what it needs in ``run``: the program answers ``--he
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,13 @@ _SHARED = dict.fromkeys(("tasks", "robots", "scenes", "objects"), "lists")
 
 FAILED = 1  # some episodes or checks failed
 WRONG_INPUT = 2
+
+
+def run(words: Sequence[str]) -> int:
+    """Runs the program with the words of its command line, and returns its exit code."""
+    from mjsense.commands import start
+
+    return start.main(words)
 
 
 def module_of(name: str) -> ModuleType:

@@ -98,7 +98,8 @@ def _keys_of(parser: Parser) -> dict[str, Callable[[Any, str], None]]:
 def _setter(parser: Parser, action: argparse.Action, opposite: bool = False) -> Callable[[Any, str], None]:
     is_flag = action.nargs == 0 or isinstance(action, argparse.BooleanOptionalAction)
     is_list = action.nargs in ("+", "*") or isinstance(action, argparse._AppendAction)
-    types, kind = _KINDS[bool if is_flag else action.type if action.type in _KINDS else str]  # pyright: ignore[reportArgumentType,reportIndexIssue]
+    given = getattr(action.type, "kind", action.type)
+    types, kind = _KINDS[bool if is_flag else given if given in _KINDS else str]  # pyright: ignore[reportArgumentType]
 
     def put(value: Any, place: str) -> None:
         name = action.dest
@@ -110,7 +111,7 @@ def _setter(parser: Parser, action: argparse.Action, opposite: bool = False) -> 
             chosen = value != opposite if constant is None else constant if value else action.default
         else:
             try:
-                made = [action.type(one) if callable(action.type) and isinstance(one, str) else one for one in values]
+                made = [action.type(str(one)) if callable(action.type) else one for one in values]
             except (argparse.ArgumentTypeError, ValueError) as error:
                 raise ValueError(f"{place}: {name}: {error}") from None
             if action.choices is not None and (wrong := [one for one in made if one not in action.choices]):

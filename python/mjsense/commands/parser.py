@@ -174,6 +174,7 @@ def add_steps(parser: Parser, text: str, default: int) -> None:
             raise argparse.ArgumentTypeError(f"Value {given} not in range 0 to {_MAX_STEPS}")
         return int(given)
 
+    setattr(steps, "kind", int)  # noqa: B010
     action = parser.add_argument("--steps", type=steps, default=default, metavar="INT", help=text)
     setattr(action, "shown_default", str(default))  # noqa: B010
 

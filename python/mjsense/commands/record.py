@@ -184,7 +184,8 @@ def _record_on_ray(arguments: argparse.Namespace, options: dict[str, Any]) -> in
     from mjsense._progress import ProgressLine
     from mjsense.cluster import Job, record_on_ray
 
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # the cluster of this machine ends with the recording
+    if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # the cluster of this machine ends with the recording
     line = None if arguments.quiet else ProgressLine()
 
     def show(now: ClusterProgress) -> None:

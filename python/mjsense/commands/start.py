@@ -187,9 +187,10 @@ def _run(words: Sequence[str]) -> int:
         return 0
     arguments = parsed(words)
     module = module_of(arguments.command)
-    if not getattr(module, "ENDS_AT_CTRL_C", False):
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    _core.print_warnings_once()
+    if _prepared:
+        _core.print_warnings_once()
+        if not getattr(module, "ENDS_AT_CTRL_C", False):
+            signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         return module.run(arguments)
     except KeyboardInterrupt:
