@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     import importlib
     import io
 
-    from mjsense._progress import counter
+    from mjsense.core.progress_line import counter
 
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
             export_on_ray(arguments.format, arguments.path, arguments.out, **options, progress=report, **ray_options(arguments))
             return 0
-        function = getattr(importlib.import_module(f"mjsense.export.{arguments.format}"), f"export_{arguments.format}")
+        function = getattr(importlib.import_module(f"mjsense.exporting.{arguments.format}"), f"export_{arguments.format}")
         function(arguments.path, arguments.out, progress=report, **options)
         if not arguments.quiet:
             print(f"Wrote {arguments.out}.")

@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense import _core
     from mjsense.cluster import tools
     from mjsense.commands import quality
-    from mjsense.ffmpeg import use_installed_ffmpeg
+    from mjsense.recording.ffmpeg import use_installed_ffmpeg
 
     local, text, as_json = tools.inspect(arguments.path)
     # Before anything is printed, so that a failure prints one line only.

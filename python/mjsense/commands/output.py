@@ -13,14 +13,14 @@ def tell(text: str) -> None:
 
     Characters that control a terminal become ``?``, because names in the text may come from files of others.
     """
-    from mjsense.errors import printable  # slow to import
+    from mjsense.core.errors import printable  # slow to import
 
     print(printable(text), file=sys.stderr)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
     """Lines of columns. ``right``: the columns that are aligned to the right."""
-    from mjsense.errors import printable
+    from mjsense.core.errors import printable
 
     shown = [[printable(cell).replace("\n", "?") for cell in row] for row in (header, *rows)]
     widths = [max(map(len, column)) for column in zip(*shown)]

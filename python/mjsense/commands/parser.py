@@ -23,7 +23,7 @@ _LISTED = ("robot", "policy")  # in the help
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'record'?"``, or nothing."""
-    from mjsense.errors import did_you_mean  # slow to import
+    from mjsense.core.errors import did_you_mean  # slow to import
 
     return did_you_mean(name, known)
 

@@ -71,8 +71,8 @@ def _refuse(names: list[str], other: str) -> None:
 def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bool, shows_tree: bool) -> int:
     """Records on this machine, and prints the summary. Returns 0 if all wanted episodes are on disk, otherwise 1."""
     from mjsense import _core
-    from mjsense._progress import ProgressLine, of_recording
-    from mjsense._recording import RecordProgress, job_result
+    from mjsense.core.progress_line import ProgressLine, of_recording
+    from mjsense.tasks.record_job import RecordProgress, job_result
 
     title, out = _title(options)
     line = None if arguments.quiet else ProgressLine()
@@ -160,7 +160,7 @@ def _summary_json(made: dict[str, Any], sheet: str) -> str:
 
 def _record_lerobot(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     """Records, and converts the recording to a LeRobot data set meanwhile."""
-    from mjsense.export.record_lerobot import CompleteError, converted
+    from mjsense.exporting.record_lerobot import CompleteError, converted
 
     out = options["out"]
     try:
@@ -181,8 +181,8 @@ def _record_lerobot(arguments: argparse.Namespace, options: dict[str, Any]) -> i
 
 
 def _record_on_ray(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
-    from mjsense._progress import ProgressLine
     from mjsense.cluster import Job, record_on_ray
+    from mjsense.core.progress_line import ProgressLine
 
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # the cluster of this machine ends with the recording

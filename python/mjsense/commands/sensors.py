@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     import json
 
     from mjsense import _core
-    from mjsense.assets import use_installed_meshes
+    from mjsense.tasks.assets import use_installed_meshes
 
     options = field_values(arguments, "RolloutCfg")
     if names_model(arguments.what, "an MJCF file or the name of a task"):

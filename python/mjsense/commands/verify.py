@@ -20,10 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     import json
 
-    from mjsense._progress import ProgressLine, interactive
     from mjsense.cluster import tools
     from mjsense.commands import FAILED
-    from mjsense.ffmpeg import use_installed_ffmpeg
+    from mjsense.core.progress_line import ProgressLine, interactive
+    from mjsense.recording.ffmpeg import use_installed_ffmpeg
 
     use_installed_ffmpeg()
     line = ProgressLine() if interactive() and not arguments.quiet else None
