@@ -11,11 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/robots/load_robot.h"
-#include "mjsense/rollout/registry.h"
-#include "mjsense/rollout/task_defaults.h"
-#include "mjsense/scenes/load_scene.h"
-#include "mjsense/scenes/object_catalogue.h"
+#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/rollout/registry.h"
+#include "mjsense_tasks/rollout/task_defaults.h"
+#include "mjsense_tasks/scenes/load_scene.h"
+#include "mjsense_tasks/scenes/object_catalogue.h"
 #include "python/bindings/bindings.h"
 
 namespace mjsense::python {
@@ -51,9 +51,9 @@ constexpr struct {
 };
 
 // Packages that entities of a scene come from: "package:<package>/...".
-std::string packages_of(const scenes::SceneFileCfg& scene) {
+std::string packages_of(const tasks::scenes::SceneFileCfg& scene) {
   std::vector<std::string> found;
-  for (const scenes::SceneEntityCfg& entity : scene.entities) {
+  for (const tasks::scenes::SceneEntityCfg& entity : scene.entities) {
     constexpr std::string_view kPrefix = "package:";  // of the model, or of files in its MJCF text
     const std::size_t at = entity.model.find(kPrefix);
     if (at == std::string::npos) continue;
@@ -73,32 +73,32 @@ Json entry(const std::string& name, const std::string& description, const std::s
 
 std::string tasks_json() {
   Json out = Json::array();
-  for (const std::string& name : rollout::task_names()) {
+  for (const std::string& name : tasks::rollout::task_names()) {
     const auto* known =
         std::ranges::find_if(kTasks, [&](const auto& one) { return name == one.name; });
     if (known == std::end(kTasks)) {
       out.push_back(entry(name, "", ""));
       continue;
     }
-    out.push_back(
-        entry(name, known->what,
-              fmt::format("{} Default: {} in {}.", known->needs, rollout::default_robot(name),
-                          rollout::default_scene(rollout::task_components(name)[0]))));
+    out.push_back(entry(
+        name, known->what,
+        fmt::format("{} Default: {} in {}.", known->needs, tasks::rollout::default_robot(name),
+                    tasks::rollout::default_scene(tasks::rollout::task_components(name)[0]))));
   }
   return out.dump(2);
 }
 
 std::string robots_json() {
   Json out = Json::array();
-  for (const std::string& name : robots::robot_names())
-    out.push_back(entry(name, robots::robot_cfg(name).description, ""));
+  for (const std::string& name : tasks::robots::robot_names())
+    out.push_back(entry(name, tasks::robots::robot_cfg(name).description, ""));
   return out.dump(2);
 }
 
 std::string scenes_json() {
   Json out = Json::array();
-  for (const std::string& name : scenes::scene_names()) {
-    const scenes::SceneFileCfg scene = scenes::load_scene(name);
+  for (const std::string& name : tasks::scenes::scene_names()) {
+    const tasks::scenes::SceneFileCfg scene = tasks::scenes::load_scene(name);
     const char* houses = !scene.generator.empty() ? " Each house number gives a different house."
                          : scene.catalogue_count >= 0 ? " Each house number gives other objects."
                                                       : "";
@@ -109,10 +109,11 @@ std::string scenes_json() {
 
 std::string objects_json() {
   Json out = Json::array();
-  for (const scenes::CatalogueObjectCfg& object : scenes::object_catalogue().objects) {
-    const scenes::ObjectSourceCfg& source = scenes::source_of(object);
+  for (const tasks::scenes::CatalogueObjectCfg& object :
+       tasks::scenes::object_catalogue().objects) {
+    const tasks::scenes::ObjectSourceCfg& source = tasks::scenes::source_of(object);
     std::vector<std::string> meshes;
-    for (const scenes::CataloguePartCfg& part : object.parts) meshes.push_back(part.mesh);
+    for (const tasks::scenes::CataloguePartCfg& part : object.parts) meshes.push_back(part.mesh);
     out.push_back({{"name", object.name},
                    {"description", object.text},
                    {"kind", object.kind},
@@ -123,7 +124,7 @@ std::string objects_json() {
                    {"packages", source.packages},
                    {"model", object.model},
                    {"meshes", meshes},
-                   {"installed", scenes::is_installed(object)},
+                   {"installed", tasks::scenes::is_installed(object)},
                    {"excluded", object.excluded}});
   }
   return out.dump(2);

@@ -19,11 +19,11 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/system/print_stderr.h"
-#include "mjsense/rollout/rollout.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 #include "mjsense/sensors/lidar/point_cloud.h"
 #include "mjsense/sim/simulation.h"
+#include "mjsense_tasks/rollout/rollout.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 
@@ -85,10 +85,10 @@ std::string streams_json(sim::Simulation& simulation, std::span<Sensor* const> s
 }
 
 std::string streams_of_task(nb::dict options, int steps) {
-  rollout::RolloutCfg cfg;
-  read_options(options, struct_of<rollout::RolloutCfg>(), &cfg);
+  tasks::rollout::RolloutCfg cfg;
+  read_options(options, struct_of<tasks::rollout::RolloutCfg>(), &cfg);
   nb::gil_scoped_release unlock;
-  rollout::Rollout rollout(cfg);
+  tasks::rollout::Rollout rollout(cfg);
   const int worlds[] = {0};
   const std::int64_t episodes[] = {0};
   rollout.start(worlds, episodes);

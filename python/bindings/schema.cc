@@ -8,13 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/fields/fields.h"
-#include "mjsense/robots/load_robot.h"
-#include "mjsense/rollout/record_job.h"
-#include "mjsense/rollout/registry.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/scenes/load_scene.h"
-#include "mjsense/scenes/scene_file.h"
 #include "mjsense/sensors/all_sensors.h"
+#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/rollout/record_job.h"
+#include "mjsense_tasks/rollout/registry.h"
+#include "mjsense_tasks/scenes/load_scene.h"
+#include "mjsense_tasks/scenes/scene_file.h"
 
 namespace mjsense::python {
 namespace {
@@ -68,10 +68,10 @@ class Schema {
   const std::map<std::string, const StructDecl*, std::less<>>& decls() const { return decls_; }
 
   std::string text() const {
-    const Json names{{"tasks", rollout::task_names()},
-                     {"robots", robots::robot_names()},
-                     {"policies", rollout::policy_names()},
-                     {"scenes", scenes::scene_names()}};
+    const Json names{{"tasks", tasks::rollout::task_names()},
+                     {"robots", tasks::robots::robot_names()},
+                     {"policies", tasks::rollout::policy_names()},
+                     {"scenes", tasks::scenes::scene_names()}};
     return Json{
         {"structs", structs_}, {"data", data_}, {"data_of_kind", data_of_kind_}, {"names", names}}
         .dump(1);
@@ -183,9 +183,9 @@ const Schema& schema() {
       schema.add(*kind.cfg);
       if (kind.data) schema.add(*kind.data, kind.cfg->kind);
     }
-    schema.add(struct_of<scenes::SceneFileCfg>());
-    schema.add(struct_of<rollout::RecordJobCfg>());
-    schema.add(struct_of<rollout::RolloutCfg>());
+    schema.add(struct_of<tasks::scenes::SceneFileCfg>());
+    schema.add(struct_of<tasks::rollout::RecordJobCfg>());
+    schema.add(struct_of<tasks::rollout::RolloutCfg>());
     return schema;
   }();
   return kSchema;

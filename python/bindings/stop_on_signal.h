@@ -6,7 +6,7 @@
 
 #include <csignal>
 
-#include "mjsense/rollout/record_job.h"
+#include "mjsense_tasks/rollout/record_job.h"
 
 namespace mjsense::python {
 
@@ -31,7 +31,7 @@ class StopOnSignal {
   StopOnSignal(const StopOnSignal&) = delete;
   StopOnSignal& operator=(const StopOnSignal&) = delete;
 
-  static inline rollout::StopFlag flag{0};  // number of signals
+  static inline tasks::rollout::StopFlag flag{0};  // number of signals
 
  private:
   static void handle(int signal) {

@@ -5,12 +5,12 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/toml_fields.h"
-#include "mjsense/rollout/record_job.h"
+#include "mjsense_tasks/rollout/record_job.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace mjsense;
-  rollout::RecordJobCfg job;
+  tasks::rollout::RecordJobCfg job;
   try {
     read_toml_fields({reinterpret_cast<const char*>(data), size}, "file.toml", job);
   } catch (const Error& e) {
