@@ -12,7 +12,7 @@ add_library(mjsense_fuzzed STATIC EXCLUDE_FROM_ALL ${MJSENSE_FUZZ_SOURCES} tests
 target_compile_options(mjsense_fuzzed PUBLIC ${flags} PRIVATE -fsanitize=fuzzer-no-link)
 target_link_options(mjsense_fuzzed PUBLIC ${flags})
 target_include_directories(mjsense_fuzzed PUBLIC src ${PROJECT_SOURCE_DIR})
-target_link_libraries(mjsense_fuzzed PUBLIC mujoco::mujoco ${MJSENSE_PRIVATE_LIBS})
+target_link_libraries(mjsense_fuzzed PUBLIC mujoco::mujoco ${MJSENSE_ALL_LIBS})
 
 set_source_files_properties(src/mjsense/core/fields/toml_value.cc PROPERTIES
                             COMPILE_OPTIONS -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/fuzz/ignored.txt)

@@ -198,7 +198,7 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
   d["times"] = times;
   d["published_bytes"] = s.record.published_bytes;
   d["path"] = nb::cast(s.house_dir);
-  nb::dict work;  // beside the simulation, for the program
+  nb::dict work;  // in addition to the simulation, for the program
   work["encode_cpu_s"] = s.record.encode_cpu_s;
   work["write_s"] = s.record.write_s + s.record.commit_s;
   work["raw_bytes"] = s.record.raw_bytes;

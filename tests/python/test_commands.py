@@ -149,7 +149,7 @@ def test_the_command_line_has_priority(tmp_path):
     ("seed = 1\nseed = 2", ":2: Cannot overwrite a value"),
 ))  # fmt: skip
 def test_wrong_keys_and_types_name_the_line(text, message, tmp_path):
-    with pytest.raises(ValueError, match="job.toml:") as error:
+    with pytest.raises(ValueError, match=r"job\.toml:") as error:
         settings(tmp_path, text)
     assert message in str(error.value)
 

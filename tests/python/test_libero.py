@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of scenes with LIBERO's unchanged files: its table and graspable objects, in the folder of its package."""
 
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from wheels import wheel

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import gymnasium
 import h5py

@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def completions(words: Sequence[str]) -> list[str]:
     """Completions of the last of these words, which follow the name of the program."""
-    from mjsense.commands import COMMANDS, parser_of
+    from mjsense.commands.registry import COMMANDS, parser_of
 
     last = words[-1] if words else ""
     if len(words) < 2:

@@ -10,7 +10,8 @@ import stat
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from mjsense.commands.parser import Parser, suggestion
+from mjsense.commands.fields import suggestion
+from mjsense.commands.parser import Parser
 
 _MAX_BYTES = 16 << 20
 _KINDS = {str: (str, "a str"), int: (int, "an int"), float: ((int, float), "a number"), bool: (bool, "a bool")}

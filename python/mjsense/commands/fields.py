@@ -7,11 +7,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 _EXPECTED = {"bool": "a bool", "int": "an int", "unsigned": "an int from 0 on", "number": "a number", "text": "a str", "path": "a str"}
 _NUMBER = re.compile(r"-?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|nan)", re.ASCII | re.IGNORECASE)
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """``"; did you mean 'record'?"``, or nothing."""
+    from mjsense.core.errors import did_you_mean  # slow to import
+
+    return did_you_mean(name, known)
 
 
 class Field(NamedTuple):
@@ -70,7 +77,7 @@ class Field(NamedTuple):
         return self._checked(value, f"{place}: {self.option}")
 
     def _of_word(self, text: str) -> Any:
-        """None if the text is no value of this kind."""
+        """The value, or None if the text does not state one of this kind."""
         if self.kind == "bool":
             return {"true": True, "false": False}.get(text)
         if self.kind == "number":
@@ -92,8 +99,6 @@ class Field(NamedTuple):
     def _checked(self, value: Any, place: str) -> Any:
         for one in value if self.is_list else [value]:
             if self.words and one not in self.words:
-                from mjsense.commands.parser import suggestion  # slow to import
-
                 words = ", ".join(word or '""' for word in self.words)
                 raise ValueError(f"{place} is '{one}': must be one of {words}{suggestion(one, self.words)}")
             if self.kind in ("int", "number") and not self._is_in_range(one):

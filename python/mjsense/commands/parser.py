@@ -7,10 +7,10 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NoReturn
 
-from mjsense.commands.fields import Field, find, read_size
+from mjsense.commands.fields import Field, find, read_size, suggestion
 from mjsense.commands.table import FIELDS, NAMES
 
 _NAME_COLUMN = 28  # where descriptions begin
@@ -19,13 +19,6 @@ _NAMED = {"robot": "robots", "policy": "policies", "scene": "scenes"}
 """Options that accept names."""
 _MAX_STEPS = 1_000_000_000
 _LISTED = ("robot", "policy")  # in the help
-
-
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """``"; did you mean 'record'?"``, or nothing."""
-    from mjsense.core.errors import did_you_mean  # slow to import
-
-    return did_you_mean(name, known)
 
 
 def terminal_width(descriptor: int) -> int:

@@ -14,8 +14,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from mjsense.commands import COMMANDS, WRONG_INPUT, module_of, parser_of
 from mjsense.commands.output import tell
+from mjsense.commands.registry import COMMANDS, WRONG_INPUT, module_of, parser_of
 
 if TYPE_CHECKING:
     import argparse
@@ -106,8 +106,8 @@ def prepare_process() -> None:
         except OSError:
             os.open(os.devnull, mode)  # the lowest free descriptor is this one
     # Names of files need not be UTF-8, and the output does not depend on the locale.
-    sys.stdout = _Stdout(open(1, "wb", closefd=False), encoding="utf-8", errors="surrogateescape", line_buffering=os.isatty(1))
-    sys.stderr = _Stderr(open(2, "wb", buffering=0, closefd=False), encoding="utf-8", errors="backslashreplace", write_through=True)  # pyright: ignore[reportArgumentType]
+    sys.stdout = _Stdout(io.BufferedWriter(io.FileIO(1, "w", closefd=False)), encoding="utf-8", errors="surrogateescape", line_buffering=os.isatty(1))
+    sys.stderr = _Stderr(io.FileIO(2, "w", closefd=False), encoding="utf-8", errors="backslashreplace", write_through=True)  # pyright: ignore[reportArgumentType]
 
 
 def message_of(error: BaseException) -> str:
@@ -231,7 +231,7 @@ def _run_external(word: str, words: Sequence[str]) -> None:
 
 
 def _nearest_command(word: str) -> str:
-    from mjsense.commands.parser import suggestion
+    from mjsense.commands.fields import suggestion
 
     found = list(COMMANDS)
     for folder in os.get_exec_path():

@@ -35,7 +35,7 @@ class ProgressLine:
         """Shows the text, unless the one before is very recent.
 
         Args:
-            mark: What has been reached, such as the number of ended episodes: where lines are not overwritten, another value shows the text
+            mark: The state of the work, such as the number of ended episodes. Where lines are not overwritten, another value shows the text
                 after one second instead of ten.
             last: Show the text in any case, and end the line.
         """

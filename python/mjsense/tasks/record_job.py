@@ -99,7 +99,7 @@ def record_here(options: dict[str, Any], sensors: Iterable[Any] = (), progress: 
 def job_result(
     options: dict[str, Any], sensors: Iterable[Any], report: Callable[..., None] | None, *, stop_on_signals: bool = False
 ) -> dict[str, Any]:
-    """Records episodes. Returns the fields of a RecordSummary, and ``work``: what ran beside the simulation.
+    """Records episodes. Returns the fields of a RecordSummary, and ``work``: what ran in addition to the simulation.
 
     Args:
         report: Called with the fields of a RecordProgress; with ``stop_on_signals`` also with the number of signals.

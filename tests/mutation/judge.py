@@ -17,7 +17,7 @@ SLOW_S = 2  # a test that takes longer is slow
 # Seconds of tests, as measured without a mutant, that judge one mutant: slow ones of its own room, fast ones of other rooms.
 SLOW_OWN_S, OTHERS_S = 20, 30
 PYTHON_S = 120  # seconds of the clock after which no further pytest file judges a mutant of python/
-EXTENSION = "python/mjsense/_core.abi3.so"  # the program and the Python package
+MODULE = "python/mjsense/_core.abi3.so"
 OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
 
 
@@ -34,16 +34,16 @@ def within(limit: float, tests: list[str], seconds: dict[str, float]) -> list[st
 class Judge:
     def __init__(self, runner, root: Path, build: Path, rooms: list[str], pytests: dict[str, list[str]]) -> None:
         self.runner, self.root, self.build, self.pytests = runner, root, build, pytests
-        self.rooms = [room for room in rooms if any((root / "src/mjsense" / room).rglob("*_test.cc"))]
+        folders = {room: folder for room in rooms for folder in (root / "src").glob(f"*/{room}")}
+        self.rooms = [room for room in folders if any(folders[room].rglob("*_test.cc"))]
         self.original: dict[str, str] = {}  # hash of each program without a mutant
         self.seconds: dict[str, dict[str, float]] = {}  # program: test: seconds
         self.tests: dict[str, dict[str, str]] = {}  # room: suite: text of the file with its tests
         self.uses: dict[str, set[str]] = {}  # room: what its files include, code and tests
         self.version: dict[str, str] = {}  # room: hash of its tests
         for room in self.rooms:
-            files = list((root / "src/mjsense" / room).rglob("*.cc")) + list((root / "src/mjsense" / room).rglob("*.h"))
-            texts = {f: f.read_text() for f in files}
-            self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense/([^"]+)"', text, re.M)}
+            texts = {f: f.read_text() for f in folders[room].rglob("*") if f.suffix in (".h", ".cc")}
+            self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense\w*/([^"]+)"', text, re.M)}
             self.tests[room] = {suite: f"{f.parent.relative_to(root)}\n{text}" for f, text in texts.items() if f.name.endswith("_test.cc")
                                 for suite in re.findall(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),", text, re.M)}
 
@@ -56,7 +56,7 @@ class Judge:
         """The time of each test without a mutant. Tests that fail so are left out."""
         known = json.loads(cache.read_text()) if cache.exists() else {}
         self.runner.build([*(f"{room}_test" for room in self.rooms), "golden_test", "record_fake", "mjsense_python"])
-        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", EXTENSION]:
+        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", MODULE]:
             self.original[program] = self.digest(program)
         for room in self.rooms:
             program = f"{room}_test"
@@ -73,7 +73,7 @@ class Judge:
 
     def users(self, file: str) -> list[str]:
         """Rooms that use a file's room: those that include its header first, then in the order of the rooms."""
-        room, header = file.split("/")[2], re.sub(r"\.cc$", ".h", file.removeprefix("src/mjsense/"))
+        room, header = file.split("/")[2], re.sub(r"\.cc$", ".h", file.split("/", 2)[2])
         users = [r for r in self.rooms if r != room and any(name.startswith(f"{room}/") for name in self.uses[r])]
         return sorted(users, key=lambda r: header not in self.uses[r])
 
@@ -131,13 +131,13 @@ class Judge:
                     if failed := self.runner.golden():
                         return "noticed", failed
             self.runner.build(["mjsense_python"])
-            same = same and self.digest(EXTENSION) == self.original[EXTENSION]
+            same = same and self.digest(MODULE) == self.original[MODULE]
             if not same and (paths := self.pytests.get(file.split("/")[2])):
                 self.runner.build(["record_fake"])
                 if failed := self.runner.pytest(paths):
                     return "noticed", failed
         elif not built:
-            self.runner.build(["mjsense"])  # a room without fast tests
+            self.runner.build(["mjsense_python"])  # a room without fast tests
         return "same program" if others and same else "survived", ""
 
     def ask_python(self, file: str) -> tuple[str, str]:
@@ -164,7 +164,7 @@ def judge_all(judge: Judge, mutants: list, results_file: Path, tree: Path, failu
         known = results.get(mutant.id)
         if not known or known["digest"] != mutant.digest:
             return True
-        if known["outcome"] != "survived" or mutant.room == "python":
+        if known["outcome"] != "survived" or mutant.room.startswith(("python/", "bindings")):
             return False
         return not known["others"] if others else known["tests"] != judge.version.get(mutant.room)
 
