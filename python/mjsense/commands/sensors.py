@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _table(streams: list[dict[str, Any]]) -> str:
     costs = [stream["microseconds"] for stream in streams]
-    rows = [[s["name"], str(s["shape"]), "json" if s["is_dict"] else s["dtype"], s["unit"], s["frame"], str(s["bytes"]), _cost(cost)]
+    rows = [[s["name"], str(tuple(s["shape"])), "json" if s["is_dict"] else s["dtype"], s["unit"], s["frame"], str(s["bytes"]), _cost(cost)]
             for s, cost in zip(streams, costs)]  # fmt: skip
     total = sum(filter(None, costs))
     rows.append([f"{len(streams)} streams", "", "", "", "", str(sum(s["bytes"] for s in streams)), _cost(total or None)])
