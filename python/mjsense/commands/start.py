@@ -32,7 +32,7 @@ def is_program() -> bool:
     """Whether this process is ``python -m mjsense``, or the command that the package installs; asked while the package is imported."""
     if sys.argv[:1] == ["-m"]:  # until Python has found the module
         return sys.orig_argv[-len(sys.argv)] in ("mjsense", "-mmjsense")
-    folder, name = os.path.split(sys.argv[0]) if sys.argv else ("", "")
+    folder, name = os.path.split(os.path.abspath(sys.argv[0])) if sys.argv else ("", "")
     return name == "mjsense" and folder == os.path.dirname(sys.executable)
 
 
