@@ -141,7 +141,7 @@ def test_the_command_line_has_priority(tmp_path):
 @pytest.mark.parametrize("text, message", (
     *((wrong, "has the wrong type") for wrong in (
         "episodes = 1.5", "depth = 1", "task = true", "cameras = [1]", "cameras = 3", "size = 64", "no_noise = 'yes'", "json = 'x'", "ray = 3")),
-    ("seed = 1\nsamles = 2\n", ":2: no key named 'samles'; did you mean 'samples'"),
+    ("seed = 1\nsamles = 2\n", ":2: no key named 'samles'; did you mean 'samples'?"),
     ("seed = 1\ncameras = 'a,,b'", ":2: cameras is 'a,,b': must be a list"),
     ("format = 'lerobt'", ":1: format is 'lerobt': must be one of mjsense, lerobot; did you mean 'lerobot'?"),
     ("[options]\nseed = 1", ":1: no key named 'options'"),

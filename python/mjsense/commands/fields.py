@@ -16,9 +16,9 @@ _NUMBER = re.compile(r"-?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|nan)", re.ASCII | re
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """``"; did you mean 'record'?"``, or nothing."""
-    from mjsense.core.errors import did_you_mean  # slow to import
+    from mjsense.core.errors import nearest  # slow to import
 
-    return did_you_mean(name, known)
+    return "".join(f"; did you mean '{one}'?" for one in nearest(name, known)[:1])
 
 
 class Field(NamedTuple):

@@ -35,7 +35,7 @@ COMMANDS = {
     "assets": "Install the packages with further objects for scenes.",
 }
 """Names and one-line descriptions, in the order of ``mjsense --help``."""
-_SHARED = dict.fromkeys(("tasks", "robots", "scenes", "objects"), "lists")
+_SHARED: dict[str, str] = dict.fromkeys(("tasks", "robots", "scenes", "objects"), "lists")
 """Commands whose module has another name."""
 
 FAILED = 1  # some episodes or checks failed
