@@ -61,7 +61,8 @@ class ProgressLine:
     def _write(self, text: str, last: bool) -> None:
         if self._overwrite:
             if sys.stderr.isatty():  # a longer line would wrap, and "\r" would not return to its beginning
-                text = text[: os.get_terminal_size(sys.stderr.fileno()).columns - 1]
+                columns = os.get_terminal_size(sys.stderr.fileno()).columns  # 0: unknown
+                text = text[: columns - 1 if columns > 1 else 79]
             sys.stderr.write("\r" + text.ljust(len(self._shown)) + ("\n" if last else ""))
         elif text != self._shown:
             sys.stderr.write(text + "\n")
