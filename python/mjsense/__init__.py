@@ -37,6 +37,10 @@ Where to look (``help(mjs.Simulation)`` and so on):
 ``python -m mjsense --help`` is the program.
 """
 
+from mjsense.commands import start
+
+start.answer_early()  # if this process is the program
+
 from mjsense.core import libmujoco
 
 libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses

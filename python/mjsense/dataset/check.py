@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the readers of recordings refuse, for ``mjsense verify``: a recording without findings is read by every command.
 
-The C++ program compares checksums and examines the structure of the files. This module opens each episode with the readers that all Python
+The C++ library compares checksums and examines the structure of the files. This module opens each episode with the readers that all Python
 commands use, so that neither accepts what the other refuses.
 """
 

@@ -10,8 +10,7 @@ import gymnasium
 
 from mjsense.core.arguments import KnownAttributes, checked
 from mjsense.core.arrays import ids_of_worlds
-from mjsense.core.errors import UnknownNameError
-from mjsense.core.representations import printable
+from mjsense.core.errors import UnknownNameError, printable
 from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.sensor import Sensor
 

@@ -9,26 +9,18 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from mjsense import _core
-from mjsense.core.installed_files import name_package_folders, use_installed_meshes
-from mjsense.recording.ffmpeg import use_installed_ffmpeg
+from mjsense.core.installed_files import name_package_folders
 
 _GENERATORS = {"scene_synthesizer": "mjsense.tasks.synthesized_objects"}
 """Modules that write the files of a source's objects with its packages."""
 
 
-def use_installed_files(words: list[str]) -> None:
-    """Makes the C++ program, run with these arguments in this process, use the meshes and the ffmpeg of installed packages."""
-    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
-        use_installed_meshes()
-    use_installed_ffmpeg()
-
-
 def _objects() -> list[dict[str, Any]]:
+    from mjsense import _core
+
     name_package_folders()
     return json.loads(_core.objects_json())
 

@@ -95,17 +95,29 @@ def record_here(options: dict[str, Any], sensors: Iterable[Any] = (), progress: 
     Args:
         options: Options of ``mjsense.record`` by name; ``out`` and those that differ from the defaults.
     """
-    options = {**PARTS, **options, "out": str(options["out"])}
-    objects = parts_of(options, sensors)
     line = line_of(progress)
     show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
-    report = None if show is None else lambda p: show(RecordProgress(**p))
-    if options.get("meshes") == "real":
-        use_installed_meshes()
-    use_installed_ffmpeg()
-    made = _core.record(options, report, objects, Simulation._of)
-    made["path"] = Path(made["path"])
+    made = job_result(options, sensors, None if show is None else lambda p: show(RecordProgress(**p)))
+    del made["work"]
     summary = RecordSummary(**made)
     if line is not None:
         line.show(of_recording(summary), last=True)
     return summary
+
+
+def job_result(
+    options: dict[str, Any], sensors: Iterable[Any], report: Callable[..., None] | None, *, stop_on_signals: bool = False
+) -> dict[str, Any]:
+    """Records episodes. Returns the fields of a RecordSummary, and ``work``: what ran in addition to the simulation.
+
+    Args:
+        report: Called with the fields of a RecordProgress; with ``stop_on_signals`` also with the number of signals.
+        stop_on_signals: The first Ctrl-C or SIGTERM finishes the running episodes, the second discards them, the third ends the process.
+            Otherwise Ctrl-C discards them and raises KeyboardInterrupt.
+    """
+    options = {**PARTS, **options, "out": str(options["out"])}
+    objects = parts_of(options, sensors)
+    if options.get("meshes") == "real":
+        use_installed_meshes()
+    use_installed_ffmpeg()
+    return _core.record(options, report, objects, Simulation._of, stop_on_signals)

@@ -1,49 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/app/list_command.h"
+// The lists of the commands `tasks`, `robots`, `scenes` and `objects`, as JSON.
 
 #include <fmt/format.h>
-#include <unistd.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
 #include <vector>
 
-#include "mjsense/app/terminal.h"
-#include "mjsense/app/text_table.h"
 #include "mjsense_tasks/robots/load_robot.h"
 #include "mjsense_tasks/rollout/registry.h"
 #include "mjsense_tasks/rollout/task_defaults.h"
 #include "mjsense_tasks/scenes/load_scene.h"
 #include "mjsense_tasks/scenes/object_catalogue.h"
+#include "python/bindings/bindings.h"
 
-namespace mjsense::app {
+namespace mjsense::python {
 namespace {
 
-constexpr std::size_t kMaxWidth = 100;  // longer lines are hard to read
-
-struct Line {
-  std::string name, what, needs;
-};
-
-std::string text_of(const std::vector<Line>& lines, bool json) {
-  if (json) {
-    nlohmann::ordered_json out = nlohmann::ordered_json::array();
-    for (const Line& line : lines)
-      out.push_back({{"name", line.name}, {"description", line.what}, {"needs", line.needs}});
-    return out.dump(2);
-  }
-  const std::size_t width = std::clamp(terminal_width(STDOUT_FILENO), std::size_t{40}, kMaxWidth);
-  std::string out;
-  const auto add = [&](const std::string& text) {
-    for (const std::string& one : wrap(text, width - 4)) out += "    " + one + "\n";
-  };
-  for (const Line& line : lines) {
-    out += line.name + "\n";
-    if (!line.what.empty()) add(line.what);
-    if (!line.needs.empty()) add("Needs: " + line.needs);
-  }
-  return out;
-}
+using Json = nlohmann::ordered_json;
 
 // Built-in tasks. User-defined tasks are listed by name only.
 constexpr struct {
@@ -89,54 +67,51 @@ std::string packages_of(const tasks::scenes::SceneFileCfg& scene) {
   return text;
 }
 
-}  // namespace
+Json entry(const std::string& name, const std::string& description, const std::string& needs) {
+  return {{"name", name}, {"description", description}, {"needs", needs}};
+}
 
-std::string list_tasks(bool json) {
-  std::vector<Line> lines;
+std::string tasks_json() {
+  Json out = Json::array();
   for (const std::string& name : tasks::rollout::task_names()) {
-    Line line{name, "", ""};
-    for (const auto& one : kTasks) {
-      if (name == one.name) line = {name, one.what, one.needs};
+    const auto* known =
+        std::ranges::find_if(kTasks, [&](const auto& one) { return name == one.name; });
+    if (known == std::end(kTasks)) {
+      out.push_back(entry(name, "", ""));
+      continue;
     }
-    if (!line.what.empty())
-      line.needs +=
-          fmt::format(" Default: {} in {}.", tasks::rollout::default_robot(name),
-                      tasks::rollout::default_scene(tasks::rollout::task_components(name)[0]));
-    lines.push_back(line);
+    out.push_back(entry(
+        name, known->what,
+        fmt::format("{} Default: {} in {}.", known->needs, tasks::rollout::default_robot(name),
+                    tasks::rollout::default_scene(tasks::rollout::task_components(name)[0]))));
   }
-  return text_of(lines, json);
+  return out.dump(2);
 }
 
-std::string list_robots(bool json) {
-  std::vector<Line> lines;
+std::string robots_json() {
+  Json out = Json::array();
   for (const std::string& name : tasks::robots::robot_names())
-    lines.push_back({name, tasks::robots::robot_cfg(name).description, ""});
-  return text_of(lines, json);
+    out.push_back(entry(name, tasks::robots::robot_cfg(name).description, ""));
+  return out.dump(2);
 }
 
-std::string list_scenes(bool json) {
-  std::vector<Line> lines;
+std::string scenes_json() {
+  Json out = Json::array();
   for (const std::string& name : tasks::scenes::scene_names()) {
     const tasks::scenes::SceneFileCfg scene = tasks::scenes::load_scene(name);
     const char* houses = !scene.generator.empty() ? " Each house number gives a different house."
                          : scene.catalogue_count >= 0 ? " Each house number gives other objects."
                                                       : "";
-    lines.push_back({name, scene.description + houses, packages_of(scene)});
+    out.push_back(entry(name, scene.description + houses, packages_of(scene)));
   }
-  return text_of(lines, json);
+  return out.dump(2);
 }
 
-std::string list_objects(bool json) {
-  nlohmann::ordered_json out = nlohmann::ordered_json::array();
-  Table table{{"name", "kind", "source", "licence", "installed", ""}, "", {}};
+std::string objects_json() {
+  Json out = Json::array();
   for (const tasks::scenes::CatalogueObjectCfg& object :
        tasks::scenes::object_catalogue().objects) {
     const tasks::scenes::ObjectSourceCfg& source = tasks::scenes::source_of(object);
-    const bool installed = tasks::scenes::is_installed(object);
-    std::string note = object.receptacle ? "receptacle" : "";
-    if (!object.excluded.empty()) note = "not used: " + object.excluded;
-    table.rows.push_back(
-        {object.name, object.kind, source.name, source.license, installed ? "yes" : "no", note});
     std::vector<std::string> meshes;
     for (const tasks::scenes::CataloguePartCfg& part : object.parts) meshes.push_back(part.mesh);
     out.push_back({{"name", object.name},
@@ -149,10 +124,19 @@ std::string list_objects(bool json) {
                    {"packages", source.packages},
                    {"model", object.model},
                    {"meshes", meshes},
-                   {"installed", installed},
+                   {"installed", tasks::scenes::is_installed(object)},
                    {"excluded", object.excluded}});
   }
-  return json ? out.dump(2) : table.text();
+  return out.dump(2);
 }
 
-}  // namespace mjsense::app
+}  // namespace
+
+void bind_listing(nanobind::module_& m) {
+  m.def("tasks_json", &tasks_json, "What `mjsense tasks --json` prints.");
+  m.def("robots_json", &robots_json, "What `mjsense robots --json` prints.");
+  m.def("scenes_json", &scenes_json, "What `mjsense scenes --json` prints.");
+  m.def("objects_json", &objects_json, "What `mjsense objects --json` prints.");
+}
+
+}  // namespace mjsense::python

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/app/schema.h"
+#include "python/bindings/schema.h"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,13 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/all_sensors.h"
+#include "mjsense_tasks/robots/load_robot.h"
 #include "mjsense_tasks/rollout/record_job.h"
+#include "mjsense_tasks/rollout/registry.h"
+#include "mjsense_tasks/scenes/load_scene.h"
 #include "mjsense_tasks/scenes/scene_file.h"
 
-namespace mjsense::app {
+namespace mjsense::python {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -65,7 +68,13 @@ class Schema {
   const std::map<std::string, const StructDecl*, std::less<>>& decls() const { return decls_; }
 
   std::string text() const {
-    return Json{{"structs", structs_}, {"data", data_}, {"data_of_kind", data_of_kind_}}.dump(1);
+    const Json names{{"tasks", tasks::rollout::task_names()},
+                     {"robots", tasks::robots::robot_names()},
+                     {"policies", tasks::rollout::policy_names()},
+                     {"scenes", tasks::scenes::scene_names()}};
+    return Json{
+        {"structs", structs_}, {"data", data_}, {"data_of_kind", data_of_kind_}, {"names", names}}
+        .dump(1);
   }
 
  private:
@@ -85,6 +94,7 @@ class Schema {
       out["above_low"] = field.above_low;
       out["words"] = field.words;
       out["option"] = field.option_name();
+      out["flag"] = field.flag_name();
       out["hidden"] = field.is_hidden;
     }
     out["unit"] = field.unit_;
@@ -190,4 +200,4 @@ const StructDecl* find_struct(std::string_view name) {
   return found == schema().decls().end() ? nullptr : found->second;
 }
 
-}  // namespace mjsense::app
+}  // namespace mjsense::python

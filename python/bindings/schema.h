@@ -8,10 +8,10 @@
 
 #include "mjsense/core/fields/fields.h"
 
-namespace mjsense::app {
+namespace mjsense::python {
 
 std::string schema_json();
 // Finds a struct by its name in Python; null if there is none.
 const StructDecl* find_struct(std::string_view name);
 
-}  // namespace mjsense::app
+}  // namespace mjsense::python
