@@ -295,7 +295,7 @@ def read_robomimic(content: tuple[Any, str, bytes | None], folder: Path) -> None
             if key in about:
                 where.attrs[key] = json.dumps(about[key])[:60_000]
         for name, rows in about["rows"].items() if isinstance(about.get("rows"), dict) else ():
-            if isinstance(rows, int) and 0 <= rows < 9 and isinstance(name, str) and "\0" not in name and "\ud800" not in name and name.strip("/.") and name not in demo:
+            if type(rows) is int and 0 <= rows < 9 and isinstance(name, str) and "\0" not in name and "\ud800" not in name and name.strip("/.") and name not in demo:
                 demo.create_dataset(name, data=np.zeros((rows, 2) if name in ("actions", "obs/joint") else rows, "f8" if name == "actions" else kind))
         if model is not None:
             demo.attrs["model_file"] = np.bytes_(model[:60_000] or b" ")

@@ -26,9 +26,6 @@ namespace fs = std::filesystem;
 namespace mjsense::replay {
 namespace {
 
-// A file whose rows are more than this many times its own size is taken for a decompression bomb.
-constexpr std::uint64_t kMaxUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
-
 // Runs `read`, with `place` in front of the text of its errors.
 void at(const std::string& place, const std::function<void()>& read) {
   try {
@@ -124,7 +121,7 @@ class Inspector {
   void add_dataset(hid_t trajectory, const std::string& name, InspectResult::File& entry) {
     const RowDataset dataset(trajectory, name);
     unpacked_ += dataset.bytes();
-    if (unpacked_ > kFreeBytes + kMaxUnpacked * bytes_)
+    if (hdf5::is_bomb(unpacked_, bytes_))
       throw RuntimeError("the files declare far more data than they contain");
     Stream& stream = stream_of(dataset, name);
     if (dataset.is_json()) {
