@@ -369,7 +369,7 @@ def test_episodes_of_a_recording_have_the_same_streams(root, tmp_path, change, t
         change(file)
     found = refusals(root, tmp_path, who)
     assert found.keys() == set(who) and all(re.search(text, one) for one in found.values()), found
-    # The size of a video is compared by the program, which is asked first.
+    # The C++ check, which comes first, compares the size of a video.
     assert any(re.search(f"{text}|is 32 x 24 pixels, expected 64 x 24", one) for one in errors_of(root)), errors_of(root)
 
 
