@@ -8,6 +8,7 @@ and the number of the trial (:func:`change`). All readers then run in a process 
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import importlib
 import io
@@ -36,7 +37,7 @@ import numpy as np
 CPU_SECONDS = 10  # that a reader may use
 MEMORY = 1500 << 20  # bytes that a process of readers may use
 _ADDRESS_SPACE = 12 << 30  # protects the machine; mappings of libraries and thread stacks count too
-_NO_END = 300  # s
+_IDLE = 120  # s without CPU time, after which a process of readers hangs; it may get little of a busy machine
 _MODULES = ("mjsense.__main__", "mjsense.exporting", "mjsense.viewer.open", "h5py", "av", "pyarrow.parquet", "viser", "PIL.PngImagePlugin", "asyncio", "xml.etree.ElementTree")
 
 # ------------------------------------------------------------------------------------------------------------------ values
@@ -526,6 +527,16 @@ class Outcome:
         self.hung = False
 
 
+def _cpu_ticks(group: int) -> int:
+    """CPU time of the processes of a group."""
+    ticks = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = stat.read_text().rpartition(")")[2].split()
+            ticks += sum(map(int, fields[11:15])) if int(fields[2]) == group else 0
+    return ticks
+
+
 def run_readers(path: Path, out: Path, number: int) -> Outcome:
     """Runs :func:`read_all` in a child process with limits."""
     outcome = Outcome()
@@ -547,11 +558,12 @@ def run_readers(path: Path, out: Path, number: int) -> Outcome:
         finally:
             os._exit(0)
     os.close(writes)
-    begun, rest = time.monotonic(), b""
-    started = 0.0
+    rest, started, ticks = b"", 0.0, -1
     while True:
-        ready = select.select([reads], [], [], max(0.0, begun + _NO_END - time.monotonic()))[0]
-        if not ready:
+        if not select.select([reads], [], [], _IDLE)[0]:
+            if (now := _cpu_ticks(pid)) != ticks:
+                ticks = now
+                continue
             outcome.hung = True
             os.killpg(pid, signal.SIGKILL)
             break

@@ -275,7 +275,8 @@ class Rows:
         step = max(1, limits.ROW_BYTES // max(1, self.bytes // max(1, len(self))))
         found = 0
         for first in range(0, len(self), step):
-            found = zlib.crc32(self._read(first, min(step, len(self) - first)), found)
+            rows: Any = self._read(first, min(step, len(self) - first))
+            found = zlib.crc32(rows, found)
         self._check_sum(found, stated)
 
     def rows_of(self, length: int) -> Rows:
