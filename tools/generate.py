@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import runpy
 import sys
 import textwrap
 from pathlib import Path
@@ -360,10 +361,17 @@ class Generator:
     def tables(self, text: str) -> str:
         def table(match: re.Match[str]) -> str:
             what, name = match[2], match[3]
-            make = {"fields": self.field_table, "data": self.data_table, "options": self.option_table}[what]
+            make = {"fields": self.field_table, "data": self.data_table, "options": self.option_table, "export": self.format_table}[what]
             return match[1] + "\n" + make(name) + match[4]
 
-        return re.sub(r"(<!-- (fields|data|options) (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
+        return re.sub(r"(<!-- (fields|data|options|export) (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
+
+    def format_table(self, _: str) -> str:
+        formats = runpy.run_path(str(PACKAGE / "exporting" / "formats.py"))["FORMATS"]
+        rows = [
+            f"| `{name}` | {format.about} | {format.readers} | `mjsense[{format.extra}]` |\n" for name, format in formats.items()
+        ]
+        return "| format | output | programs that read it | package |\n| --- | --- | --- | --- |\n" + "".join(rows)
 
     def field_table(self, name: str) -> str:
         s = self.structs[name]

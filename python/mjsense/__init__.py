@@ -25,8 +25,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     editing recordings           delete_episodes, split_dataset, merge_datasets
-    files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
-                                 export_zarr; import_lerobot, import_robomimic
+    files of other programs      export; import_lerobot, import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
@@ -69,6 +68,7 @@ from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
 from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.exporting import (
+    export,
     export_lerobot,
     export_lerobot21,
     export_mcap,
@@ -139,7 +139,7 @@ __all__ = [
     "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
     "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
     "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
-    "WorldState", "attach", "check_replay", "delete_episodes", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
+    "WorldState", "attach", "check_replay", "delete_episodes", "effects", "embedded_models", "export", "export_lerobot", "export_lerobot21", "export_mcap",
     "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_lerobot", "import_robomimic", "make", "make_vec",
     "merge_datasets", "observations",
     "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "split_dataset", "task_names",

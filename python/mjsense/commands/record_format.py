@@ -9,6 +9,7 @@ import sys
 from typing import NoReturn
 
 from mjsense.commands import message_of
+from mjsense.exporting.formats import FORMATS
 
 _REFUSED = ("--ray", "--shard", "--append", "--overwrite", "--config")
 
@@ -30,7 +31,7 @@ def run(words: list[str]) -> int:
     from mjsense.recording.ffmpeg import use_installed_ffmpeg
 
     parser = _Parser(prog="mjsense record", add_help=False, allow_abbrev=False)
-    parser.add_argument("--format", choices=["lerobot", "mjsense"])
+    parser.add_argument("--format", choices=[*(name for name, format in FORMATS.items() if format.while_recording), "mjsense"])
     parser.add_argument("--out", required=True)
     parser.add_argument("--map")
     parser.add_argument("--trim-idle", action=argparse.BooleanOptionalAction)
@@ -39,8 +40,8 @@ def run(words: list[str]) -> int:
     try:
         given, others = parser.parse_known_args(words[1:])
         for option in _REFUSED:
-            if given.format == "lerobot" and any(word.split("=")[0] == option for word in others):
-                raise ValueError(f"{option} cannot be combined with --format lerobot")
+            if given.format != "mjsense" and any(word.split("=")[0] == option for word in others):
+                raise ValueError(f"{option} cannot be combined with --format {given.format}")
         use_installed_ffmpeg()
         quiet = bool({"-q", "--quiet"} & set(others))
 
@@ -53,7 +54,7 @@ def run(words: list[str]) -> int:
         from mjsense.exporting.record_lerobot import CompleteError, converted
 
         try:
-            with converted(given.out, resume=given.resume, map=given.map, trim_idle=given.trim_idle, keep_recording=given.keep_recording,
+            with converted(given.out, format=given.format, resume=given.resume, map=given.map, trim_idle=given.trim_idle, keep_recording=given.keep_recording,
                            quiet=quiet) as folder:  # fmt: skip
                 code = record(str(folder), "--no-sheet", "--no-tree")
         except CompleteError as error:
@@ -64,7 +65,7 @@ def run(words: list[str]) -> int:
                 if os.path.exists(path):
                     print(f"\n{_core.tree_text(path)}", end="", flush=True)
         if not quiet and os.path.exists(given.out):
-            print(f"The LeRobot data set is in {given.out}.", file=sys.stderr)
+            print(f"The {FORMATS[given.format].about} data set is in {given.out}.", file=sys.stderr)
         return code
     except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
         print(f"mjsense record: {message_of(error)}", file=sys.stderr)

@@ -171,7 +171,7 @@ def record(
         raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
     from mjsense.exporting.record_lerobot import converted
 
-    with converted(out, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
+    with converted(out, format=format, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
         summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))
 
