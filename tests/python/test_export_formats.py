@@ -273,6 +273,12 @@ def with_videos(root, folder, b_frames):
                 for frame in video[:]:
                     container.mux(stream.encode(av.VideoFrame.from_ndarray(np.pad(frame, ((0, 1), (0, 0), (0, 0)), "edge"), format="rgb24")))
                 container.mux(stream.encode(None))
+    for path in folder.rglob("*.h5"):
+        with h5py.File(path, "r+") as file:
+            videos: list[h5py.Dataset] = []
+            file.visititems(lambda name, item, found=videos: found.append(item) if "/sensor_data/" in name else None)
+            for video in videos:  # their checksums are those of the recorder's files
+                video.attrs.pop("crc32", None)
     return folder
 
 
@@ -341,11 +347,11 @@ def test_command_exports(root, tmp_path):
     assert done.returncode == 2 and "--encode-again is an option of the format mcap" in done.stderr
 
 
-@pytest.mark.parametrize(("name", "module"), [("rlds", "google_crc32c"), ("zarr", "zarr"), ("rerun", "rerun"), ("mcap", "mcap")])
-def test_a_missing_library_is_an_error_with_the_extra(name, module, root, tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", [name for name in FORMATS if name != "robomimic"])  # whose library reads recordings, too
+def test_a_missing_library_is_an_error_with_the_extra(name, root, tmp_path, monkeypatch):
+    module = FORMATS[name].library
     for loaded in [m for m in sys.modules if m == module or m.startswith(f"{module}.")]:
         monkeypatch.delitem(sys.modules, loaded)
     monkeypatch.setitem(sys.modules, module, None)
-    assert name in FORMATS
-    with pytest.raises(ModuleNotFoundError, match=rf"pip install 'mjsense\[{name}\]'"):
-        getattr(mjs, f"export_{name}")(root, tmp_path / "out")
+    with pytest.raises(ModuleNotFoundError, match=rf"pip install 'mjsense\[{FORMATS[name].extra}\]'"):
+        mjs.export(root, tmp_path / "out", format=name)

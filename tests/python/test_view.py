@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import gymnasium
 import mujoco
@@ -401,6 +402,14 @@ def test_export_to_rerun(recording, tmp_path):
     assert (done.returncode, done.stdout) == (0, "Wrote a.rrd.\n"), done.stderr
     written = (tmp_path / "a.rrd").read_bytes()
     assert written.startswith(b"RRF") and len(written) > 100_000
+    live = [*command[:4], "pick", "--seconds", "0.2", "--export", "b.rrd"]
+    assert subprocess.run(live, cwd=tmp_path, capture_output=True).returncode == 0
+    program = Path(pytest.importorskip("rerun_cli").__file__).parent / "rerun"
+    for name, features in (("a.rrd", ("actions/joint_pos/arm", "obs/agent/qpos/arm")), ("b.rrd", ("reward", "success"))):
+        shown = subprocess.run([program, "rrd", "print", name], cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "HOME": str(tmp_path)}).stdout
+        entities = {word for line in shown.splitlines() for word in line.split() if word.startswith("/")}
+        assert {f"/features/{feature}" for feature in features} <= entities, entities
+        assert "/world/cameras/wrist_camera/colour" in entities and any(one.startswith("/world/scene/") for one in entities), entities
 
 
 @needs_viser
