@@ -101,7 +101,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         root, out = Path(args.keep or folder, "recording"), Path(args.keep or folder, "lerobot")
         if not list(root.glob("house_*/*.h5")):
-            mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, worlds=2)
+            mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, num_worlds=2)
         export(root, out)
         if args.only_export:
             return

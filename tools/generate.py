@@ -100,7 +100,7 @@ from mjsense.core.sensor_data import SensorData, make_data
 
 # Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).
 SIGNATURES = {
-    "tasks/recording.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "scene", "out"), {}),
+    "tasks/recording.py": ("RecordJobCfg", {}, {}, ("task", "robot", "policy", "scene", "out"), {}),
     "tasks/vector.py": (
         "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False", "seed": "None"}, ("task", "robot", "policy", "scene"),
         {"seed": " None: a random seed, so that every environment has other episodes."},

@@ -289,7 +289,7 @@ def run_case(case: dict[str, Any]) -> dict[str, Any]:
         frames = np.asarray(settings.pop("frames"), dtype=np.float32)
         if "delay" in settings:  # constant delay
             settings["delay_min_lag"] = settings["delay_max_lag"] = settings.pop("delay")
-        pipeline = ObservationPipeline(num_envs=frames.shape[1], **settings)
+        pipeline = ObservationPipeline(num_worlds=frames.shape[1], **settings)
         return {"out": {"data": encode(np.stack([pipeline(frame) for frame in frames]))}}
     return run_script(case)
 

@@ -79,7 +79,7 @@ def live(tmp_path_factory):
     objects += [mjs.SensorSuite([scene["scan"]]), mjs.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
     objects += [mjs.Recorder(tmp_path_factory.mktemp("data"), sim, [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.WorldState(sim, 0, 0)]
     objects[-2].reset()
-    mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, worlds=1)
+    mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, num_worlds=1)
     dataset = mjs.Dataset(data)
     renderer = mjs.Renderer(scene.model, 4, 4)
     data = mujoco.MjData(scene.model)
@@ -180,7 +180,7 @@ def test_misspelt_attributes():
         (mjs.TerrainCfg(), "level", "levels"),
         (mjs.CameraSensorCfg(name="a"), "with", "width"),
         (mjs.SensorSuite(), "sensor", "sensors"),
-        (mjs.ObservationPipeline(1), "num_env", "num_envs"),
+        (mjs.ObservationPipeline(1), "num_world", "num_worlds"),
         (mjs.DebugShapes(), "mean_size", "meansize"),
     ]:
         with pytest.raises(AttributeError, match=f"has no attribute '{name}'; did you mean .*'{near}'"):
@@ -281,3 +281,23 @@ def test_texts_of_a_sensor_must_be_texts(attribute):
     own = type("Own", (Own,), {attribute: 3})()
     with pytest.raises(TypeError, match=f"Own.{attribute} must be a str, not 3"):
         mjs.Simulation(ball_scene()).add(own)
+
+
+def test_the_number_of_worlds_has_one_name(tmp_path):
+    data = tmp_path / "data"
+    mjs.record("pick", out=data, cameras=[], horizon=2, keep_failures=True, num_worlds=1)
+    for function, path in ((mjs.check_replay, data), (mjs.view, "pick")):
+        with pytest.raises(TypeError, match=r"\(\) got an unexpected keyword argument 'num_envs'; did you mean 'num_worlds'\?$"):
+            function(path, num_envs=2)
+    with pytest.raises(TypeError, match=r"make_vec\(\) got an unexpected keyword argument 'num_worlds'; did you mean 'num_envs'\?$"):
+        mjs.make_vec("pick", num_worlds=2)
+    with pytest.warns(DeprecationWarning, match=r"^check_replay\(\): the argument worlds is now num_worlds$") as caught:
+        assert mjs.check_replay(data, worlds=2)
+    assert caught[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match=r"^ObservationPipeline\(\): the argument num_envs is now num_worlds$") as caught:
+        pipeline = mjs.ObservationPipeline(num_envs=2)
+    assert caught[0].filename == __file__ and pipeline.num_worlds == 2
+    with pytest.warns(DeprecationWarning, match="^ObservationPipeline.num_envs is now num_worlds$"):
+        assert pipeline.num_envs == 2
+    with pytest.raises(TypeError, match=r"'worlds'; did you mean 'num_worlds'\?$"):
+        mjs.check_replay(data, worlds=2, num_worlds=2)

@@ -23,7 +23,7 @@ from mjsense.cluster import driver as driver_module
 from mjsense.cluster.job import Shard, ShardResult
 from mjsense.exporting import FORMATS
 
-ARGUMENTS = {"task": "pick", "horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5}
+ARGUMENTS = {"task": "pick", "horizon": 12, "keep_failures": True, "width": 32, "height": 24, "num_worlds": 2, "seed": 5}
 EPISODES, ATTEMPTS = 6, 2
 
 
@@ -270,7 +270,7 @@ def test_a_defect_that_ends_the_process_is_an_error(how, tmp_path, monkeypatch):
     (tmp_path / "crashing.py").write_text(CRASH.format(log=str(tmp_path / "log"), defect=DEFECTS[how]))
     monkeypatch.syspath_prepend(tmp_path)
     policy = __import__("crashing").Crash
-    job = Job(str(tmp_path / "out"), {**ARGUMENTS, "policy": policy, "worlds": 1})
+    job = Job(str(tmp_path / "out"), {**ARGUMENTS, "policy": policy, "num_worlds": 1})
     environment = {"env_vars": {"PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}}
     with pytest.raises(RuntimeError) as raised:
         record_on_ray(job, episodes=2, max_attempts=2, shard_attempts=2, runtime_env=environment)

@@ -19,7 +19,7 @@ from edited_recordings import changed
 import mjsense as mjs
 from mjsense.dataset import video
 
-SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
+SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
 
 
 @pytest.fixture(scope="module")

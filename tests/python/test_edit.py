@@ -13,7 +13,7 @@ import pytest
 import mjsense as mjs
 from mjsense import commands
 
-RECORDING = dict(worlds=2, keep_failures=True, width=32, height=24, horizon=4, depth=True, cameras=["wrist_camera"])
+RECORDING = dict(num_worlds=2, keep_failures=True, width=32, height=24, horizon=4, depth=True, cameras=["wrist_camera"])
 
 
 @pytest.fixture(scope="module")

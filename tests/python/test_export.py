@@ -24,7 +24,7 @@ from mjsense.exporting.mapping import _filled
 from mjsense.exporting.output import new_output
 from mjsense.exporting.remux import Concatenation
 
-SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
+SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
 
 
 @pytest.fixture(scope="module")

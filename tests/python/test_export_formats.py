@@ -32,7 +32,7 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 def root(tmp_path_factory):
     """Two episodes of 9 observations, images with an odd height."""
     out = tmp_path_factory.mktemp("data")
-    mjs.record("pick", out=out, worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=8, depth=True, shadows=False, seed=3)
+    mjs.record("pick", out=out, num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=8, depth=True, shadows=False, seed=3)
     return out
 
 

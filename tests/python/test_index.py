@@ -24,7 +24,7 @@ from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.remote import resolved
 
-ARGUMENTS = {"task": "pick", "horizon": 4, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5}
+ARGUMENTS = {"task": "pick", "horizon": 4, "keep_failures": True, "width": 32, "height": 24, "num_worlds": 2, "seed": 5}
 
 
 @pytest.fixture(scope="module")

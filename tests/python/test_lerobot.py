@@ -156,7 +156,7 @@ def test_lerobot_reads_every_row_and_frame(record, tmp_path, version, format, fp
 def test_lerobot_reads_episodes_without_idle_steps(tmp_path, version, format):
     """Each row has its own frame, although frames between them are left out; the frames are encoded again and differ slightly."""
     environment(version)
-    mjs.record("pick_and_place", policy=Waiting, out=tmp_path / "data", episodes=2, worlds=2, horizon=2 * MOVES + WAITS, keep_failures=True,
+    mjs.record("pick_and_place", policy=Waiting, out=tmp_path / "data", episodes=2, num_worlds=2, horizon=2 * MOVES + WAITS, keep_failures=True,
                width=64, height=48, cameras=["wrist_camera"], shadows=False)  # fmt: skip
     source = Source(tmp_path / "data", trim_idle=None)
     assert all(episode.trimmed_steps > 3 for episode in source.episodes)
@@ -188,7 +188,7 @@ TRAIN = """--policy.type=act --policy.device=cpu --policy.push_to_hub=false --po
 def test_act_trains_on_an_exported_pick(tmp_path):
     """A small ACT, 200 steps: the loss falls, and LeRobot prints no warning. About a minute of CPU time."""
     python, _ = environment("0.4.4")
-    mjs.record("pick", out=tmp_path / "data", episodes=2, keep_failures=True, width=96, height=96, cameras=["wrist_camera"], worlds=2)
+    mjs.record("pick", out=tmp_path / "data", episodes=2, keep_failures=True, width=96, height=96, cameras=["wrist_camera"], num_worlds=2)
     mjs.export_lerobot(tmp_path / "data", tmp_path / "lerobot")
     words = [python.parent / "lerobot-train", *TRAIN.split(), f"--dataset.root={tmp_path}/lerobot", f"--output_dir={tmp_path}/act"]
     done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "HF_HOME": str(tmp_path / "hf"), "HF_HUB_OFFLINE": "1"})

@@ -32,7 +32,7 @@ def sim():
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     out = tmp_path_factory.mktemp("data")
-    mjs.record(task := Cart(), policy=Driver(task), out=out, worlds=1, episodes=1, keep_failures=True, cameras=[], seed=1, horizon=5)
+    mjs.record(task := Cart(), policy=Driver(task), out=out, num_worlds=1, episodes=1, keep_failures=True, cameras=[], seed=1, horizon=5)
     return mjs.Dataset(out)
 
 

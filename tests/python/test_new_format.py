@@ -26,7 +26,7 @@ def lines_format():
 def data(tmp_path_factory):
     """Five episodes of 5 observations."""
     out = tmp_path_factory.mktemp("lines") / "data"
-    mjs.record("pick", out=out, worlds=5, num_attempts=5, keep_failures=True, cameras=[], horizon=4)
+    mjs.record("pick", out=out, num_worlds=5, num_attempts=5, keep_failures=True, cameras=[], horizon=4)
     return out
 
 
@@ -71,7 +71,7 @@ def test_cluster(data, tmp_path, monkeypatch):
 def test_mistakes(data, tmp_path, monkeypatch, lines_format):
     with pytest.raises(ValueError, match="unknown export format 'line'; did you mean 'lines'"):
         mjs.export(data, tmp_path / "a", format="line")
-    with pytest.raises(ValueError, match="encode_again is an option of the format mcap$"):
+    with pytest.raises(ValueError, match=r"^encode_again is an option of the format mcap$"):
         mjs.export(data, tmp_path / "a", format="lines", encode_again=True)
     with pytest.raises(TypeError, match=r"export\(\) got an unexpected keyword argument 'trimidle'; did you mean 'trim_idle'"):
         mjs.export(data, tmp_path / "a", format="lines", trimidle=True)

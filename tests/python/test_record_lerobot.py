@@ -17,7 +17,7 @@ import mjsense as mjs
 from mjsense.exporting.output import part_of
 from mjsense.exporting.record_lerobot import CompleteError
 
-ARGUMENTS = {"horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5, "episodes": 6, "max_attempts": 6, "batches": 3}
+ARGUMENTS = {"horizon": 12, "keep_failures": True, "width": 32, "height": 24, "num_worlds": 2, "seed": 5, "episodes": 6, "max_attempts": 6, "batches": 3}
 WORDS = ["record", "pick", "--horizon", "12", "--keep-failures", "--size", "32x24", "--worlds", "2", "--seed", "5", "--episodes", "6",
          "--max-attempts", "6", "--batches", "3", "--format", "lerobot", "--resume", "-q"]  # fmt: skip
 KILLS = int(os.environ.get("MJSENSE_TEST_KILLS", "3"))

@@ -11,7 +11,7 @@ import pytest
 import mjsense as mjs
 
 PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
-SMALL = dict(worlds=2, width=48, height=32, shadows=False, seed=1)
+SMALL = dict(num_worlds=2, width=48, height=32, shadows=False, seed=1)
 
 
 class Hand(mjs.Sensor):
@@ -58,7 +58,7 @@ def test_bad_arguments(tmp_path):
         (dict(policy="x"), KeyError, "planner"),
         (dict(cameras=["wrist"]), KeyError, "wrist"),
         (dict(episodes=0), ValueError, "episodes is 0"),
-        (dict(worlds=0), ValueError, "worlds is 0"),
+        (dict(num_worlds=0), ValueError, "worlds is 0"),
         (dict(episodes="2"), TypeError, "episodes must be an int"),
         (dict(sensors=[3]), TypeError, "not a mjsense.Sensor"),
     ]:

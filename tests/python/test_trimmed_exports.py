@@ -133,7 +133,7 @@ def test_ray_trims_as_one_process_does(recordings, tmp_path):
     ray = pytest.importorskip("ray")
     ray.init("local", num_cpus=1, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
     try:
-        with pytest.raises(ValueError, match="trim_idle is an option of the formats .* and zarr; mcap shows episodes with their times"):
+        with pytest.raises(ValueError, match=r"trim_idle is an option of the formats .* and zarr; mcap shows episodes with their times"):
             export_on_ray("mcap", recordings["pick_and_place"], tmp_path / "mcap", trim_idle=True)
         for trim in (None, False):
             ours = export_on_ray(

@@ -41,7 +41,7 @@ def live(port):
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     out = tmp_path_factory.mktemp("pick")
-    mjs.record("pick", out=out, horizon=30, episodes=2, worlds=2, keep_failures=True, width=48, height=32, depth=True)
+    mjs.record("pick", out=out, horizon=30, episodes=2, num_worlds=2, keep_failures=True, width=48, height=32, depth=True)
     return out
 
 

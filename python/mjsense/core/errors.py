@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable
 
 from mjsense.core.representations import printable
 
+_NUMBER_OF_WORLDS = {"num_worlds", "num_envs", "worlds"}  # Gymnasium's and mjlab's word is num_envs
+
 
 class UnknownNameError(KeyError):
     """A name does not exist. The message contains the most similar names."""
@@ -19,7 +21,9 @@ class UnknownNameError(KeyError):
 
 def unexpected_keyword(context: str, name: str, known: Iterable[str]) -> TypeError:
     """The error for an argument that ``context``, such as ``make_vec()``, does not have."""
-    return TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, [one for one in known if one[0] != '_'], 'it takes')}")
+    names = [one for one in known if one[0] != "_"]
+    same = [one for one in names if {one, name} <= _NUMBER_OF_WORLDS]
+    return TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, same or names, 'it takes')}")
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.6) -> list[str]:

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Old names of modules. They work for one version, with a warning that gives the new name."""
+"""Old names of modules and arguments. They work for one version, with a warning that gives the new name."""
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 import warnings
+from collections.abc import Callable
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, cast
+
+T = TypeVar("T", bound=Callable[..., Any])
 
 OLD_NAMES = {
     "mjsense.assets": "mjsense.tasks.assets",
@@ -44,3 +48,26 @@ def register() -> None:
         module = sys.modules.setdefault(old, _OldModule(old, new))
         package, _, name = old.rpartition(".")
         vars(sys.modules[package]).setdefault(name, module)
+
+
+def old_argument(old: str, new: str) -> Callable[[T], T]:
+    """Decorates a function, or a class, whose keyword argument ``old`` is now ``new``."""
+
+    def decorate(target: T) -> T:
+        if isinstance(target, type):
+            cls: Any = target
+            cls.__init__ = decorate(cls.__init__)
+            return target
+        function: Any = target
+        context = function.__qualname__.removesuffix(".__init__")
+
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            if old in kwargs and new not in kwargs:
+                warnings.warn(f"{context}(): the argument {old} is now {new}", DeprecationWarning, stacklevel=2)
+                kwargs[new] = kwargs.pop(old)
+            return function(*args, **kwargs)
+
+        return cast(T, call)
+
+    return decorate

@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from mjsense.core.arguments import Seed, checked
+from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import line_of, of_recording
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks
 from mjsense.tasks.record_job import RecordProgress, RecordSummary, record_here
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def record(
     task: Tasks = "pick",
@@ -26,7 +28,7 @@ def record(
     # options of a recording
     arm_controller: str = "",
     split: Literal["", "train", "test"] = "",
-    worlds: int = 4,
+    num_worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
     camera_system: str = "",
@@ -93,7 +95,7 @@ def record(
             ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
         split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
             or ``@test`` after the scene's name.
-        worlds: Number of worlds that run in parallel.
+        num_worlds: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.

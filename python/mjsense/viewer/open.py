@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsense._core import robot_names
-from mjsense.core.errors import UnknownNameError
+from mjsense.core.errors import UnknownNameError, unexpected_keyword
 from mjsense.dataset import Dataset
 from mjsense.dataset.files import INDEX
 from mjsense.dataset.remote import is_address
@@ -39,7 +39,7 @@ def options_of(given: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> LiveSource | Dataset:
+def source_of(thing: Any, *, num_worlds: int = 1, seed: int = 0, **options: Any) -> LiveSource | Dataset:
     """What a viewer can show.
 
     Args:
@@ -47,6 +47,8 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
             of a scene or a task.
         options: Options of :func:`mjsense.make_vec`, for tasks and scenes.
     """
+    if "num_envs" in options:
+        raise unexpected_keyword("view()", "num_envs", ["num_worlds"])
     if isinstance(thing, (LiveSource, Dataset)):
         return thing
     if isinstance(thing, Simulation):
@@ -64,8 +66,8 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
         if is_recording(path):
             return Dataset(path)
         if path.suffix in (".xml", ".mjcf"):
-            return _model(path, worlds, seed)
-    options = {"policy": "planner", "render_mode": "rgb_array", "num_envs": worlds, "seed": seed, **_IMAGE, **options}
+            return _model(path, num_worlds, seed)
+    options = {"policy": "planner", "render_mode": "rgb_array", "num_envs": num_worlds, "seed": seed, **_IMAGE, **options}
     if not isinstance(thing, (str, Path, SceneFileCfg)):
         return TaskSource(make_vec(thing, **options), type(thing).__name__)
     if isinstance(thing, str) and thing in task_names():
