@@ -162,11 +162,11 @@ def test_every_frame_of_a_long_video(tmp_path, decoder, encoding):
     subprocess.run([*source, *codec, path], check=True)
     expected = decode(path, "rgb24", (24, 32, 3)) if rgb else decode(path, "gray16le", (24, 32)) * np.float32(0.0002)
     reader = video.FrameReader(Cache(150_000), Cache(150_000))
-    frames = mjs.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
+    frames = mjs.dataset.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
     for t in [*np.random.default_rng(0).permutation(400)[:16], 89, 90, 88, 179, 180, 399, 0, *range(200, 212)]:
         np.testing.assert_array_equal(frames[int(t)], expected[t], err_msg=str(t))
     with pytest.raises(RuntimeError, match="has no frame 400"):
-        mjs.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
+        mjs.dataset.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
 
 
 def test_a_recording_of_the_first_format(tmp_path):

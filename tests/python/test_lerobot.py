@@ -174,7 +174,7 @@ def test_lerobot_streams_and_edits_an_export_at_the_default_rate(record, tmp_pat
     root = record(Fraction(500, 33), 200)
     map = map_of("")
     rows = expected_of(Source(root, map=map), tmp_path / "expected.npz")
-    out = mjs.export_lerobot(root, tmp_path / "out", map=map)
+    out = mjs.exporting.export_lerobot(root, tmp_path / "out", map=map)
     result = read(version, out, tmp_path / "expected.npz", 1, tolerance, mode)
     assert result["rows"] == (rows // 2 if mode == "delete" else rows) and result["wrong"] == 0, result
 
@@ -189,7 +189,7 @@ def test_act_trains_on_an_exported_pick(tmp_path):
     """A small ACT, 200 steps: the loss falls, and LeRobot prints no warning. About a minute of CPU time."""
     python, _ = environment("0.4.4")
     mjs.record("pick", out=tmp_path / "data", episodes=2, keep_failures=True, width=96, height=96, cameras=["wrist_camera"], num_worlds=2)
-    mjs.export_lerobot(tmp_path / "data", tmp_path / "lerobot")
+    mjs.exporting.export_lerobot(tmp_path / "data", tmp_path / "lerobot")
     words = [python.parent / "lerobot-train", *TRAIN.split(), f"--dataset.root={tmp_path}/lerobot", f"--output_dir={tmp_path}/act"]
     done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "HF_HOME": str(tmp_path / "hf"), "HF_HUB_OFFLINE": "1"})
     text = done.stdout + done.stderr

@@ -18,7 +18,7 @@ BENCH = """
   </worldbody>
 </mujoco>"""
 THINGS = {"mug": "mug", "can": "soup_can", "cube": "blue_cube"}
-TOP = mjs.SceneRegionCfg(name="top", on="bench/top", area=(0.4, 0.75, -0.4, 0.4), target_area=(0.45, 0.62, -0.2, 0.2))
+TOP = mjs.tasks.SceneRegionCfg(name="top", on="bench/top", area=(0.4, 0.75, -0.4, 0.4), target_area=(0.45, 0.62, -0.2, 0.2))
 SMALL = dict(width=64, height=48)
 
 
@@ -62,7 +62,7 @@ def test_scene_may_be_a_function(tmp_path):
         (3, "scene must be the name or file of a scene"),
         (lambda: 3, r"models\(\) must return a mjsense.SceneCfg, not 3"),
         (mjs.SceneFileCfg(name="both", models=bench, base="x.xml"), "scene 'both': a scene whose models are made by code"),
-        (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
+        (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.tasks.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
     ],
 )
 def test_errors_name_the_scene(what, message):

@@ -91,7 +91,7 @@ def test_cameras_of_the_suite():
     assert cameras == ["wrist_camera", "exo_camera_1"] and not is_camera_sensor("qpos", suite) and not is_camera_sensor("x", suite)
     (observation,), _ = task.reset(seed=0)
     assert observation["wrist_camera"].shape == (36, 64, 3) and "object_image_points" in observation
-    assert is_camera_sensor("rgb", SensorSuite([mjs.CameraImageSensor("wrist_camera", uuid="rgb")]))
+    assert is_camera_sensor("rgb", SensorSuite([mjs.sensors.CameraImageSensor("wrist_camera", uuid="rgb")]))
     task.close()
 
 

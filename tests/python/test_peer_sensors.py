@@ -313,7 +313,7 @@ def test_the_robot_view_agrees_with_the_suite():
         np.testing.assert_allclose(pose[:3, 3], env.rows["actions/ee_pose/arm"][w][:3], atol=1e-12)
         peer.current_batch_index = w
         camera = peer.camera_manager.registry["wrist_camera"]
-        sensor = mjs.CameraParameterSensor("wrist_camera", 48, 32, uuid=f"camera{w}")
+        sensor = mjs.sensors.CameraParameterSensor("wrist_camera", 48, 32, uuid=f"camera{w}")
         env.sim.add(sensor)
         np.testing.assert_allclose(camera.get_pose(), sensor.data["cam2world_gl"][w], atol=1e-12)
         np.testing.assert_array_equal(peer.render_rgb_frame("wrist_camera"), env.rows["wrist_camera"][w])

@@ -37,7 +37,7 @@ def recording(tmp_path_factory):
 def test_summary_and_progress(recording):
     summary, seen = recording
     assert summary.kept == 1 and summary.enough and not summary.interrupted
-    assert isinstance(seen[-1], mjs.RecordProgress) and seen[-1].kept == 1
+    assert isinstance(seen[-1], mjs.tasks.RecordProgress) and seen[-1].kept == 1
     assert summary.steps == sum(n - 1 for n in summary.lengths)
 
 

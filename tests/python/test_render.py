@@ -225,7 +225,7 @@ def test_sensors(recorded, tmp_path):
         recorded,
         tmp_path / "out",
         cameras=[],
-        sensors=lambda: [*sensors_of(tmp_path / "sensors.toml"), Height(), mjs.PoseSensor("hand", body="robot_0/gripper/base")],
+        sensors=lambda: [*sensors_of(tmp_path / "sensors.toml"), Height(), mjs.sensors.PoseSensor("hand", body="robot_0/gripper/base")],
     )
     verified(tmp_path / "out")
     episode = mjs.Dataset(tmp_path / "out").episodes[0]

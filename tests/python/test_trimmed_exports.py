@@ -74,10 +74,10 @@ def test_data_sets_say_how_many_steps_are_left_out(recordings, tmp_path):
     (episode,) = mjs.Dataset(recordings["pick_and_place"]).episodes
     short = episode.trimmed()
     assert episode.trimmed_steps == 0 < short.trimmed_steps == episode.length - short.length < WAITS
-    path = mjs.export_lerobot(recordings["pick_and_place"], tmp_path / "lerobot")
+    path = mjs.exporting.export_lerobot(recordings["pick_and_place"], tmp_path / "lerobot")
     table = parquet.read_table(path / "meta/episodes/chunk-000/file-000.parquet")
     assert table["trimmed_steps"].to_pylist() == [short.trimmed_steps] and table["length"].to_pylist() == [short.length - 1]
-    with h5py.File(mjs.export_robomimic(recordings["pick_and_place"], tmp_path / "robomimic.hdf5")) as file:
+    with h5py.File(mjs.exporting.export_robomimic(recordings["pick_and_place"], tmp_path / "robomimic.hdf5")) as file:
         assert json.loads(file["data/demo_0"].attrs["ep_meta"])["trimmed_steps"] == short.trimmed_steps
         assert file["data/demo_0"].attrs["num_samples"] == short.length - 1
 
@@ -112,14 +112,14 @@ def test_videos_do_not_depend_on_what_memory_contained(tmp_path):
     recording = mjs.record("pick_and_place", out=tmp_path / "recording", **{**ARGUMENTS, "width": 224, "height": 224}).path
     videos = []
     for value in ("0", "1"):  # with which glibc fills memory before a program writes to it; elsewhere the variable has no effect
-        code = f"import mjsense; mjsense.export_lerobot({str(recording)!r}, {str(tmp_path / value)!r})"
+        code = f"import mjsense; mjsense.exporting.export_lerobot({str(recording)!r}, {str(tmp_path / value)!r})"
         subprocess.run([sys.executable, "-c", code], env={**os.environ, "MALLOC_PERTURB_": value}, check=True)
         videos.append(digest(next((tmp_path / value).rglob("*.mp4")).read_bytes()))
     assert videos[0] == videos[1]
 
 
 def test_exact_depth_beside_a_trimmed_episode(recordings, tmp_path):
-    out = mjs.export_lerobot(recordings["packing"], tmp_path / "out", map={"cameras": {"near": "wrist_camera_depth"}})
+    out = mjs.exporting.export_lerobot(recordings["packing"], tmp_path / "out", map={"cameras": {"near": "wrist_camera_depth"}})
     (episode,) = mjs.Dataset(recordings["packing"], trim_idle=True).episodes
     (file,) = (out / "extras/depth/near").iterdir()
     wanted = episode.video("wrist_camera_depth")
@@ -142,7 +142,7 @@ def test_ray_trims_as_one_process_does(recordings, tmp_path):
                 tmp_path / f"ray_{trim}.hdf5",
                 **({} if trim is None else {"trim_idle": trim}),
             )
-            theirs = mjs.export_robomimic(recordings["pick_and_place"], tmp_path / f"alone_{trim}.hdf5", trim_idle=trim)
+            theirs = mjs.exporting.export_robomimic(recordings["pick_and_place"], tmp_path / f"alone_{trim}.hdf5", trim_idle=trim)
             assert files(ours) == files(theirs)
     finally:
         ray.shutdown()
@@ -153,7 +153,7 @@ def test_recording_to_lerobot_trims_as_the_export_does(tmp_path, capsys):
         out = tmp_path / f"direct_{trim}"
         mjs.record("pick_and_place", out=out, format="lerobot", trim_idle=trim, keep_recording=True, **ARGUMENTS)
         assert (NOTE in capsys.readouterr().err) == (trim is None)
-        assert files(out) == files(mjs.export_lerobot(f"{out}.recording", tmp_path / f"exported_{trim}", trim_idle=trim))
+        assert files(out) == files(mjs.exporting.export_lerobot(f"{out}.recording", tmp_path / f"exported_{trim}", trim_idle=trim))
         capsys.readouterr()
     with pytest.raises(ValueError, match="map, trim_idle and keep_recording are options of format='lerobot'"):
         mjs.record("pick", out=tmp_path / "no", trim_idle=True, **ARGUMENTS)

@@ -100,7 +100,7 @@ def test_poses_in_frames_of_bodies():
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='b' pos='1 2 3' euler='0 0 90'><geom size='.1'/></body></worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    shapes = mjs.DebugShapes()
+    shapes = mjs.sensors.DebugShapes()
     PoseStream("p", "body b").draw(shapes, np.array([1.0, 0, 0, 1, 0, 0, 0]), model, data.xpos, data.xmat)
     np.testing.assert_allclose(shapes.positions[0], (1, 3, 3), atol=1e-9)
     np.testing.assert_allclose(shapes.vectors[0] / np.linalg.norm(shapes.vectors[0]), (0, 1, 0), atol=1e-9)

@@ -23,7 +23,8 @@ def unexpected_keyword(context: str, name: str, known: Iterable[str]) -> TypeErr
     """The error for an argument that ``context``, such as ``make_vec()``, does not have."""
     names = [one for one in known if one[0] != "_"]
     same = [one for one in names if {one, name} <= _NUMBER_OF_WORLDS]
-    return TypeError(f"{context} got an unexpected keyword argument '{name}'{did_you_mean(name, same or names, 'it takes')}")
+    near = f"; did you mean '{same[0]}'?" if same else did_you_mean(name, names, "it takes")
+    return TypeError(f"{context} got an unexpected keyword argument '{name}'{near}")
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.6) -> list[str]:

@@ -91,7 +91,7 @@ def export_lerobot(
         map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
             places an object. Videos of episodes with such steps are encoded again.
         exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
             such a data set. By default the rate is rounded if that changes it by at most 5 %.
@@ -124,7 +124,7 @@ def export_lerobot21(
         map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
             places an object. Videos of episodes with such steps are encoded again.
         exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
             such a data set. By default the rate is rounded if that changes it by at most 5 %.
@@ -157,7 +157,7 @@ def export_robomimic(
         map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
             places an object.
         progress: Called with the number of written episodes and of all episodes.
 
@@ -187,7 +187,7 @@ def export_rlds(
         map: Which streams become which features: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
             places an object.
         progress: Called with the number of written episodes and of all episodes.
 
@@ -217,7 +217,7 @@ def export_zarr(
         map: Which streams become which arrays: a TOML file, a dict of the same form, or a Mapping.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
             places an object.
         progress: Called with the number of written episodes and of all episodes.
 

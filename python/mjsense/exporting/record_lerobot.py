@@ -47,8 +47,8 @@ def converted(
         out: Folder of the data set.
         format: Name of a format that is written while the recording is made.
         resume: Whether the recording may exist.
-        map: Features and cameras, as in :func:`mjsense.export_lerobot`.
-        trim_idle: Leave out idle steps, as in :func:`mjsense.export_lerobot`.
+        map: Features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
+        trim_idle: Leave out idle steps, as in :func:`mjsense.exporting.export_lerobot`.
         keep_recording: Keep the recording, ``OUT.recording``, when the data set is complete.
         quiet: Do not print how many steps are left out.
 

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mjsense.core.arguments import Seed, checked
 from mjsense.core.old_names import old_argument
+from mjsense.viewer.plots import plot
+from mjsense.viewer.viewer import Viewer
 
-if TYPE_CHECKING:
-    from mjsense.viewer.viewer import Viewer
+__all__ = ["Viewer", "plot", "view"]
 
 
 @old_argument("worlds", "num_worlds")
