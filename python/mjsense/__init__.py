@@ -48,6 +48,14 @@ from mjsense import _core
 
 _core.leave_no_log_file()
 
+from mjsense import dataset as dataset
+from mjsense import exporting as exporting
+from mjsense import recording as recording
+from mjsense import scene as scene
+from mjsense import sensors as sensors
+from mjsense import sim as sim
+from mjsense import tasks as tasks
+from mjsense import viewer as viewer
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense._core import embedded_models, robot_names
 from mjsense.core import old_names

@@ -156,7 +156,7 @@ def old_argument(old: str, new: str) -> Callable[[T], T]:
         if isinstance(target, type):
             cls: Any = target
             cls.__init__ = decorate(cls.__init__)
-            return target
+            return cast(T, cls)
         function: Any = target
         context = function.__qualname__.removesuffix(".__init__")
 
