@@ -40,6 +40,10 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
 import typing
 
+from mjsense.commands import start
+
+start.answer_early()  # if this process is the program
+
 from mjsense.core import libmujoco
 
 libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses
@@ -58,7 +62,7 @@ from mjsense import tasks as tasks
 from mjsense import viewer as viewer
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense._core import embedded_models, robot_names
-from mjsense.core import old_names
+from mjsense.core import installed_files, later_rooms, old_names
 from mjsense.core.errors import UnknownNameError
 from mjsense.dataset import Dataset, check_replay, render, replay
 from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
@@ -100,7 +104,7 @@ from mjsense.sensors import (
     observations,
 )
 from mjsense.sim import Simulation, attach
-from mjsense.tasks import assets, gymnasium_registry
+from mjsense.tasks import gymnasium_registry
 from mjsense.tasks.env import make
 from mjsense.tasks.policy import Policy, policy_names, register_policy
 from mjsense.tasks.recording import record
@@ -110,7 +114,18 @@ from mjsense.tasks.teleoperation import play
 from mjsense.tasks.vector import make_vec
 from mjsense.viewer import plot, view
 
-assets.name_package_folders()
+later_rooms.provide({
+    "env": "mjsense.compat.peer.env:PeerEnv",
+    "foreign_sensor": "mjsense.compat.peer.per_world:foreign_sensor",
+    "record_on_ray": "mjsense.cluster.recording:record_from_options",
+    "sensor_adapters": "mjsense.compat.sensor_adapters:ADAPTERS",
+    "task_names": "mjsense.tasks.task:task_names",
+    "task_source": "mjsense.tasks.viewer_source:task_source",
+    "warp_environment": "mjsense.warp.start:environment",
+    "warp_simulation": "mjsense.warp.start:simulation",
+})
+
+installed_files.name_package_folders()
 
 gymnasium_registry.register_all()
 

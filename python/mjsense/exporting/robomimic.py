@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.env_ids import env_id
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.model_xml import model_xml
 from mjsense.exporting.images import FLAGS, depth_videos
 from mjsense.exporting.mapping import Source, check_names, named_streams
 from mjsense.exporting.output import needs
-from mjsense.tasks.gymnasium_registry import env_id
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _VALID_EVERY = 10

@@ -20,7 +20,6 @@ from mjsense.sensors.core_sensors import (
 )
 from mjsense.sensors.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.sensors.drawing import DebugShapes
-from mjsense.sensors.effects import EffectSensorCfg
 from mjsense.sensors.imu import ImuSensor
 from mjsense.sensors.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.sensors.pipeline import ObservationPipeline
@@ -39,7 +38,6 @@ __all__ = [
     "ContactData",
     "ContactSensor",
     "DebugShapes",
-    "EffectSensorCfg",
     "EnvStatesSensor",
     "FunctionSensor",
     "GraspStateSensor",
