@@ -72,8 +72,8 @@ def _refuse(names: list[str], other: str) -> None:
 def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bool, shows_tree: bool) -> int:
     """Records on this machine, and prints the summary. Returns 0 if all wanted episodes are on disk, otherwise 1."""
     from mjsense import _core
-    from mjsense.core.progress_line import ProgressLine, of_recording
-    from mjsense.tasks.record_job import RecordProgress, job_result
+    from mjsense.core.progress_line import ProgressLine
+    from mjsense.tasks.record_job import RecordProgress, job_result, of_recording
 
     title, out = _title(options)
     line = None if arguments.quiet else ProgressLine()
