@@ -30,7 +30,7 @@ from mjsense.cluster.job import Shard, ShardResult, run_shard
 from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import read_index
 
-ARGUMENTS = {"task": "pick", "horizon": 80, "keep_failures": True, "width": 320, "height": 184, "worlds": 2, "seed": 2}
+ARGUMENTS = {"task": "pick", "horizon": 80, "keep_failures": True, "width": 320, "height": 184, "num_worlds": 2, "seed": 2}
 
 
 def cpu() -> float:
@@ -64,7 +64,7 @@ def _peak() -> float:
 def overhead() -> None:
     """Prints what a division into one more shard costs in a warm worker."""
     words = ("pick", "--horizon", "80", "--keep-failures", "--size", "320x184", "--worlds", "1", "--seed", "2")
-    jobs: list[tuple[str, dict[str, Any]]] = [("mjs.record", {"arguments": {**ARGUMENTS, "worlds": 1}}), ("command", {"words": words})]
+    jobs: list[tuple[str, dict[str, Any]]] = [("mjs.record", {"arguments": {**ARGUMENTS, "num_worlds": 1}}), ("command", {"words": words})]
     for name, made in jobs:
         with tempfile.TemporaryDirectory() as out:
             job = Job(out, **made)
@@ -82,7 +82,7 @@ def overhead() -> None:
 def memory() -> None:
     for worlds in (2, 4):
         with tempfile.TemporaryDirectory() as out:
-            run_shard(Job(out, {**ARGUMENTS, "horizon": 20, "width": 640, "height": 368, "worlds": worlds}), Shard(0, 0, 4), "")
+            run_shard(Job(out, {**ARGUMENTS, "horizon": 20, "width": 640, "height": 368, "num_worlds": worlds}), Shard(0, 0, 4), "")
         print(f"memory of a worker with {worlds} worlds, two cameras of 640x368, without Ray and encoders: {_peak():.0f} MB")
 
 

@@ -49,7 +49,7 @@ def attempts(scene: Path, out: Path, number: int, robot: str) -> tuple[int, Coun
         scene=str(scene),
         out=out,
         num_attempts=number,
-        worlds=number,
+        num_worlds=number,
         cameras=[],
         replay=False,
         progress=False,

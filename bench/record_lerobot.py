@@ -14,7 +14,7 @@ from typing import Any
 import mjsense as mjs
 from mjsense.exporting import record_lerobot
 
-ARGUMENTS: dict[str, Any] = dict(task="pick", horizon=80, keep_failures=True, worlds=2, threads=1, seed=5, format="lerobot", progress=False)
+ARGUMENTS: dict[str, Any] = dict(task="pick", horizon=80, keep_failures=True, num_worlds=2, threads=1, seed=5, format="lerobot", progress=False)
 used = 0.0
 run = record_lerobot._Conversion.run
 

@@ -66,7 +66,7 @@ def main() -> None:
     print("| setting | bytes per frame | CPU ms per frame | PSNR exo, wrist, dB | CPU ms of a random frame of both cameras |\n| --- | ---: | ---: | ---: | ---: |")
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
-        mjs.record("pick", out=folder / "out", episodes=2, worlds=2, crf=0, keep_failures=True)
+        mjs.record("pick", out=folder / "out", episodes=2, num_worlds=2, crf=0, keep_failures=True)
         raw, out = decoded(folder), folder / "video.mp4"
         for name, setting in SETTINGS.items():
             frames, size, seconds, decoding, quality = 0, 0, 0.0, 0.0, []

@@ -7,7 +7,7 @@ import tempfile
 import mjsense as mjs
 
 out = sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp()
-summary = mjs.record("pick", "franka", out=out, episodes=2, worlds=2, width=160, height=92)
+summary = mjs.record("pick", "franka", out=out, episodes=2, num_worlds=2, width=160, height=92)
 print(f"{summary.kept} episodes, {summary.frames} frames in {summary.seconds:.1f} s: {summary.path}")
 
 dataset = mjs.Dataset(summary.path)

@@ -131,7 +131,7 @@ class ClonePolicy(mjs.Policy):
 
 def successes(policy, episodes, out):
     """In how many unseen episodes the object was lifted at the last step or before."""
-    return mjs.record("pick", scene="table", policy=policy, out=out, overwrite=True, num_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
+    return mjs.record("pick", scene="table", policy=policy, out=out, overwrite=True, num_attempts=episodes, num_worlds=50, seed=10_000, horizon=STEPS,
                       cameras=[], action_noise=False, terminate_upon_success=True, keep_failures=True).succeeded  # fmt: skip
 
 
@@ -146,7 +146,7 @@ def wilson(successes, episodes, z=1.96):
 def main(out, recorded=200, judged=200, passes=120):
     begun = time.perf_counter()
     made = mjs.record("pick", scene="table", policy="top_down_planner", out=out / "demonstrations", overwrite=True, episodes=recorded,
-                      worlds=16, cameras=[])  # fmt: skip
+                      num_worlds=16, cameras=[])  # fmt: skip
     print(f"{made.kept} picks recorded in {time.perf_counter() - begun:.0f} s", flush=True)
     x, moves, closed = demonstrations(made.path)
     begun = time.perf_counter()

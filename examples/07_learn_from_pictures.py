@@ -92,7 +92,7 @@ def record(out, episodes):
     robot = Path(out) / "franka_with_noise.toml"
     robot.write_text(text + "\n[noise]\nscale = 2.5\nmax_position = 0.03\n")
     return mjs.record("pick", str(robot), policy="top_down_planner", camera_system=str(MODELS / "cameras/close_up.toml"), width=WIDTH,
-                      height=HEIGHT, crf=12, out=out, episodes=episodes, worlds=8, replay=False).path  # fmt: skip
+                      height=HEIGHT, crf=12, out=out, episodes=episodes, num_worlds=8, replay=False).path  # fmt: skip
 
 
 class Demonstrations:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import runpy
 import sys
 import textwrap
 from pathlib import Path
@@ -97,7 +98,7 @@ from mjsense.core.sensor_data import SensorData, make_data
 
 # Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).
 SIGNATURES = {
-    "tasks/recording.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "scene", "out"), {}),
+    "tasks/recording.py": ("RecordJobCfg", {}, {}, ("task", "robot", "policy", "scene", "out"), {}),
     "tasks/vector.py": (
         "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False", "seed": "None"}, ("task", "robot", "policy", "scene"),
         {"seed": " None: a random seed, so that every environment has other episodes."},
@@ -382,10 +383,17 @@ class Generator:
     def tables(self, text: str) -> str:
         def table(match: re.Match[str]) -> str:
             what, name = match[2], match[3]
-            make = {"fields": self.field_table, "data": self.data_table, "options": self.option_table}[what]
+            make = {"fields": self.field_table, "data": self.data_table, "options": self.option_table, "export": self.format_table}[what]
             return match[1] + "\n" + make(name) + match[4]
 
-        return re.sub(r"(<!-- (fields|data|options) (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
+        return re.sub(r"(<!-- (fields|data|options|export) (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
+
+    def format_table(self, _: str) -> str:
+        formats = runpy.run_path(str(PACKAGE / "exporting" / "formats.py"))["FORMATS"]
+        rows = [
+            f"| `{name}` | {format.about} | {format.readers} | `mjsense[{format.extra}]` |\n" for name, format in formats.items()
+        ]
+        return "| format | output | programs that read it | package |\n| --- | --- | --- | --- |\n" + "".join(rows)
 
     def field_table(self, name: str) -> str:
         s = self.structs[name]
@@ -435,7 +443,7 @@ class Generator:
         for struct, renamed in OPTIONS.items():
             rows = [self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.structs[struct]["fields"] if "type" in f]
             structs += f"    {quoted(struct)}: [\n" + "".join(row for row in rows if row) + "    ],\n"
-        names = {**self.names, "formats": export_formats()}
+        names = self.names
         return TABLE % (NOTE, structs, "".join(f"    {quoted(kind)}: {json.dumps(known)},\n" for kind, known in names.items()))
 
     def program_option(self, f: dict[str, Any], parameter: str) -> str:
@@ -477,12 +485,6 @@ class Generator:
             out[ROOT / f"src/{library}/{library}.h"] = UMBRELLA % (purpose, includes, names, namespace, using, namespace)
         out[ROOT / "cmake/PublicHeaders.cmake"] = PUBLIC_HEADERS % "\n".join(f"  {header}" for header in headers)
         return out
-
-
-def export_formats() -> dict[str, str]:
-    """``FORMATS`` of mjsense.exporting."""
-    tree = ast.parse((PACKAGE / "exporting" / "__init__.py").read_text())
-    return next(ast.literal_eval(node.value) for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FORMATS")
 
 
 def short(value: Any) -> str:

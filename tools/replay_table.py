@@ -28,7 +28,7 @@ PAIRS = [(task, robot) for task, robot, scene in CASES if not scene]
 
 def check(task: str, robot: str, episodes: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as out:
-        mjs.record(task, robot, out=out, episodes=episodes, max_attempts=episodes, keep_failures=True, worlds=2, width=32, height=24, depth=True)
+        mjs.record(task, robot, out=out, episodes=episodes, max_attempts=episodes, keep_failures=True, num_worlds=2, width=32, height=24, depth=True)
         report = mjs.check_replay(out, states=True)
     checks = [episode.sensors for episode in report.episodes if episode.sensors]
     equal = {name for check in checks for name in check.equal}

@@ -102,7 +102,7 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
     for one in scenes:
         with tempfile.TemporaryDirectory() as out:
             made = mjs.record(task, robot, out=out, scene=one, episodes=episodes, max_attempts=episodes, keep_failures=True,
-                              worlds=min(8, episodes), cameras=[], **options)  # fmt: skip
+                              num_worlds=min(8, episodes), cameras=[], **options)  # fmt: skip
             found += episodes_of(made.path)
             parts.append(made)
     angles = approach_angles(found)

@@ -96,7 +96,7 @@ def measure(task: str, scene: str, robot: str, system: str, policy: str, episode
     retried: list[bool] = []
     if policy:
         with tempfile.TemporaryDirectory() as out:
-            made = mjs.record(task, robot, out=out, scene=scene, episodes=played, max_attempts=played, keep_failures=True, worlds=8,
+            made = mjs.record(task, robot, out=out, scene=scene, episodes=played, max_attempts=played, keep_failures=True, num_worlds=8,
                               cameras=[], perturb=0.5, policy=policy)  # fmt: skip
             retried = [e["retries"] > 0 for e in task_table.episodes_of(made.path)]
     colours, cameras = np.array(found["colour"]), np.array(found["camera"])

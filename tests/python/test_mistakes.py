@@ -32,7 +32,7 @@ def sim():
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     out = tmp_path_factory.mktemp("data")
-    mjs.record(task := Cart(), policy=Driver(task), out=out, worlds=1, episodes=1, keep_failures=True, cameras=[], seed=1, horizon=5)
+    mjs.record(task := Cart(), policy=Driver(task), out=out, num_worlds=1, episodes=1, keep_failures=True, cameras=[], seed=1, horizon=5)
     return mjs.Dataset(out)
 
 
@@ -59,7 +59,7 @@ CASES = {
     "record": (lambda u: mjs.record("pick", out="x", episode=2), ["record()", "'episode'", "'episodes'"]),
     "Renderer": (lambda u: mjs.Renderer(u.model, heigth=3), ["Renderer()", "'heigth'", "did you mean 'height'?"]),
     "Dataset": (lambda u: mjs.Dataset("x", delta_timestamp={}), ["Dataset()", "'delta_timestamp'", "'delta_timestamps'"]),
-    "export": (lambda u: mjs.export_lerobot("x", "y", succes=True), ["export_lerobot()", "'succes'", "did you mean 'success'?"]),
+    "export": (lambda u: mjs.exporting.export_lerobot("x", "y", succes=True), ["export_lerobot()", "'succes'", "did you mean 'success'?"]),
     "import": (lambda u: mjs.import_robomimic("x", out="y", fp=3), ["import_robomimic()", "'fp'", "did you mean 'fps'?"]),
     "attach": (lambda u: mjs.attach(1, 2, sensor=()), ["attach()", "'sensor'", "did you mean 'sensors'"]),
     "Simulation": (lambda u: mjs.Simulation(scene_of(), num_world=2), ["Simulation()", "'num_world'", "'num_worlds'"]),

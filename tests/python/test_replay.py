@@ -16,7 +16,7 @@ from edited_recordings import changed, file_of
 
 import mjsense as mjs
 
-SMALL = dict(worlds=2, episodes=2, keep_failures=True, cameras=[], seed=3)
+SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, cameras=[], seed=3)
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def test_a_recording_is_the_same_in_one_world_and_in_three(task, tmp_path):
             out=out,
             episodes=3,
             max_attempts=3,
-            worlds=worlds,
+            num_worlds=worlds,
             threads=threads,
             cameras=[],
             horizon=6,
@@ -167,7 +167,7 @@ def test_any_of_several_tasks():
 
 
 def test_nav_and_pick_drives_and_then_picks(tmp_path):
-    made = mjs.record("nav_and_pick", out=tmp_path, first_attempt=1, num_attempts=1, worlds=1, cameras=[])
+    made = mjs.record("nav_and_pick", out=tmp_path, first_attempt=1, num_attempts=1, num_worlds=1, cameras=[])
     assert made.succeeded == 1, made.failures
     (episode,) = mjs.Dataset(tmp_path).episodes
     assert episode.settings["robot"] == "mobile_franka" and episode.task.endswith((" it", " it up", " it?", " it up?"))

@@ -26,7 +26,7 @@ def hold(env):
 
 
 def test_spaces(env):
-    assert isinstance(env, mjs.TaskVectorEnv) and isinstance(env, gymnasium.vector.VectorEnv)
+    assert isinstance(env, mjs.tasks.TaskVectorEnv) and isinstance(env, gymnasium.vector.VectorEnv)
     assert env.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
     assert env.action_space.shape == (3, 8) and list(env.action_groups) == ["arm", "gripper"]
     observation, info = env.reset(seed=0)

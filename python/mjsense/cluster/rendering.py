@@ -15,6 +15,7 @@ from mjsense import _core
 from mjsense.cluster.driver import ClusterProgress, ClusterSummary, run_job
 from mjsense.cluster.job import Shard
 from mjsense.cluster.tasks import check_pickle
+from mjsense.core.old_names import old_argument
 from mjsense.dataset import Dataset, render
 from mjsense.dataset.remote import absolute
 
@@ -56,6 +57,7 @@ def _text(value: Any) -> str:
     return getattr(value, "__qualname__", None) or str(value)
 
 
+@old_argument("worlds", "num_worlds")
 def render_on_ray(
     root: str | Path,
     out: str | Path,

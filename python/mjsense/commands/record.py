@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mjsense.commands._ray import add_ray, ray_options
 from mjsense.commands.output import bytes_below, bytes_text, tell, tree
 from mjsense.commands.parser import Parser, add_name, field_values
+from mjsense.exporting.formats import FORMATS
 
 if TYPE_CHECKING:
     from mjsense.cluster import ClusterProgress
@@ -33,7 +34,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--no-sheet", dest="sheet", action="store_false", help="Do not write a contact sheet.")
     add_ray(parser, "Record")
     parser.add_argument("--shard-attempts", type=int, metavar="N", help="With --ray: attempts of one task of the cluster; default 16.")
-    parser.add_argument("--format", choices=("mjsense", "lerobot"), default="mjsense", metavar="FORMAT",
+    parser.add_argument("--format", choices=("mjsense", *(name for name, format in FORMATS.items() if format.while_recording)), default="mjsense", metavar="FORMAT",
                         help="lerobot: write a LeRobot data set (v3.0) instead of HDF5.")  # fmt: skip
     parser.add_argument("--map", metavar="FILE", help="With --format: TOML file that chooses features and cameras.")
     parser.add_argument("--trim-idle", action=argparse.BooleanOptionalAction,
@@ -57,8 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
         _refuse([*(name for name in _NOT_ON_RAY if options.get(name)), *(["json"] if arguments.json else []),
                  *(["format"] if arguments.format != "mjsense" else [])], "--ray")  # fmt: skip
         return _record_on_ray(arguments, options)
-    if arguments.format == "lerobot":
-        _refuse([name for name in _NOT_WITH_FORMAT if options.get(name)], "--format lerobot")
+    if arguments.format != "mjsense":
+        _refuse([name for name in _NOT_WITH_FORMAT if options.get(name)], f"--format {arguments.format}")
         return _record_lerobot(arguments, options)
     return _record(arguments, options, sheet=arguments.sheet, shows_tree=True)
 
@@ -164,7 +165,7 @@ def _record_lerobot(arguments: argparse.Namespace, options: dict[str, Any]) -> i
 
     out = options["out"]
     try:
-        with converted(out, resume=options.get("resume", False), map=arguments.map, trim_idle=arguments.trim_idle,
+        with converted(out, format=arguments.format, resume=options.get("resume", False), map=arguments.map, trim_idle=arguments.trim_idle,
                        keep_recording=arguments.keep_recording, quiet=arguments.quiet) as folder:  # fmt: skip
             code = _record(arguments, {**options, "out": str(folder)}, sheet=False, shows_tree=False)
             sys.stdout.flush()
@@ -176,7 +177,7 @@ def _record_lerobot(arguments: argparse.Namespace, options: dict[str, Any]) -> i
             if os.path.exists(path):
                 print(f"\n{tree(path)}", flush=True)
     if not arguments.quiet and os.path.exists(out):
-        tell(f"The LeRobot data set is in {out}.")
+        tell(f"The {FORMATS[arguments.format].about} data set is in {out}.")
     return code
 
 

@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sensors", metavar="FILE", help="TOML file with [[sensors]] tables, as in a robot.toml.")
     parser.add_argument("--copy", action=flag, default=True, help="Copy the videos of recorded cameras that do not change.")
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
-    parser.add_argument("--worlds", type=int, default=4, metavar="N", help="Number of episodes that are rendered in parallel.")
+    parser.add_argument("--worlds", dest="num_worlds", type=int, default=4, metavar="N", help="Number of episodes that are rendered in parallel.")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="Number of threads; 0: one per available CPU.")
     parser.add_argument("--batches", type=int, default=0, metavar="N", help="Number of HDF5 files of a house; 0: one per four episodes.")
     parser.add_argument("--crf", type=int, metavar="N", help="Quality of the videos, from 0 (lossless) to 51 (worst); by default as recorded.")
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise ValueError(f"--add-camera: '{name}' is given twice")
         added[name] = camera
     same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "shadow_samples", "brightness", "copy", "episodes",
-            "worlds", "threads", "batches", "crf", "preset", "resume")  # fmt: skip
+            "num_worlds", "threads", "batches", "crf", "preset", "resume")  # fmt: skip
     if arguments.ray:
         return _on_ray(arguments, added, [name for name in same if name not in ("batches", "episodes", "resume")])
     made = render(

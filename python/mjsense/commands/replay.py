@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     report = check_replay(
         arguments.path, actions=arguments.verify or arguments.from_ == "actions", states=arguments.verify or arguments.from_ == "states",
-        episodes=arguments.episodes, worlds=arguments.worlds, threads=arguments.threads, progress=False if arguments.quiet else None,
+        episodes=arguments.episodes, num_worlds=arguments.worlds, threads=arguments.threads, progress=False if arguments.quiet else None,
     )  # fmt: skip
     if arguments.json:
         print(json.dumps(report.to_dict(), indent=2))

@@ -133,5 +133,4 @@ NAMES: dict[str, Any] = {
     "robots": ["bimanual_yam", "floating_rum", "franka", "franka_hand", "i2rt_yam", "mobile_franka", "rby1"],
     "policies": ["planner", "top_down_planner"],
     "scenes": ["assorted", "clutter", "floor", "gymnasium_robotics/kitchen", "kitchen", "libero/coffee_table", "libero/kitchen", "libero/living_room", "libero/objects", "libero/study", "libero/table", "metaworld/objects", "rgb/objects", "robosuite/objects", "room_with_door", "scene_synthesizer/objects", "shelf", "table", "tableware", "varied_table", "ycb/objects"],
-    "formats": {"lerobot": "LeRobot v3.0", "lerobot21": "LeRobot v2.1 with meta/modality.json, as GR00T reads it", "robomimic": "one HDF5 file of robomimic, with simulator states and models", "rlds": "RLDS for tensorflow-datasets", "zarr": "Zarr 2, as Diffusion Policy reads it", "rerun": "files for the Rerun viewer, one for each episode", "mcap": "MCAP files with Foxglove's schemas, one for each episode"},
 }

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.viewer.open import options_of, source_of, viewer_of
 
     given = {name: getattr(arguments, name) for name in ("robot", "scene", "task", "policy")}
-    source = source_of(arguments.what, worlds=max(arguments.worlds, arguments.world + 1), seed=arguments.seed, **options_of(given))
+    source = source_of(arguments.what, num_worlds=max(arguments.worlds, arguments.world + 1), seed=arguments.seed, **options_of(given))
     place = {"host": arguments.host, "port": arguments.port}
     if arguments.export:
         export(source, arguments.export, world=arguments.world, episode=arguments.episode, seconds=arguments.seconds,

@@ -16,6 +16,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.arguments import checked
+from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import line_of
 from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
@@ -128,7 +129,7 @@ class _House:
         scene_sensors = [sensor for sensor in sensors if not isinstance(sensor, CoreSensor)]
         views = [camera.scene_sensor(images) for camera in cameras]
         self._worlds = EpisodeWorlds(
-            first, min(options["worlds"], len(self._episodes)), [*views, *scene_sensors],
+            first, min(options["num_worlds"], len(self._episodes)), [*views, *scene_sensors],
             edit=options["edit"], brightness=brightness, threads=options["threads"],
         )  # fmt: skip
         if self._system:
@@ -209,6 +210,7 @@ def _key_of(sensor: Any) -> str:
     return getattr(sensor, "prefixed_name", None) or getattr(sensor, "uuid", None) or sensor.name
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def render(
     root: str | Path | Dataset,
@@ -229,7 +231,7 @@ def render(
     sensors: Callable[[], Iterable[Any]] | Iterable[Any] = (),
     copy: bool = True,
     episodes: Sequence[int] | None = None,
-    worlds: int = 4,
+    num_worlds: int = 4,
     threads: int = 0,
     batches: int = 0,
     crf: int | None = None,
@@ -263,7 +265,7 @@ def render(
             with several houses, a function that makes them for each house. One with the name of a recorded stream replaces it.
         copy: Copy the videos of recorded cameras of which no option changes the images. False: render them again, with the same result.
         episodes: Positions of episodes in the recording; by default all.
-        worlds: Number of episodes that are rendered in parallel.
+        num_worlds: Number of episodes that are rendered in parallel.
         threads: Number of threads; 0: one per available CPU.
         batches: Number of HDF5 files over which the episodes of a house are distributed; 0: one per four episodes.
         crf, preset: Quality and speed of the video encoder; by default as recorded.
@@ -274,9 +276,9 @@ def render(
     options: dict[str, Any] = {
         "cameras": cameras, "add_cameras": add_cameras or {}, "camera_system": camera_system, "width": width, "height": height, "depth": depth,
         "segmentation": segmentation, "shadows": shadows, "samples": samples, "shadow_samples": shadow_samples, "brightness": brightness, "edit": edit, "copy": copy,
-        "worlds": worlds, "threads": threads, "batches": batches, "crf": crf, "preset": preset, "resume": resume,
+        "num_worlds": num_worlds, "threads": threads, "batches": batches, "crf": crf, "preset": preset, "resume": resume,
     }  # fmt: skip
-    for name, value in (("worlds", worlds), ("width", width), ("height", height), ("samples", samples)):
+    for name, value in (("num_worlds", num_worlds), ("width", width), ("height", height), ("samples", samples)):
         if value is not None and value < 1:
             raise ValueError(f"{name} is {value}: must be at least 1")
     if brightness is not None and not brightness > 0:

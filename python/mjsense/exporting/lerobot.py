@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.dataset import Episode
 from mjsense.exporting import lerobot_depth
 from mjsense.exporting.frame_statistics import image_histograms
@@ -33,8 +32,8 @@ from mjsense.exporting.lerobot_files import (
     times,
     write_json,
 )
-from mjsense.exporting.mapping import Mapping, Source, print_trimming
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, print_trimming
+from mjsense.exporting.output import needs
 from mjsense.exporting.remux import Concatenation
 
 DATA_FILE_MB, VIDEO_FILE_MB = 100, 200
@@ -42,44 +41,13 @@ _TOLERANCE_S = 1e-4  # LeRobot's tolerance of times of frames
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 
 
-@checked
-def export_lerobot(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    exact_rate: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
-
-    Args:
-        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder of the data set, which must not exist.
-        map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object. Videos of episodes with such steps are encoded again.
-        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
-            such a data set. By default the rate is rounded if that changes it by at most 5 %.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle, whole_rate=not exact_rate)
-    source.print_notes()
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Writes all episodes to the new folder ``path``."""
     print_rate(source)
-    with new_output(out) as path:
-        writer = Writer(source, path)
-        for episode in source.each(progress):
-            writer.add(episode)
-        writer.close()
-    return Path(out)
+    writer = Writer(source, path)
+    for episode in source.each(progress):
+        writer.add(episode)
+    writer.close()
 
 
 class _Tables:
@@ -158,6 +126,9 @@ def _place(file: int) -> dict[str, int]:
 
 class Writer:
     """A data set that is being written."""
+
+    LAST_FILE = "meta/info.json"
+    """The file that is written last."""
 
     def __init__(self, source: Source, path: Path) -> None:
         check_columns(source)
@@ -243,7 +214,7 @@ class Writer:
             "data_path": f"data/{_PLACE}.parquet", "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
             "features": features_of(self._source, self._codec),
         }  # fmt: skip
-        write_json(self._path / "meta/info.json", info)
+        write_json(self._path / self.LAST_FILE, info)
 
 
 def _write_tasks(path: Path, tasks: list[str]) -> None:

@@ -113,7 +113,7 @@ class Source:
         map: A :class:`Mapping`, a TOML file, or a dict of the same form; by default :class:`Mapping`'s defaults.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`); None: in episodes whose task places an
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`); None: in episodes whose task places an
             object.
         whole_rate: Round ``fps`` to a whole number, as formats need whose rates are whole numbers, if that changes it by at most 5 %.
     """

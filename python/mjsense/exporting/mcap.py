@@ -11,55 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.video_decoder import open_container
 from mjsense.exporting.images import CRF, depth_videos, padded
-from mjsense.exporting.mapping import Mapping, Source, check_names
-from mjsense.exporting.output import join_folders, needs, new_output
+from mjsense.exporting.mapping import Source, check_names
+from mjsense.exporting.output import join_folders, needs
 from mjsense.exporting.scene import Body, Shape, bodies
 
 _NS = 1_000_000_000
 _WORLD = "world"
 _Message = tuple[int, str, Any]
 """Observation, topic, and a protobuf message or a dict of numbers."""
-
-
-@checked
-def export_mcap(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    encode_again: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
-    calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages.
-
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which topics: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        encode_again: Encode videos again that have B-frames, which ``foxglove.CompressedVideo`` does not allow; other videos are copied.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-
-    Raises:
-        ValueError: A video has B-frames, and ``encode_again`` is False.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success)
-    source.print_notes()
-    with new_output(out) as path:
-        write(source, path, progress, encode_again=encode_again)
-    return Path(out)
 
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None, *, encode_again: bool = False) -> None:

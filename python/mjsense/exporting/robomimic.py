@@ -10,52 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.core.env_ids import env_id
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.model_xml import model_xml
 from mjsense.exporting.images import FLAGS, depth_videos
-from mjsense.exporting.mapping import Mapping, Source, check_names, named_streams
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, check_names, named_streams
+from mjsense.exporting.output import needs
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _VALID_EVERY = 10
 _OWN = ("actions", "rewards", "dones", "obs", "next_obs", "states", "integration_states", "assets")
 """Members of a demonstration."""
-
-
-@checked
-def export_robomimic(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
-    data for replay. Images are decoded, because robomimic reads arrays.
-
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: File to write. It must not exist.
-        map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_notes()
-    with new_output(out) as path:
-        write(source, path, progress)
-    return Path(out)
 
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
@@ -75,14 +40,14 @@ def _check_names(source: Source) -> None:
                  *named_streams(source, observed, "obs/", "_image")])  # fmt: skip
 
 
-def join(source: Source, parts: Iterable[Path], out: Path) -> None:
-    """Writes the new file ``out`` with the demonstrations of several files, whose arrays are copied as they are compressed.
+def join(source: Source, parts: Iterable[Path], path: Path) -> None:
+    """Writes the new file ``path`` with the demonstrations of several files, whose arrays are copied as they are compressed.
 
     Args:
         source: The episodes of all files.
     """
     h5py = needs("h5py", "robomimic")
-    with new_output(out) as path, h5py.File(path, "w") as file:
+    with h5py.File(path, "w") as file:
         models: dict[bytes, Any] = {}
         count = 0
         for part in parts:

@@ -283,7 +283,7 @@ class CameraVizCfg(config_methods.Config):
 
 @dataclass
 class CameraSensorCfg(SensorCfg):
-    """A camera of the model (``camera_name``) or a new camera. ``data`` is a :class:`mjsense.CameraData`."""
+    """A camera of the model (``camera_name``) or a new camera. ``data`` is a :class:`mjsense.sensors.CameraData`."""
 
     kind: ClassVar[str] = "camera"
     camera_name: str | None = None
@@ -410,7 +410,7 @@ class ContactVizCfg(config_methods.Config):
 
 @dataclass
 class ContactSensorCfg(SensorCfg):
-    """Contacts of primaries, optionally with one secondary only. ``data`` is a :class:`mjsense.ContactData`.
+    """Contacts of primaries, optionally with one secondary only. ``data`` is a :class:`mjsense.sensors.ContactData`.
 
     The normal points from the primary to the secondary; forces are what the **primary exerts on the secondary**: a
     box on the floor reads (0, 0, -m g) in the world frame.
@@ -507,7 +507,8 @@ class ImuModel(config_methods.Config):
 
 @dataclass
 class ImuSensorCfg(SensorCfg):
-    """Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an :class:`mjsense.ImuData`.
+    """Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an
+    :class:`mjsense.sensors.ImuData`.
 
     The clean values are the built-in sensors ``<name>_acc`` and ``<name>_gyro``.
     """
@@ -564,7 +565,7 @@ class RayCastVizCfg(config_methods.Config):
 
 @dataclass
 class RayCastSensorCfg(SensorCfg):
-    """Casts rays from frames against all visible geoms. ``data`` is a :class:`mjsense.RayCastData`."""
+    """Casts rays from frames against all visible geoms. ``data`` is a :class:`mjsense.sensors.RayCastData`."""
 
     kind: ClassVar[str] = "raycast"
     frame: ObjRef | Sequence[ObjRef] = ()
@@ -616,8 +617,8 @@ class SpinningScanCfg(config_methods.Config):
 
 @dataclass
 class LidarSensorCfg(RayCastSensorCfg):
-    """A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.RayCastData` with points and
-    intensity. ``pattern`` does not apply, and hit ids are always reported."""
+    """A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.sensors.RayCastData` with points
+    and intensity. ``pattern`` does not apply, and hit ids are always reported."""
 
     kind: ClassVar[str] = "lidar"
     max_distance: float = 100.0

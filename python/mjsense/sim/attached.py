@@ -249,7 +249,7 @@ class Attached(KnownAttributes):
         self.reset([world])
 
     def add(self, sensor: Any) -> Any:
-        """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.PoseSensor`. Returns it."""
+        """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.sensors.PoseSensor`. Returns it."""
         return self._sim.add(sensor)
 
     # ---------------------------------------------------------------------------------------------------------- states

@@ -375,7 +375,7 @@ class Simulation(KnownAttributes):
     def add(self, sensor: Any) -> Any:
         """Adds a sensor that is not part of the scene, for use in suites, and returns it.
 
-        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.PoseSensor`), or an object of another
+        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.sensors.PoseSensor`), or an object of another
         library with a ``uuid`` and ``get_observation(env, task, batch_index)``; the latter is wrapped, and the wrapper is
         returned.
         """

@@ -10,10 +10,12 @@ from typing import Any, Literal
 
 from mjsense.core.arguments import Seed, checked
 from mjsense.core.later_rooms import provided
+from mjsense.core.old_names import old_argument
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks
 from mjsense.tasks.record_job import RecordProgress, RecordSummary, record_here
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def record(
     task: Tasks = "pick",
@@ -25,7 +27,7 @@ def record(
     # options of a recording
     arm_controller: str = "",
     split: Literal["", "train", "test"] = "",
-    worlds: int = 4,
+    num_worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
     camera_system: str = "",
@@ -92,7 +94,7 @@ def record(
             ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
         split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
             or ``@test`` after the scene's name.
-        worlds: Number of worlds that run in parallel.
+        num_worlds: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.
@@ -144,8 +146,8 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
-        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
+        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
         trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
         keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
             data set is complete.
@@ -170,6 +172,6 @@ def record(
         raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
     from mjsense.exporting.record_lerobot import converted
 
-    with converted(out, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
+    with converted(out, format=format, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
         summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))

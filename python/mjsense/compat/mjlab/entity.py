@@ -116,7 +116,7 @@ def _add_keyframe(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
 
 
 class Entity:
-    """An attached entity: the local names of its elements in model order. ``native`` is the :class:`mjsense.Entity`."""
+    """An attached entity: the local names of its elements in model order. ``native`` is the :class:`mjsense.scene.Entity`."""
 
     def __init__(self, native: Any, cfg: Any) -> None:
         self.native = native

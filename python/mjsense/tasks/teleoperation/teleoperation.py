@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import Seed, checked
+from mjsense.core.old_names import old_argument
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
 from mjsense.tasks.recording import RecordSummary, record
@@ -117,6 +118,7 @@ class Teleoperation(Policy):
             self._page = None
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def play(
     task: Tasks = "pick",
@@ -162,7 +164,7 @@ def play(
     policy = Teleoperation(
         title, arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser
     )
-    defaults = {"worlds": 1, "arm_controller": "ee_pose", "terminate_upon_success": True, "action_noise": False, "horizon": 6000, "max_attempts": 100 * episodes}
+    defaults = {"num_worlds": 1, "arm_controller": "ee_pose", "terminate_upon_success": True, "action_noise": False, "horizon": 6000, "max_attempts": 100 * episodes}
     try:
         return record(task, robot, policy, out=out, scene=scene, episodes=episodes, seed=seed, **{**defaults, **options})
     finally:

@@ -159,7 +159,7 @@ template <class V>
 void visit_fields(V& v, CameraSensorCfg& c) {
   v.object("CameraSensorCfg",
            "A camera of the model (``camera_name``) or a new camera. ``data`` is a "
-           ":class:`mjsense.CameraData`.",
+           ":class:`mjsense.sensors.CameraData`.",
            "camera");
   v.extends(static_cast<SensorCfg&>(c));
   v("camera_name", c.camera_name,

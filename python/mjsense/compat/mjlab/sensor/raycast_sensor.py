@@ -125,7 +125,7 @@ class RayCastSensorCfg(SensorCfg):
 
 @dataclass
 class RayCastData:
-    """As :class:`mjsense.RayCastData`."""
+    """As :class:`mjsense.sensors.RayCastData`."""
 
     distances: Any
     normals_w: Any

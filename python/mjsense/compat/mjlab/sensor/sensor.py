@@ -74,7 +74,7 @@ class Sensor(Generic[T]):
     def reset(self, env_ids: Any = None) -> None:
         """Called when environments begin a new episode: a tensor of ids, or None for all."""
 
-    def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
+    def debug_vis(self, visualizer: mjsense.sensors.DebugShapes) -> None:
         """Draws the environment ``visualizer.env_idx``."""
 
     @property
@@ -176,7 +176,7 @@ class OwnSensor(mjsense.Sensor):
     def reset(self, world_ids: Any = None) -> None:
         self.original.reset(world_ids if world_ids is None or not HAS_TORCH else tensor(np.array(world_ids)))
 
-    def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
+    def debug_vis(self, visualizer: mjsense.sensors.DebugShapes) -> None:
         self.original.debug_vis(visualizer)
 
     def _mjs_updates(self) -> bool:
