@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs each fuzz target of build/fuzz for a number of seconds: ./dev fuzz [SECONDS] [NAME ...]
+"""Runs each fuzz target of build/fuzz, and each Python reader of readers.py, for a number of seconds: ./dev fuzz [SECONDS] [NAME ...]
 
-This script creates the seeds. Inputs that reach new code are stored in build/fuzz/corpus/NAME for the next run. Inputs that cause
-a failure are written to build/fuzz/found/: add a test with such an input next to the code, then fix the code.
+This script creates the seeds of the C++ targets. Inputs that reach new code are stored in build/fuzz/corpus/NAME for the next run. Inputs that cause
+a failure are written to build/fuzz/found/: add a test with such an input next to the code, then fix the code. Inputs of the Python readers
+come from hypothesis, which prints the smallest one that fails.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 BUILD = ROOT / "build/fuzz"
 SECONDS = 60
+PYTHON = "python_"
+"""Prefix of the names of Python readers."""
 MOST_BYTES = {"video": 6000, "recording": 2000}
 
 
@@ -82,7 +85,14 @@ def words(name: str) -> list[str]:
     return ["NaN", "Infinity", "-Infinity", "null", "true", "false", "\\\\u0000", "1e999", "settings", "streams"]
 
 
+def run_python(name: str, seconds: int) -> bool:
+    done = subprocess.run([sys.executable, ROOT / "tests/fuzz/readers.py", name, str(seconds)], env={"PYTHONPATH": str(ROOT / "build/dev/python"), **os.environ})
+    return done.returncode == 0
+
+
 def run(name: str, seconds: int) -> bool:
+    if name.startswith(PYTHON):
+        return run_python(name.removeprefix(PYTHON), seconds)
     corpus, found, seeds = BUILD / "corpus" / name, BUILD / "found" / f"{name}_", BUILD / "seeds" / name
     for folder in (corpus, found.parent, seeds):
         folder.mkdir(parents=True, exist_ok=True)
@@ -104,11 +114,12 @@ def run(name: str, seconds: int) -> bool:
 
 def main(arguments: list[str]) -> int:
     seconds = int(arguments.pop(0)) if arguments and arguments[0].isdigit() else SECONDS
-    unknown = sorted(set(arguments) - set(SEEDS))
+    names = [*SEEDS, *(PYTHON + name for name in re.findall(r"^def read_(\w+)", (ROOT / "tests/fuzz/readers.py").read_text(), re.MULTILINE))]
+    unknown = sorted(set(arguments) - set(names))
     if unknown:
-        print(f"no target named {', '.join(unknown)}; there are {', '.join(SEEDS)}", file=sys.stderr)
+        print(f"no target named {', '.join(unknown)}; there are {', '.join(names)}", file=sys.stderr)
         return 2
-    sound = [run(name, seconds) for name in arguments or SEEDS]
+    sound = [run(name, seconds) for name in arguments or names]
     return 0 if all(sound) else 1
 
 

@@ -82,6 +82,22 @@ def test_a_changed_video_is_noticed(root, tmp_path, monkeypatch, kind, damage, w
             read(root)
 
 
+@pytest.mark.parametrize("level", [0, 4])
+def test_a_changed_row_of_segmentation_is_noticed(tmp_path, level):
+    """Rows of 64 kB are read one by one."""
+    mjs.record("pick", out=tmp_path / "data", episodes=1, horizon=3, keep_failures=True, width=160, height=120, cameras=[CAMERA], segmentation=True, gzip=level, seed=5, progress=False)
+    file, name = file_of(tmp_path / "data"), f"obs/extra/{CAMERA}_segmentation"
+    assert mjs.Dataset(tmp_path / "data")[1][name].nbytes >= 1 << 16
+    with h5py.File(file) as opened:
+        rows = opened[f"traj_0/{name}"]
+        chunk = rows.id.get_chunk_info(rows.id.get_num_chunks() - 1)
+    data = bytearray(file.read_bytes())
+    data[chunk.byte_offset + chunk.size // 2] ^= 4
+    file.write_bytes(data)
+    with pytest.raises(ValueError, match=rf"traj_0/{name} {'differs from what was recorded' if level == 0 else 'is damaged'}"):
+        every(tmp_path / "data")
+
+
 def test_a_video_that_changes_while_it_is_read(root):
     """The table of its packets is that of another file."""
     video = mjs.Dataset(root, cache_mb=0).episodes[0].video(CAMERA)

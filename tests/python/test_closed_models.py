@@ -174,7 +174,7 @@ def test_compiled_models_are_those_of_mujoco(tmp_path):
 
 
 def test_errors_of_the_compiler_have_one_line():
-    with pytest.raises(ValueError, match=r"^a.zip: MuJoCo \S+ cannot compile the model: ") as error:
+    with pytest.raises(ValueError, match=r"^a.zip: MuJoCo cannot compile the model: ") as error:
         compile_closed({"model.xml": b"<mujoco><worldbody><geom size='1' material='none'/></worldbody></mujoco>"}, "a.zip")
     assert "\n" not in str(error.value)
     with pytest.raises(ValueError, match=r"a.zip: the timestep of the model is"):

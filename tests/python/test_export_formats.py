@@ -89,7 +89,7 @@ def test_model_xml_simulates_as_the_model_of_the_episode(task, root, tmp_path):
 def test_model_xml_names_a_field_that_mjcf_cannot_express(root, monkeypatch):
     episode = mjs.Dataset(root).episodes[0]
     monkeypatch.setattr("mjsense.dataset.model_xml._set", lambda *_: None)
-    with pytest.raises(ValueError, match=r"episode 0: MJCF cannot express its .*geom_size"):
+    with pytest.raises(ValueError, match=r"episode 0 \(trajectories_batch_1_of_1.h5, traj_0\): MJCF cannot express its .*geom_size"):
         model_xml(episode)
 
 

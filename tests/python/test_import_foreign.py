@@ -94,7 +94,7 @@ def test_arrays_of_demonstrations(tmp_path, name, value, message):
     path = robomimic(tmp_path / "demo.hdf5", change=replaced(name, value))
     with pytest.raises(ValueError, match=rf"demo\.hdf5: data/demo_0.*{message}") as error:
         mjs.import_robomimic(path, tmp_path / "out")
-    assert "\n" not in str(error.value)
+    assert "\n" not in str(error.value) and not list(tmp_path.glob("out*"))
 
 
 @pytest.mark.parametrize("text, message", [
@@ -313,7 +313,7 @@ def test_values_of_data_sets(video, tmp_path, change, message):
     root = lerobot(tmp_path / "set", video, change)
     with pytest.raises(ValueError, match=message) as error:
         mjs.import_lerobot(root, tmp_path / "out")
-    assert "\n" not in str(error.value) and str(root) in str(error.value)
+    assert "\n" not in str(error.value) and str(root) in str(error.value) and not list(tmp_path.glob("out*"))
 
 
 @pytest.mark.parametrize("name", ["../../x", "/abs", "", "-i", "a\nb", "a:b"])

@@ -318,6 +318,20 @@ def test_damage_is_noticed(recorded, tmp_path):
         mjs.render(tmp_path / "data", tmp_path / "out")
 
 
+@pytest.mark.parametrize("lost", ["replay/state", "obs/extra/tcp_pose", "obs/sensor_data/wrist_camera"])
+def test_a_missing_stream_that_was_carried_over_is_noticed(recorded, tmp_path, lost):
+    """Also in a rendering of a rendering. Streams of cameras that were left out are not missing."""
+    mjs.render(recorded, tmp_path / "first", cameras=["wrist_camera"], add_cameras={"top": TOP}, episodes=[0])
+    mjs.render(tmp_path / "first", tmp_path / "second", cameras=["wrist_camera"])
+    for name in ("first", "second"):
+        verified(tmp_path / name)
+        with changed(file_of(tmp_path / name)) as file:
+            del file[f"traj_0/{lost}"]
+        done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(tmp_path / name)], capture_output=True, text=True)
+        assert done.returncode == 1 and f"has no '{lost}'" in done.stdout.replace("obs/extra/wrist_camera", "obs/sensor_data/wrist_camera"), done.stdout
+        shutil.rmtree(tmp_path / "first", ignore_errors=True)
+
+
 def test_gaps_between_episode_numbers(tmp_path):
     """Failed attempts are not in a recording; the numbers of the others stay."""
     mjs.record("pick", out=tmp_path / "data", **{**RECORDING, "episodes": 4})

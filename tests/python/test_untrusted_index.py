@@ -88,6 +88,12 @@ def test_values_of_an_index(root, change, text):
         mjs.Dataset(root)
 
 
+def test_a_column_is_missing(root):
+    (root / "index.parquet").write_bytes(index_of([{name: value for name, value in ROW.items() if name != "path"}]))
+    with pytest.raises(ValueError, match=r"index\.parquet: the column 'path' is missing"):
+        mjs.Dataset(root)
+
+
 def test_an_index_that_unpacks_to_much_more(root, monkeypatch):
     """Filters with a large ratio are refused by name, and rows are counted before they are read."""
     many = pa.table({name: pa.array([value]).take(pa.array([0] * 50_000)) for name, value in ROW.items()})

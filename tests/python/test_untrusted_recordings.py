@@ -2,8 +2,10 @@
 """Recordings that someone has changed on purpose: each reader gives one line that says what is wrong, or the right values, and ``mjsense
 verify`` refuses what a reader refuses. Nothing outside of the recording is read or written, and nothing is started."""
 
+import contextlib
 import json
 import os
+import re
 import resource
 import shutil
 import time
@@ -268,6 +270,11 @@ def short_chunk(group, rows):
     group.create_dataset("evil", shape=(rows, 1000), dtype="f8", chunks=(rows, 1000), compression="gzip").id.write_direct_chunk((0, 0), b"x\x9ccddd\xe4\x02\x00\x00\x1e\x00\x0a")
 
 
+def short_plain_chunk(group, rows):
+    """The same without a filter: h5py gives what was in the memory after its only byte."""
+    group.create_dataset("evil", shape=(rows, 1000), dtype="f8", chunks=(rows, 1000)).id.write_direct_chunk((0, 0), b"x")
+
+
 def json_rows(row):
     def make(group, rows):
         made = group.create_dataset("evil", data=np.tile(np.frombuffer(row, np.uint8), (rows, 1)), compression="gzip")
@@ -285,6 +292,7 @@ def json_rows(row):
         (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 10**6, 8), chunks=(n, 10**6, 8), dtype="f8", compression="gzip")), "has chunks of 320000000 bytes"),
         (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 4 * 10**6), chunks=(1, 10**6), dtype="f8", compression="gzip")), "declares 160000000 bytes but stores 0"),
         (dataset_of(short_chunk), "is damaged: one of its chunks does not"),
+        (dataset_of(short_plain_chunk), "is damaged: one of its chunks does not"),
         (dataset_of(lambda g, n: g.create_dataset("evil", data=np.zeros((n + 1, 3)))), f"has {6} rows"),
         (json_rows(b'{"a":' * 20000 + b"1" + b"}" * 20000), "evil row 0 is"),
         (json_rows(b'{"../../escaped": [1.0]}'), "has the key '../../escaped', which is not a plain name"),
@@ -308,6 +316,61 @@ def test_hdf5(root, tmp_path, change, text):
     found = refusals(root, tmp_path, ("read", "robomimic"))
     assert found and text in found["read"], found
     assert errors_of(root)
+
+
+@contextlib.contextmanager
+def with_second_episode(root):
+    """The file of a recording to which a copy of its episode is added."""
+    with changed(file_of(root)) as file:
+        file.copy("traj_0", "traj_1")
+        file["traj_1"].attrs["episode"] = 1
+        for name in file["traj_1/obs/sensor_data"].values():
+            video = file_of(root).with_name(name[:].tobytes().rstrip(b"\0").decode())
+            shutil.copy(video, video.with_name(f"copied_{video.name}"))
+            name[:] = np.frombuffer(f"copied_{video.name}".encode().ljust(len(name), b"\0"), np.uint8)
+        yield file
+
+
+def test_every_episode_is_checked(root):
+    """Also the one whose streams are, by their names, those of the episode before."""
+    with with_second_episode(root) as file:
+        file["traj_1/obs/extra/tcp_pose"].attrs["unit"] = np.arange(3)
+    with pytest.raises(ValueError, match=r"traj_1/obs/extra/tcp_pose: the attribute 'unit' is .* not a text"):
+        _ = mjs.Dataset(root).episodes[1].streams
+    assert any("traj_1/obs/extra/tcp_pose: the attribute 'unit'" in text for text in errors_of(root)), errors_of(root)
+
+
+def with_shape(place, shape, dtype):
+    def change(file):
+        del file[place]
+        file[place] = np.zeros((len(file["traj_0/rewards"]), *shape), dtype)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "text", "who"),
+    [
+        (with_shape("traj_1/obs/extra/tcp_pose", (5,), "f4"), r"tcp_pose is float32 \[[57]\]; in another episode of the recording it is float32 \[[57]\]", ("read",)),
+        (with_shape("traj_1/obs/extra/tcp_pose", (7,), "f8"), r"tcp_pose is float(32|64) \[7\]; in another episode", ("read",)),
+        (with_shape("traj_1/numbers/obs/agent/qpos/arm", (6,), "f8"), r"qpos/arm is float(32|64) \[[67]\]; in another episode", ("read", "lerobot", "robomimic")),
+        (with_shape("traj_1/numbers/actions/joint_pos/arm", (), "f8"), r"joint_pos/arm is float64 \[7?\]; in another episode", ("read", "lerobot", "robomimic")),
+        (with_shape("traj_1/rewards", (2,), "f4"), r"traj_1/rewards is float32 \[\d, 2\]; it must be one number for each observation", ("read", "lerobot", "robomimic", "render")),
+        (with_shape("traj_0/terminated", (), "f4"), r"traj_0/terminated is float32 \[\d\]; it must be one bool for each observation", ("read", "lerobot", "robomimic", "render")),
+        (with_shape("traj_1/obs/sensor_param/wrist_camera/intrinsic_cv", (2, 3), "f8"), r"intrinsic_cv is float64 \[\d, 2, 3\]; it must be a matrix of 3 x 3 numbers", ("read",)),
+        (lambda file: file["traj_1/obs/sensor_data/wrist_camera"].attrs.__setitem__("width", 64), r"is rgb (32|64) x 24; in another episode of the recording it is rgb (32|64) x 24", ("read", "lerobot", "render")),
+        (lambda file: file["traj_1/obs/sensor_data/wrist_camera"].attrs.__setitem__("fps", "15"), "fps is 15; that of its recording is 500/33", ("read", "lerobot", "render")),
+        (lambda file: file.__delitem__("traj_1/numbers/actions/joint_pos/arm"), "has no 'numbers/actions/joint_pos/arm', which another episode of the recording has", ()),
+    ],
+    ids=range(10),
+)  # fmt: skip
+def test_episodes_of_a_recording_have_the_same_streams(root, tmp_path, change, text, who):
+    with with_second_episode(root) as file:
+        change(file)
+    found = refusals(root, tmp_path, who)
+    assert found.keys() == set(who) and all(re.search(text, one) for one in found.values()), found
+    # The C++ check, which comes first, compares the size of a video.
+    assert any(re.search(f"{text}|is 32 x 24 pixels, expected 64 x 24", one) for one in errors_of(root)), errors_of(root)
 
 
 @pytest.mark.parametrize("kind", ["external", "soft", "hard loop", "reference", "opaque"])

@@ -86,7 +86,19 @@ def _check_rows(episode: Episode) -> None:
 
 
 def _check_streams(episode: Episode) -> None:
-    _ = episode.streams
+    """Every dataset can be a stream, and has the type and shape that it has in the episode before. If the recording lists its streams, all of them are
+    in every episode."""
+    known, index = episode._store.known, episode._entry.recording
+    before = known.pop(index, {})
+    streams = episode.streams  # opens all datasets
+    for place, stream in before.items():
+        if stream is None:
+            continue
+        now = known[index].get(place)
+        if now is not None and (now.dtype, now.shape) != (stream.dtype, stream.shape):
+            raise ValueError(f"{place} is {now.dtype} {list(now.shape)}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}")
+        if stream.name not in streams and "streams" in episode._recording.provenance:
+            raise ValueError(f"has no '{place}', which another episode of the recording has")
 
 
 def _check_videos(episode: Episode) -> None:
@@ -94,7 +106,10 @@ def _check_videos(episode: Episode) -> None:
         info = episode._video(name)
         episode.image_histogram(name)
         if have_av():
-            Packets(info.path, info.fps, info.frames, (info.width, info.height), "")  # the program compares the checksum
+            packets = Packets(info.path, info.fps, info.frames, (info.width, info.height), "")  # the program compares the checksum
+            exact = packets.exact or info.path.suffix == ".mkv" or episode._recording.fps is None
+            if not exact or sorted(packets.frames) != list(range(info.frames)):
+                raise ValueError(f"{info.path.name}: its times are not those of {info.frames} frames at {info.fps} per second")
 
 
 def _check_replay(episode: Episode) -> None:

@@ -9,6 +9,7 @@ textures of 60,000 x 60,000 pixels, is counted before MuJoCo allocates it.
 
 from __future__ import annotations
 
+import contextlib
 import posixpath
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -39,6 +40,7 @@ _MESHES = (".stl", ".obj", ".msh")
 _CONTENT = {"image/png", "image/ktx", "image/vnd.mujoco.texture", "image/vnd.mujoco.hfield", "model/stl", "model/obj", "model/vnd.mujoco.msh"}
 _CONVERSION = re.compile(r"%[-+ #0'*.$\dhlLqjztw]*[A-Za-z]")
 """MuJoCo 4.0.1 uses a name that it does not know as the format of a message: ``%n`` ends the process."""
+_ERRORS: tuple[type[Exception], ...] = (ValueError, RuntimeError, *((mujoco.FatalError,) if libmujoco.shared else ()))
 _REFUSED = {"include": "reads other files", "attach": "reads other files", "model": "reads other files"}
 
 
@@ -180,15 +182,22 @@ def compile_closed(files: Mapping[str, bytes], about: str) -> mujoco.MjModel:
     """The model of an archive's files. ``about`` names the archive in errors; the package ``mujoco`` must be of mjsense's series."""
     members = {name: content for name, content in files.items() if name != MODEL_FILE}
     text = closed_model(files[MODEL_FILE], members, f"{about}: {MODEL_FILE}")
-    try:
+    with compiling(about):
         spec = mujoco.MjSpec.from_string(text, assets=members)
         if unknown := [name for name in _files_of(spec) if name not in members]:
             raise ValueError(f"it reads the file {unknown[0][:120]!r}, which is not in the archive")
         model = spec.compile()
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise ValueError(f"{about}: MuJoCo {mujoco.__version__} cannot compile the model: {' '.join(str(error).split())}") from None
     check_compiled(model, about)
     return model
+
+
+@contextlib.contextmanager
+def compiling(about: str) -> Iterator[None]:
+    """Errors of MuJoCo as one line with the name of the archive."""
+    try:
+        yield
+    except _ERRORS as error:
+        raise ValueError(f"{about}: MuJoCo cannot compile the model: {' '.join(str(error).split())}") from None
 
 
 def _files_of(spec: mujoco.MjSpec) -> Iterator[str]:

@@ -78,6 +78,12 @@ def _unit_of(unit: str, leaf: str) -> str:
     return by_group.get(leaf, "") if by_group else unit
 
 
+_OF_STEPS = {"rewards": ("biuf", "number"), **dict.fromkeys(("success", "fail", "terminated", "truncated"), ("b", "bool"))}
+"""Kinds of NumPy types, and the word for them, of the datasets that every trajectory has."""
+_OF_CAMERAS = {"intrinsic_cv": (3, 3), "extrinsic_cv": (3, 4), "cam2world_gl": (4, 4)}
+"""Shapes of the parameters of cameras."""
+
+
 def is_json(dataset: Rows) -> bool:
     """Whether a dataset contains JSON rows."""
     is_bytes = dataset.dtype == np.uint8 and dataset.ndim == 2
@@ -101,6 +107,16 @@ def _dataset_of(trajectory: Group, name: str) -> tuple[str, Rows] | None:
     return None
 
 
+def check_known(name: str, dataset: Rows) -> None:
+    """Raises an error if rewards or flags are not one number or bool for each observation, or parameters of cameras no matrices."""
+    kinds, word = _OF_STEPS.get(name, ("", ""))
+    if kinds and (dataset.ndim != 1 or dataset.dtype.kind not in kinds):
+        raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be one {word} for each observation")
+    shape = _OF_CAMERAS.get(name.rpartition("/")[2]) if name.startswith("obs/sensor_param/") else None
+    if shape and dataset.shape[1:] != shape:
+        raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be a matrix of {shape[0]} x {shape[1]} numbers for each observation")
+
+
 class Store:
     """What all episodes of a data set share: the recordings' descriptions and the caches."""
 
@@ -111,6 +127,10 @@ class Store:
         self.models = Cache(4)  # one unit per model
         self.known: dict[int, dict[str, Stream | None]] = {}
         """Arrays of each recording by their places in a trajectory; None: no stream."""
+        self.videos: dict[tuple[int, str], str] = {}
+        """Encoding and size of each video of a recording."""
+        self.compared: set[tuple[int, str]] = set()
+        """Streams with large rows of which the checksum was compared, by the index of their episode."""
         self.leaves: set[str] | None = None
         """Leaves of JSON rows that the data set knows; others cause a warning. None: no warning."""
 
@@ -265,7 +285,7 @@ class EpisodeRows:
         info = videos.get(_video_name(camera))
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
-            raise UnknownNameError(f"Episode {self.index} has no video '{camera}'; it has {cameras or 'no videos'}")
+            raise UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no video '{camera}'; it has {cameras or 'no videos'}")
         return info
 
     def _frames(self, cameras: list[str], rows: list[list[int]]) -> list[list[np.ndarray]]:
@@ -310,8 +330,14 @@ class EpisodeRows:
                 width, height = image_size(at.integer("width", 1, 2**31), at.integer("height", 1, 2**31), dataset.where)
                 if (encoding := at.text("encoding")) not in _ENCODINGS:
                     raise ValueError(f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}")
+                rate = rate_of(at.text("fps"), f"{dataset.where}: fps")
+                if (stated := self._recording.fps) is not None and rate != stated:
+                    raise ValueError(f"{dataset.where}: fps is {rate}; that of its recording is {stated}")
+                about = f"{encoding} {width} x {height}"
+                if (first := self._store.videos.setdefault((self._entry.recording, key), about)) != about:
+                    raise ValueError(f"{dataset.where} is {about}; in another episode of the recording it is {first}")
                 videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, width, height, encoding, at.number("metres_per_unit", 0.0),
-                                                 rate_of(at.text("fps"), f"{dataset.where}: fps"), at.text("crc32"))  # fmt: skip
+                                                 rate, at.text("crc32"))  # fmt: skip
         return videos, 500 * len(videos)
 
     def _find_streams(self) -> tuple[dict[str, Stream], int]:
@@ -336,6 +362,7 @@ class EpisodeRows:
                 return
             about = {key: dataset.attrs.text(key) for key in ("unit", "frame", "description")}
             name = place.removeprefix(NUMBERS)
+            check_known(name, dataset)
             if name.startswith(VIDEOS):
                 if name in videos:
                     info = videos[name]
@@ -405,14 +432,26 @@ class EpisodeRows:
                     if (values := cache.find((self.index, name))) is not None:
                         found[name] = values
                 elif place.removeprefix(NUMBERS) == name:
-                    found[name] = dataset.rows_of(self._entry.length).read()
+                    found[name] = self._checked(place, dataset).read()
                     if found[name].nbytes < LARGE_ROW * max(1, self._entry.length):
                         cache.add((self.index, name), found[name], found[name].nbytes)
         return {name: found[name] for name in names if name in found}
+
+    def _checked(self, place: str, dataset: Rows) -> Rows:
+        """The dataset of a stream, if it has a row for each observation, and the type and shape that it has in other episodes of the recording."""
+        check_known(place, dataset)
+        stream = self._store.known.get(self._entry.recording, {}).get(place)
+        if stream is not None and (dataset.dtype, dataset.shape[1:]) != (stream.dtype, stream.shape):
+            raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}")
+        return dataset.rows_of(self._entry.length)
 
     def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:
         """Rows of the recording, of a stream whose rows are too large to keep all of them."""
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
-            dataset = trajectory[NUMBERS + name if NUMBERS + name in trajectory else name]
-            return np.stack([dataset.rows_of(self._entry.length)[t] for t in rows])
+            place = NUMBERS + name if NUMBERS + name in trajectory else name
+            dataset = self._checked(place, trajectory[place])
+            if not dataset.has_chunk_checksums and (self.index, name) not in self._store.compared:
+                dataset.compare()
+                self._store.compared.add((self.index, name))
+            return np.stack([dataset[t] for t in rows])

@@ -12,7 +12,7 @@ import numpy as np
 from mjsense.core import mujoco_names
 from mjsense.dataset import playback
 from mjsense.dataset.archive import MODEL_FILE, read_archive
-from mjsense.dataset.closed_model import check_compiled, closed_model
+from mjsense.dataset.closed_model import check_compiled, closed_model, compiling
 from mjsense.dataset.model_fields import check_inputs
 from mjsense.scene.randomizable import field_of
 from mjsense.scene.scene import Scene
@@ -67,7 +67,8 @@ class EpisodeWorlds:
         archive = playback.archive_of(episode)
         members = read_archive(archive)
         text = closed_model(members.pop(MODEL_FILE), members, f"{archive}: {MODEL_FILE}")
-        recorded = Scene(_ArchivedSceneCfg(text, members)).model
+        with compiling(str(archive)):
+            recorded = Scene(_ArchivedSceneCfg(text, members)).model
         check_compiled(recorded, str(archive))
         self.scene = Scene(_ArchivedSceneCfg(text, members, sensors=tuple(sensors), spec_fn=edit_spec))
         self.sim = Simulation(self.scene, num_worlds, threads=threads)

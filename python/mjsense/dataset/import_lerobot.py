@@ -18,6 +18,7 @@ from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
 from mjsense.core.errors import UnknownNameError
 from mjsense.core.input_files import missing, read_text
+from mjsense.core.new_output import new_output
 from mjsense.core.optional import optional
 from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
@@ -58,7 +59,7 @@ def import_lerobot(
 
     Args:
         root: Folder of the data set.
-        out: Folder to write. It must not contain a recording.
+        out: Folder to write. It must not exist, or be empty; after an error it is not written.
         episodes: Indices of episodes; by default all.
         scene: MJCF file of the robot and its surroundings.
         joints: With ``scene``: the joint of each number of ``observation.state``, in order; ``""``: none. By default the names of the
@@ -82,12 +83,13 @@ def import_lerobot(
         raise ValueError("joints needs scene (--scene), the model that has them")
     wanted = _with_rows(source, wanted)
     pose = None if scene is None else _Pose(Path(scene), source, joints)
-    writer = _Writer(out, source, pose, wanted, crf)
-    for number, index in enumerate(wanted):
-        writer.write(number, index)
-        if progress is not None:
-            progress(number + 1, len(wanted))
-    writer.complete()
+    with new_output(out) as part:
+        writer = _Writer(part, source, pose, wanted, crf)
+        for number, index in enumerate(wanted):
+            writer.write(number, index)
+            if progress is not None:
+                progress(number + 1, len(wanted))
+        writer.complete()
     return Path(out)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
+from mjsense.core.new_output import new_output
 from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.hdf5 import open_h5
@@ -53,7 +54,7 @@ def import_robomimic(
 
     Args:
         file: HDF5 file with ``data/demo_i``.
-        out: Folder to write. It must not contain a recording.
+        out: Folder to write. It must not exist, or be empty; after an error it is not written.
         episodes: Positions of demonstrations, in the order of their numbers; by default all.
         fps: Steps per second; by default as the file's ``env_args`` state, or 20, robosuite's default.
         assets: Folder of the package ``robosuite`` or of LIBERO's assets, for models that name their meshes and textures; by default the
@@ -91,16 +92,17 @@ def import_robomimic(
         for demo in kept:
             houses.setdefault(demo.archive, []).append(demo)
         done = 0
-        for house, (archive, members) in enumerate(houses.items()):
-            settings = {"env": about.name, "source": path.name, "env_args": about.arguments}
-            options = {**OPTIONS, "house": house, "episodes": len(members)} | ({"archive": archive} if archive[0] else {})
-            writer = _Writer(out, members[0], about, rate, settings, options)
-            for i, demo in enumerate(members):
-                writer.write(i, demo, {"task_description": about.name, "policy_dt_ms": float(1000 / rate)} | about.instruction)
-                done += 1
-                if progress is not None:
-                    progress(done, len(kept))
-            writer.complete()
+        with new_output(out) as part:
+            for house, (archive, members) in enumerate(houses.items()):
+                settings = {"env": about.name, "source": path.name, "env_args": about.arguments}
+                options = {**OPTIONS, "house": house, "episodes": len(members)} | ({"archive": archive} if archive[0] else {})
+                writer = _Writer(part, members[0], about, rate, settings, options)
+                for i, demo in enumerate(members):
+                    writer.write(i, demo, {"task_description": about.name, "policy_dt_ms": float(1000 / rate)} | about.instruction)
+                    done += 1
+                    if progress is not None:
+                        progress(done, len(kept))
+                writer.complete()
     return Path(out)
 
 

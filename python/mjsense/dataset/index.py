@@ -33,9 +33,9 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with open_plain(path) as plain:
         try:
+            _check_columns(path, parquet.ParquetFile(arrow.PythonFile(plain, "r")))
             # Dictionaries of texts: a text that occurs in many rows is not copied for each of them.
             file = parquet.ParquetFile(arrow.PythonFile(plain, "r"), read_dictionary=list(_TEXTS))
-            _check_columns(path, file)
             for batch in file.iter_batches(_ROWS, columns=[*_TEXTS, *_NUMBERS, "success"]):
                 _check_texts(path, batch)
                 rows += [checked_row(path, len(rows) + i, row) for i, row in enumerate(batch.to_pylist())]
@@ -50,7 +50,7 @@ def _check_columns(path: Path, file: Any) -> None:
     expected = {**dict.fromkeys(_TEXTS, ("string",)), **dict.fromkeys(_NUMBERS, ("int64", "uint64")), "success": ("bool",)}
     for name, kinds in expected.items():
         if types.get(name) not in kinds:
-            raise ValueError(f"{path}: the column '{name}' is {types.get(name, 'missing')}; it must be {' or '.join(kinds)}")
+            raise ValueError(f"{path}: the column '{name}' is {printable(types.get(name, 'missing')[:100])}; it must be {' or '.join(kinds)}")
     if metadata.num_rows > EPISODES:
         raise ValueError(f"{path} has {metadata.num_rows} rows, more than {EPISODES}")
     for group in range(metadata.num_row_groups):

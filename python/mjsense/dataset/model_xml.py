@@ -83,7 +83,7 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
     result = _exact_xml(spec)
     compiled = mujoco.MjModel.from_xml_string(result, assets)
     if wrong := [field for field in changed if not np.allclose(field_of(compiled, field), field_of(model, field), rtol=1e-5, atol=1e-8)]:
-        raise ValueError(f"episode {episode.index}: MJCF cannot express its {', '.join(wrong)}")
+        raise ValueError(f"{playback.where(episode)}: MJCF cannot express its {', '.join(wrong)}")
     return result, assets
 
 

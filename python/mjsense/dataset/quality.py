@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 _SLOW = 0.03  # rad/s or m/s; slower joints do not move
 _SMALL = 0.01  # smaller changes of a command, as a share of its largest value in the episode, are none
 _DRIFT = 0.01  # rad or m; leaving out steps hides no larger motion
+_POSE = (7,)
 _POINTS = "obs/extra/object_image_points/"
 
 
@@ -35,11 +36,11 @@ class EpisodeQuality:
 
 def idle_steps(episode: EpisodeRows) -> np.ndarray:
     """Whether nothing moves in the step that led to an observation: bool ``[T]``; False for the first one."""
-    still = np.ones(episode.length - 1, bool)
     moving = [name for name in episode.streams if name.startswith("obs/agent/qpos/")]
     commands = [name for name in episode.streams if name.startswith("actions/commanded_action/") and "/given/" not in name]
-    if not moving:
+    if not moving or episode.length < 2:
         return np.zeros(episode.length, bool)
+    still = np.ones(episode.length - 1, bool)
     limits = {name: _SLOW / float(episode.fps) for name in moving}
     rows = {name: episode[name].reshape(episode.length, -1).astype(float) for name in [*moving, *commands]}
     for name, values in rows.items():
@@ -71,7 +72,7 @@ def quality_of(episode: EpisodeRows) -> EpisodeQuality:
     idle = idle_steps(episode)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(int), [0]])))
     waits = edges[1::2] - edges[::2]
-    tools = [episode[name] for name in episode.streams if name.startswith("obs/extra/tcp_pose")]
+    tools = [episode[name] for name, stream in episode.streams.items() if name.startswith("obs/extra/tcp_pose") and stream.shape == _POSE]
     jerks = [np.diff(tool[:, :3].astype(float), 3, axis=0) * float(episode.fps) ** 3 for tool in tools if len(tool) > 3]
     visibility: dict[str, dict[str, float]] = {}
     for name in episode.streams:
@@ -88,7 +89,8 @@ def quality_of(episode: EpisodeRows) -> EpisodeQuality:
 
 
 def _approach(episode: EpisodeRows) -> float:
-    if "obs/extra/grasp_pose" not in episode.streams:
+    grasp = episode.streams.get("obs/extra/grasp_pose")
+    if grasp is None or grasp.shape != _POSE or not episode.length:
         return float("nan")
     _, x, y, _ = episode["obs/extra/grasp_pose"][-1, 3:].astype(float)
     if not episode["obs/extra/grasp_pose"][-1, :3].any():

@@ -17,6 +17,7 @@ from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.description import is_known_thing
 from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.playback import where
 from mjsense.sensors.configs import CameraSensorCfg
 from mjsense.sensors.core_sensors import CameraImageSensor, CameraParameterSensor
 
@@ -204,7 +205,7 @@ class CameraSystem:
         centre = sum(points, np.zeros(3)) * (1.0 / len(points)) if points else np.zeros(3)
         why = self._system.place(sim._core, world, episode.seed or 0, episode.number, list(centre), [b for b in bodies if b >= 0])
         if why:
-            raise ValueError(f"episode {episode.index}: {why}")
+            raise ValueError(f"{where(episode)}: {why}")
 
 
 def sized(camera: RenderCamera, width: int | None, height: int | None) -> RenderCamera:

@@ -22,7 +22,7 @@ from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.hdf5 import open_h5, text_of
-from mjsense.dataset.playback import archive_of, inputs_of
+from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
 from mjsense.recording.recorder import FILE_OPTIONS, recorded_sensors
@@ -112,12 +112,12 @@ class _House:
         new_cameras = [camera for camera in cameras if camera not in copied]
         self._frames = sum(1 + camera.depth for camera in new_cameras)
         handles = self._make_worlds(new_cameras, images, brightness, options)
+        self._skip = _replaced_streams(first, copied)
         changed = {"cameras": [camera.settings() for camera in cameras], **images,
-                   "render": {"of": first._recording.provenance, "episodes": [episode.number for episode in episodes], "brightness": brightness,
-                              "camera_system": options["camera_system"]}}  # fmt: skip
+                   "render": {"of": first._recording.provenance, "carried": _carried_streams(first, self._skip), "episodes": [episode.number for episode in episodes],
+                              "brightness": brightness, "camera_system": options["camera_system"]}}  # fmt: skip
         self._recorder = self._make_recorder(out, handles, settings | changed, options)
         self.path = Path(self._recorder.path)
-        self._skip = _replaced_streams(first, copied)
         for number in () if self._recorder.enough else others:
             if not self._recorder.decided(number):
                 self._recorder.skip_episode(number, "not in the rendering")
@@ -170,7 +170,7 @@ class _House:
             show_states(worlds.sim, ids, [inputs_of(p.episode).state[p.t] for _, p in active])
             recorder.append(ids, *([p.steps[name][p.t].item() for _, p in active] for name in _STEP_FIELDS))
             if failed := worlds.sim.failures:
-                raise RuntimeError(f"episode {playing[failed[0][0]].episode.index}: {failed[0][1]}")  # pyright: ignore[reportOptionalMemberAccess]
+                raise RuntimeError(f"{where(playing[failed[0][0]].episode)}: {failed[0][1]}")  # pyright: ignore[reportOptionalMemberAccess]
             finished = 0
             for w, p in active:
                 p.t += 1
@@ -183,9 +183,7 @@ class _House:
 
     def _begin(self, world: int, episode: Episode) -> _Playing:
         self._worlds.begin(world, episode)
-        with open_h5(episode.path) as file:
-            trajectory = file[episode.trajectory]
-            steps = {name: trajectory[name].rows_of(episode.length).read() for name in _STEP_FIELDS}
+        steps = {name: episode[name] for name in _STEP_FIELDS}
         if self._system:
             show_states(self._worlds.sim, [world], [inputs_of(episode).state[0]])
             self._system.place(world, episode)
@@ -204,6 +202,24 @@ def _replaced_streams(episode: Episode, copied: list[RenderCamera]) -> list[str]
     names = [camera.name for camera in render_cameras.recorded_cameras(episode, None) if camera not in copied]
     places = ("sensor_data/{}", "sensor_data/{}_depth", "sensor_data/{}_depth_16bit", "sensor_param/{}", "extra/{}_segmentation")
     return [f"obs/{place.format(name)}" for name in names for place in places]
+
+
+def _carried_streams(episode: Episode, replaced: list[str]) -> list[str]:
+    """Streams of the recording that are carried over, as its description lists them. ``verify`` reports one that is missing."""
+    stated = episode._recording.provenance
+    rendered = stated.get("settings", {}).get("render", {})
+    listed = [*_texts(stated.get("streams")), *(_texts(rendered.get("carried")) if isinstance(rendered, dict) else ())]
+
+    def is_replaced(entry: str) -> bool:
+        name = entry[: entry.rfind("(")].rpartition(" ")[0].replace("sensor_param_", "obs/sensor_param/", 1)  # of "qpos uint8(2000,)"
+        places = [name] if name.startswith("obs/") else [f"obs/extra/{name}", f"obs/sensor_data/{name.replace('/', '_')}"]
+        return any(place == prefix or place.startswith(f"{prefix}/") for place in places for prefix in replaced)
+
+    return [entry for entry in listed if not is_replaced(entry)]
+
+
+def _texts(value: Any) -> list[str]:
+    return [text for text in value if isinstance(text, str)] if isinstance(value, list) else []
 
 
 def _key_of(sensor: Any) -> str:

@@ -99,6 +99,8 @@ class Packets:
         """Packets that can be decoded without the ones before."""
         self.key_frames: list[int] = []
         """Their frames."""
+        self.exact = True
+        """Whether each frame is exactly at its time. Matroska rounds times to milliseconds."""
         with open_container(path, crc) as container, open_plain(path) as file:
             self.identity = file.identity
             stream = container.streams.video[0]
@@ -116,7 +118,9 @@ class Packets:
                 offset = file.read(packet.size + _NEAR).find(bytes(packet))
                 if offset < 0:
                     raise RuntimeError(f"{path}: the file does not contain the bytes of its packet {len(self.sizes)}")
-                frame = round(packet.pts * stream.time_base * fps)
+                at = packet.pts * stream.time_base * fps
+                frame = round(at)
+                self.exact &= at == frame
                 if packet.is_keyframe:
                     self.keys.append(len(self.sizes))
                     self.key_frames.append(frame)

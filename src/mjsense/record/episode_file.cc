@@ -257,6 +257,9 @@ void EpisodeFile::carry_over(const EpisodeSource& source) {
 
 void EpisodeFile::carry_video(const std::filesystem::path& folder, const std::string& path) {
   std::string name = hdf5::read_bytes(trajectory_, path, kFileNameBytes);
+  if (name.size() != kFileNameBytes)  // the new name is written in its place
+    throw RuntimeError(fmt::format("'{}' has {} bytes; the name of a video has {}", path,
+                                   name.size(), kFileNameBytes));
   name.resize(name.find_last_not_of('\0') + 1);
   const Fd file = open_plain(folder, name);
   std::string bytes(static_cast<std::size_t>(size_of(file)), '\0');

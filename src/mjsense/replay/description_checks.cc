@@ -80,15 +80,17 @@ std::string shown(const Json& value) {
 
 std::vector<ListedStream> listed_places(const Json& description) {
   std::vector<ListedStream> found;
-  const auto streams = description.find("streams");
-  if (streams == description.end() || !streams->is_array()) return found;
-  for (const Json& entry : *streams) {  // "wrist_camera uint8(12, 16, 3)"
-    if (!entry.is_string()) continue;
-    const auto& text = entry.get_ref<const std::string&>();
-    const std::string name = text.substr(0, text.rfind(' ', text.rfind('(')));
-    std::string video = name;
-    std::ranges::replace(video, '/', '_');
-    found.push_back({name, {record::path_of(name), "obs/sensor_data/" + video}});
+  for (const char* list : {"/streams", "/settings/render/carried"}) {
+    const Json::json_pointer place(list);
+    if (!description.contains(place) || !description.at(place).is_array()) continue;
+    for (const Json& entry : description.at(place)) {  // "wrist_camera uint8(12, 16, 3)"
+      if (!entry.is_string()) continue;
+      const auto& text = entry.get_ref<const std::string&>();
+      const std::string name = text.substr(0, text.rfind(' ', text.rfind('(')));
+      std::string video = name;
+      std::ranges::replace(video, '/', '_');
+      found.push_back({name, {record::path_of(name), "obs/sensor_data/" + video}});
+    }
   }
   return found;
 }

@@ -54,5 +54,13 @@ TEST(DescriptionChecks, PlacesOfStreams) {
   EXPECT_EQ(found[2].name, "flag");
 }
 
+TEST(DescriptionChecks, StreamsThatARenderingCarriesOver) {
+  const auto found = listed_places(nlohmann::json::parse(
+      R"json({"streams":["eye uint8(4, 4, 3)"],"settings":{"render":{"carried":["replay/state float64(9,)"]}}})json"));
+  ASSERT_EQ(found.size(), 2);
+  EXPECT_THAT(found[1].places, ElementsAre("replay/state", "obs/sensor_data/replay_state"));
+  EXPECT_THAT(listed_places(nlohmann::json::parse(R"({"settings":{"render":[]}})")), IsEmpty());
+}
+
 }  // namespace
 }  // namespace mjsense::replay

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -24,6 +25,15 @@ namespace fs = std::filesystem;
 
 namespace mjsense::replay {
 namespace {
+
+// Runs `read`, with `place` in front of the text of its errors.
+void at(const std::string& place, const std::function<void()>& read) {
+  try {
+    read();
+  } catch (const Error& e) {
+    throw RuntimeError(fmt::format("{} {}", place, e.what()));
+  }
+}
 
 // Mean and standard deviation in one pass, accurate for values far from zero (Welford).
 struct Accumulator {
@@ -81,51 +91,55 @@ class Inspector {
     InspectResult::File entry{recorded.name,
                               static_cast<std::int64_t>(fs::file_size(recorded.path))};
     const hdf5::H5Lock lock;
+    const std::string path = recorded.path.string();
     const hdf5::Id file = hdf5::open_file(recorded.path);
-    if (result_.settings.empty()) result_.settings = hdf5::text_attribute(file, "recording");
-    for (const std::string& name : trajectory_names(file)) {
-      const hdf5::Id trajectory = hdf5::open_group(file, name);
-      ++entry.episodes;
-      const std::string outcome = hdf5::text_attribute(trajectory, "outcome");
-      if (!outcome.empty())
-        entry.outcomes[std::string(record::outcome_without_details(outcome))].push_back(name);
-      add_trajectory(trajectory, entry);
-      if (!hdf5::exists(trajectory, "obs/sensor_data")) continue;
-      const hdf5::Id videos = hdf5::open_group(trajectory, "obs/sensor_data");
-      for (const std::string& key : hdf5::children(videos))
-        result_.videos.push_back(read_file_name(videos, key));
-    }
+    at(path, [&] {
+      if (result_.settings.empty()) result_.settings = hdf5::text_attribute(file, "recording");
+      for (const std::string& name : trajectory_names(file))
+        at(name, [&] { add_trajectory(hdf5::open_group(file, name), name, entry); });
+    });
     result_.files.push_back(std::move(entry));
   }
 
-  void add_trajectory(hid_t trajectory, InspectResult::File& entry) {
+  void add_trajectory(hid_t trajectory, const std::string& trajectory_name,
+                      InspectResult::File& entry) {
+    ++entry.episodes;
+    const std::string outcome = hdf5::text_attribute(trajectory, "outcome");
+    if (!outcome.empty())
+      entry.outcomes[std::string(record::outcome_without_details(outcome))].push_back(
+          trajectory_name);
     hdf5::each_dataset(trajectory, [&](const std::string& name) {
-      if (name.starts_with("obs/sensor_data/")) return;
-      const RowDataset dataset(trajectory, name);
-      unpacked_ += dataset.bytes();
-      if (hdf5::is_bomb(unpacked_, bytes_))
-        throw RuntimeError(
-            fmt::format("'{}': the files declare far more data than they contain", name));
-      Stream& stream = stream_of(dataset, name);
-      if (dataset.is_json()) {
-        dataset.each_text([&](std::int64_t, std::string_view text) {
-          parse_json(text, [&](const std::string& path, double x) {
-            value_of(name, path, stream).add(x);
-          });
-        });
-      } else if (dataset.is_number() && !dataset.scalar()) {
-        double last = 0;
-        dataset.each_number([&](std::span<const double> values) {
-          for (const double x : values) stream.values.add(x);
-          if (!values.empty()) last = values.back();
-        });
-        if (name != "success") return;
-        constexpr std::int64_t kMax = std::numeric_limits<int>::max();
-        entry.steps =
-            static_cast<int>(std::min(kMax, entry.steps + std::min(kMax, dataset.rows())));
-        entry.successes += last != 0;
-      }
+      if (!name.starts_with("obs/sensor_data/"))
+        at(name + ":", [&] { add_dataset(trajectory, name, entry); });
     });
+    if (!hdf5::exists(trajectory, "obs/sensor_data")) return;
+    const hdf5::Id videos = hdf5::open_group(trajectory, "obs/sensor_data");
+    for (const std::string& key : hdf5::children(videos))
+      at(key, [&] { result_.videos.push_back(read_file_name(videos, key)); });
+  }
+
+  void add_dataset(hid_t trajectory, const std::string& name, InspectResult::File& entry) {
+    const RowDataset dataset(trajectory, name);
+    unpacked_ += dataset.bytes();
+    if (hdf5::is_bomb(unpacked_, bytes_))
+      throw RuntimeError("the files declare far more data than they contain");
+    Stream& stream = stream_of(dataset, name);
+    if (dataset.is_json()) {
+      dataset.each_text([&](std::int64_t, std::string_view text) {
+        parse_json(text,
+                   [&](const std::string& path, double x) { value_of(name, path, stream).add(x); });
+      });
+    } else if (dataset.is_number() && !dataset.scalar()) {
+      double last = 0;
+      dataset.each_number([&](std::span<const double> values) {
+        for (const double x : values) stream.values.add(x);
+        if (!values.empty()) last = values.back();
+      });
+      if (name != "success") return;
+      constexpr std::int64_t kMax = std::numeric_limits<int>::max();
+      entry.steps = static_cast<int>(std::min(kMax, entry.steps + std::min(kMax, dataset.rows())));
+      entry.successes += last != 0;
+    }
   }
 
   Stream& stream_of(const RowDataset& dataset, const std::string& name) {
