@@ -43,7 +43,8 @@ class TaskVectorEnv(VectorEnv):
     - ``next_step``: the next step starts a new episode and ignores its action;
     - ``same_step``: the new episode has started when ``step`` returns; ``infos["final_obs"]`` and ``infos["final_info"]`` are
       those of the end of the old episode;
-    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``.
+    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``. Until then each step returns the flags of its end
+      again, its last observation and the reward 0. A step in which no world can move raises ``gymnasium.error.ResetNeeded``.
 
     ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` is the mask of the worlds it applies to, as in gymnasium.
     """
@@ -89,6 +90,7 @@ class TaskVectorEnv(VectorEnv):
         """Number of control steps after which an episode is truncated."""
         self._next_episode = 0
         self._ended = np.zeros(self.num_envs, bool)
+        self._ends = (self._ended, self._ended)  # terminated, truncated
         self._started = False
         layout = self._rollout.action_layout()
         self.action_groups: dict[str, slice] = group_slices(layout)
@@ -227,6 +229,9 @@ class TaskVectorEnv(VectorEnv):
 
     def _play(self, play: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         resting = self._ended.copy()
+        stays = self.autoreset_mode == AutoresetMode.DISABLED
+        if stays and resting.all():
+            raise gymnasium.error.ResetNeeded("step(): the episodes of all worlds have ended: call reset() first")
         for world in np.flatnonzero(resting):
             self._rollout.stop(int(world))
         if not resting.all():
@@ -235,19 +240,21 @@ class TaskVectorEnv(VectorEnv):
         if resting.any():
             for values in (reward, success, terminated, truncated):
                 values[resting] = 0
-        for world in faults:
-            truncated[world] = not resting[world]
-        infos: dict[str, Any] = {"success": success, "_success": ~resting}
+            if stays:
+                for values, last in zip((terminated, truncated), self._ends, strict=True):
+                    values[resting & last] = 1
         broken = [world for world in faults if not resting[world]]
+        for world in broken:
+            truncated[world] = 1
+        infos: dict[str, Any] = {"success": success, "_success": ~resting}
         if broken:
             infos["fault"], infos["_fault"] = np.full(self.num_envs, "", object), np.zeros(self.num_envs, bool)
             for world in broken:
                 infos["fault"][world], infos["_fault"][world] = faults[world], True
-        self._ended = self._on_host(terminated | truncated).copy()
+        self._ends = self._on_host(terminated).copy(), self._on_host(truncated).copy()
+        self._ended = self._ends[0] | self._ends[1]
         if self.autoreset_mode == AutoresetMode.NEXT_STEP and resting.any():
             self._begin(np.flatnonzero(resting))
-        elif self.autoreset_mode == AutoresetMode.DISABLED:
-            self._ended |= resting
         elif self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             over = self._ended.copy()
             last = self._observe()

@@ -138,9 +138,11 @@ void Rollout::make() {
     scene_cfg.sensors.push_back(std::make_shared<sensors::CameraSensorCfg>(
         camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));
   }
-  if (cfg_.default_view)
-    scene_cfg.sensors.push_back(
-        std::make_shared<sensors::CameraSensorCfg>(default_view(*task_, cfg_)));
+  if (cfg_.default_view) {
+    view_ = std::make_unique<cameras::CameraSystem>(default_view(*task_, cfg_));
+    scene_cfg.sensors.push_back(std::make_shared<sensors::CameraSensorCfg>(
+        camera_sensor_cfg(*view_, 0, recorded_cameras(*view_)[0], cfg_)));
+  }
   auto scene = std::make_shared<scene::Scene>(std::move(scene_cfg));
   simulation_ =
       std::make_shared<sim::Simulation>(scene, sim::SimulationCfg{.num_worlds = cfg_.num_worlds,
@@ -150,6 +152,7 @@ void Rollout::make() {
   simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
   camera_system_->initialize(*simulation_);
+  if (view_) view_->initialize(*simulation_);
   task_->bind(simulation_);
   if (policy_) policy_->bind(simulation_);
   task_->initialize(scene->model(), cfg_.num_worlds);

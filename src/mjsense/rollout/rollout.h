@@ -52,8 +52,9 @@ inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real
 // Part of the scene for tests of generalisation; "": all of it.
 inline constexpr std::array<std::string_view, 3> kSplits{"", "train", "test"};
 
-// A camera next to the robot that looks at the workspace in front of it. In a scene that contains
-// its own robot, it is at the origin until its pose is set.
+// A camera next to the robot that looks at the workspace in front of it, or, if it does not see the
+// robot and the task's objects from there, around them. In a scene that contains its own robot, it
+// is at the origin until its pose is set.
 inline constexpr std::string_view kDefaultView = "default_view";
 
 // Value of RolloutCfg::robot for the task's default robot.
@@ -312,6 +313,7 @@ class Rollout {
   std::shared_ptr<episode::Policy> policy_;  // outlives the task
   std::shared_ptr<episode::Task> task_;
   std::unique_ptr<cameras::CameraSystem> camera_system_;
+  std::unique_ptr<cameras::CameraSystem> view_;  // of RolloutCfg::default_view
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<policies::StartReach> reach_;  // null: any start is accepted
   std::unique_ptr<ActionLog> log_;
