@@ -137,7 +137,6 @@ cameras::CameraSystem default_view(const episode::Task& task, const RolloutCfg& 
     view.distance_range = {1.0, 2.5};
     view.max_attempts = 50;
     view.height_range = {0.1, 1.0};
-    view.relaxed = true;
   }
   cameras::CameraSystemCfg system{.name = std::string(kDefaultView), .cameras = {view}};
   system.width = cfg.width.value_or(robot.image_width);

@@ -82,7 +82,7 @@ struct RolloutCfg {
   std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
   bool terminate_upon_success = false;
-  double max_penetration = 0.004;
+  std::optional<double> max_penetration;
   double perturb = 0;
   NamedEnum<episode::Instructions> instructions;
   bool use_sensors = true;
@@ -193,10 +193,11 @@ void visit_fields(V& v, RolloutCfg& c) {
       .decides_data();
   v("max_penetration", c.max_penetration,
     "Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: "
-    "any depth. Pairs of geoms that are deeper at the start do not count.")
+    "any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of "
+    "geoms that are deeper at the start do not count.")
       .unit("m")
       .at_least(0)
-      .decides_data();
+      .decides_data_as("max_penetration");
   v("use_sensors", c.use_sensors,
     "Add the sensors of the task, of the robot and of the policy. False: only the sensors that are "
     "passed in.")

@@ -154,11 +154,14 @@ void Rollout::place_cameras(std::span<const int> worlds) {
     why[world.id] = camera_system_->place_cameras(world, cfg_.seed, number, centre, objects);
     if (!view_ || !view_->varies()) return;
     const robots::Robot& robot = task_->robot();
-    objects.push_back(robot.base_body());
+    std::vector<int> parts{robot.base_body()};
     for (const robots::MoveGroup& group : robot.groups()) {
-      if (group.kind == robots::GroupKind::kGripper) objects.push_back(group.root_body);
+      if (group.kind == robots::GroupKind::kGripper) parts.push_back(group.root_body);
     }
-    view_->place_cameras(world, cfg_.seed, number, centre, objects);
+    objects.insert(objects.end(), parts.begin(), parts.end());
+    if (view_->place_cameras(world, cfg_.seed, number, centre, objects).empty()) return;
+    // Targets of navigation may be behind walls.
+    view_->place_cameras(world, cfg_.seed, number, robot.base_pose(world).p, parts);
   });
   for (int w : worlds) {
     if (!why[w].empty()) set_fault(w, std::move(why[w]));

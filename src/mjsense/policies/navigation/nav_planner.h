@@ -48,6 +48,7 @@ class NavPlanner final : public TaskPlanner {
   int group_ = -1;  // move group of the base
   std::vector<std::vector<scenes::BasePose>>
       tried_;  // [B] poses from which the object was not visible
+  std::vector<double> enough_;  // [B] m, distance to the object at which the base has arrived
 };
 
 // Timed path of the base group's commands (x, y, yaw) through the poses `poses`.
