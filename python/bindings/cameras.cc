@@ -10,8 +10,8 @@
 #include <functional>
 #include <memory>
 
-#include "mjsense/cameras/camera_system.h"
-#include "mjsense/cameras/load_cameras.h"
+#include "mjsense_tasks/cameras/camera_system.h"
+#include "mjsense_tasks/cameras/load_cameras.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/py_simulation.h"
 
@@ -33,13 +33,14 @@ class PyCameraSystem {
  public:
   PyCameraSystem(const std::string& name_or_path, const std::string& robot_file,
                  const std::string& prefix, const std::string& base)
-      : system_(cameras::load_camera_system(name_or_path, robot_file, prefix), prefix, base) {}
+      : system_(tasks::cameras::load_camera_system(name_or_path, robot_file, prefix), prefix,
+                base) {}
 
   nb::list mounts() const {
     nb::list out;
     for (std::size_t i = 0; i < system_.cfg().cameras.size(); ++i) {
-      const cameras::CameraMountCfg& cfg = system_.cfg().cameras[i];
-      const cameras::CameraSystem::Mounted& mounted = system_.mounted(static_cast<int>(i));
+      const tasks::cameras::CameraMountCfg& cfg = system_.cfg().cameras[i];
+      const tasks::cameras::CameraSystem::Mounted& mounted = system_.mounted(static_cast<int>(i));
       std::array<double, 3> pos{};
       std::array<double, 4> quat{};
       write_vec(mounted.pose.p, pos.data());
@@ -80,7 +81,7 @@ class PyCameraSystem {
   }
 
  private:
-  cameras::CameraSystem system_;
+  tasks::cameras::CameraSystem system_;
 };
 
 }  // namespace

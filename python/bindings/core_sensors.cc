@@ -19,7 +19,7 @@
 #include "mjsense/observe/joint_state.h"
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/observe/shared_field.h"
-#include "mjsense/robots/grasp_state.h"
+#include "mjsense_tasks/robots/grasp_state.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/sensor_handle.h"
 #include "python/bindings/task_view.h"
@@ -74,10 +74,10 @@ SensorHandle env_states(const std::string& name, const std::string& articulation
 
 SensorHandle grasp_state(const std::string& name, const std::string& object,
                          const std::vector<std::pair<std::string, std::string>>& grippers) {
-  std::vector<robots::GraspStateSensor::Gripper> all;
+  std::vector<tasks::robots::GraspStateSensor::Gripper> all;
   for (const auto& [gripper, body] : grippers) all.push_back({gripper, body});
-  return {
-      std::make_shared<robots::GraspStateSensor>(name, observe::BodyRef(object), std::move(all))};
+  return {std::make_shared<tasks::robots::GraspStateSensor>(name, observe::BodyRef(object),
+                                                            std::move(all))};
 }
 
 // objects: (key, body, erode); cameras: (name, sensor of the scene, skip erosion).

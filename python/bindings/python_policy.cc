@@ -10,7 +10,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/rollout/rollout.h"
+#include "mjsense_tasks/rollout/rollout.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/numpy.h"
 
@@ -28,7 +28,7 @@ std::string shape_text(const Numbers& array) {
 
 }  // namespace
 
-nb::list suite_streams(rollout::Rollout& rollout) {
+nb::list suite_streams(tasks::rollout::Rollout& rollout) {
   nb::list list;
   for (const auto& sensor : rollout.suite().sensors()) {
     // Keep the simulation alive too, because some rows belong to a camera of the scene.
@@ -44,9 +44,9 @@ nb::list suite_streams(rollout::Rollout& rollout) {
   return list;
 }
 
-nb::list action_layout(const robots::Robot& robot) {
+nb::list action_layout(const tasks::robots::Robot& robot) {
   nb::list layout;
-  for (const robots::MoveGroup& group : robot.groups()) {
+  for (const tasks::robots::MoveGroup& group : robot.groups()) {
     if (group.controlled())
       layout.append(nb::make_tuple(group.name, group.command_low, group.command_high));
   }
@@ -79,7 +79,7 @@ std::string PythonPolicy::layout_text() const {
                      fmt::join(groups, ", "));
 }
 
-void PythonPolicy::initialize(episode::Task& task) {
+void PythonPolicy::initialize(tasks::episode::Task& task) {
   task_ = &task;
   const auto B = static_cast<std::size_t>(task.num_worlds());
   group_.clear();
@@ -100,7 +100,7 @@ void PythonPolicy::initialize(episode::Task& task) {
             .left = std::vector<std::size_t>(B)};
 }
 
-void PythonPolicy::observe(rollout::Rollout& rollout) {
+void PythonPolicy::observe(tasks::rollout::Rollout& rollout) {
   host_->call(place("initialize"), [&] {
     nb::object policy = nb::borrow(policy_.get());
     nb::object bound =
@@ -115,7 +115,7 @@ void PythonPolicy::observe(rollout::Rollout& rollout) {
 
 std::vector<std::shared_ptr<Sensor>> PythonPolicy::create_policy_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors;
-  if (!phases_.empty()) sensors = episode::PlannerPolicy::create_policy_sensors();
+  if (!phases_.empty()) sensors = tasks::episode::PlannerPolicy::create_policy_sensors();
   host_->call(place("sensors"), [&] {
     for (auto& own : host_->members(policy_.get().attr("_mjs_sensors")(), simulation_.lock()))
       sensors.push_back(std::move(own));
@@ -138,7 +138,7 @@ std::string PythonPolicy::failure(int world) const {
   });
 }
 
-void PythonPolicy::reset_all(episode::ActiveWorlds& worlds) {
+void PythonPolicy::reset_all(tasks::episode::ActiveWorlds& worlds) {
   for (int w : worlds.ids()) chunk_.left[w] = 0;
   host_->call(place("reset"), [&] {
     nb::list ids, episodes, instructions;
@@ -152,7 +152,8 @@ void PythonPolicy::reset_all(episode::ActiveWorlds& worlds) {
   });
 }
 
-void PythonPolicy::act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) {
+void PythonPolicy::act_all(tasks::episode::ActiveWorlds& worlds,
+                           std::span<tasks::robots::Action> actions) {
   bool any = false;
   for (int w : worlds.ids()) any |= chunk_.left[w] == 0;
   if (any) {
@@ -298,7 +299,7 @@ void PythonPolicy::read_phases() {
   read_ints("num_retries", retries_);
 }
 
-void PythonPolicy::fill(int world, robots::Action& action) {
+void PythonPolicy::fill(int world, tasks::robots::Action& action) {
   const std::size_t at = chunk_.steps - chunk_.left[world];
   const double* values = chunk_.values.data() + (world * chunk_.steps + at) * n_;
   for (std::size_t i = 0; i < group_.size(); ++i) {

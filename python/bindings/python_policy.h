@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/episode/policy.h"
-#include "mjsense/episode/task.h"
+#include "mjsense_tasks/episode/policy.h"
+#include "mjsense_tasks/episode/task.h"
 #include "python/bindings/rollout_host.h"
 
-namespace mjsense::rollout {
+namespace mjsense::tasks::rollout {
 class Rollout;
-}  // namespace mjsense::rollout
+}  // namespace mjsense::tasks::rollout
 
 namespace mjsense {}
 
@@ -21,11 +21,11 @@ namespace mjsense::python {
 
 // (sensor, spec, rows) of every stream of a rollout's suite. The rows are read-only and may outlive
 // the rollout.
-nb::list suite_streams(rollout::Rollout& rollout);
+nb::list suite_streams(tasks::rollout::Rollout& rollout);
 // (name, low, high) of every controlled move group.
-nb::list action_layout(const robots::Robot& robot);
+nb::list action_layout(const tasks::robots::Robot& robot);
 
-class PythonPolicy final : public episode::PlannerPolicy {
+class PythonPolicy final : public tasks::episode::PlannerPolicy {
  public:
   // Requires the GIL.
   PythonPolicy(nb::object policy, std::shared_ptr<PythonHost> host);
@@ -34,13 +34,14 @@ class PythonPolicy final : public episode::PlannerPolicy {
   void bind(const std::shared_ptr<sim::Simulation>& simulation) override {
     simulation_ = simulation;
   }
-  void initialize(episode::Task& task) override;
+  void initialize(tasks::episode::Task& task) override;
   // Call when the suite exists: act() receives its rows.
-  void observe(rollout::Rollout& rollout);
-  void reset_all(episode::ActiveWorlds& worlds) override;
-  void act_all(episode::ActiveWorlds& worlds, std::span<robots::Action> actions) override;
+  void observe(tasks::rollout::Rollout& rollout);
+  void reset_all(tasks::episode::ActiveWorlds& worlds) override;
+  void act_all(tasks::episode::ActiveWorlds& worlds,
+               std::span<tasks::robots::Action> actions) override;
 
-  std::span<const episode::Phase> phases() const override { return phases_; }
+  std::span<const tasks::episode::Phase> phases() const override { return phases_; }
   int phase(int world) const override { return phase_[world]; }
   int num_retries(int world) const override { return retries_[world]; }
   Pose grasp_pose(int /*world*/) const override { return {}; }
@@ -66,15 +67,15 @@ class PythonPolicy final : public episode::PlannerPolicy {
   void read_group(nb::handle value, std::size_t first, std::size_t width, const std::string& what);
   void read_flags(nb::handle value, const char* what, auto&& set);
   void read_phases();
-  void fill(int world, robots::Action& action);
+  void fill(int world, tasks::robots::Action& action);
 
   PyHandle policy_;
   std::shared_ptr<PythonHost> host_;
   std::weak_ptr<sim::Simulation> simulation_;
-  episode::Task* task_ = nullptr;
+  tasks::episode::Task* task_ = nullptr;
   std::string name_;
   std::vector<std::string> phase_names_;
-  std::vector<episode::Phase> phases_;
+  std::vector<tasks::episode::Phase> phases_;
   std::vector<int> phase_, retries_;  // [B]
   PyHandle act_, observation_, wanted_, as_array_;
   bool* wanted_rows_ = nullptr;     // [B], memory of wanted_

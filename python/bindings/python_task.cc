@@ -10,9 +10,9 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/episode/object_sensors.h"
 #include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
+#include "mjsense_tasks/episode/object_sensors.h"
 
 namespace mjsense::python {
 namespace {
@@ -35,11 +35,12 @@ std::string last_part(const std::string& name) { return name.substr(name.rfind('
 
 }  // namespace
 
-PythonTask::PythonTask(episode::TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost> host)
-    : episode::Task(std::move(cfg)), task_(std::move(task)), host_(std::move(host)) {}
+PythonTask::PythonTask(tasks::episode::TaskCfg cfg, nb::object task,
+                       std::shared_ptr<PythonHost> host)
+    : tasks::episode::Task(std::move(cfg)), task_(std::move(task)), host_(std::move(host)) {}
 
 std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<PythonHost> host,
-                                             episode::TaskCfg cfg, bool own_horizon) {
+                                             tasks::episode::TaskCfg cfg, bool own_horizon) {
   nb::object settings = task.attr("_mjs_settings")();
   if (!cfg.scene.empty() || cfg.make_scene) {
     throw ValueError(fmt::format("task '{}' makes its scene itself: it cannot take the scene '{}'",
@@ -57,7 +58,7 @@ std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<Py
   made->type_ = nb::cast<std::string>(settings["task_type"]);
   made->robot_entity_ = nb::cast<std::string>(settings["robot_entity"]);
   made->table_height_ = nb::cast<double>(settings["table_height"]);
-  made->groups_ = nb::cast<robots::ActuatorGroups>(settings["move_groups"]);
+  made->groups_ = nb::cast<tasks::robots::ActuatorGroups>(settings["move_groups"]);
   for (const auto& [name, camera] :
        nb::cast<std::vector<std::pair<std::string, std::string>>>(settings["cameras"])) {
     made->cameras_.push_back({.name = name, .mjcf_camera = camera});
@@ -83,7 +84,7 @@ void PythonTask::initialize_task() {
   target_.assign(num_worlds(), 0);
   call("initialize", [&] {
     nb::list groups;
-    for (const robots::MoveGroup& group : robot().groups()) {
+    for (const tasks::robots::MoveGroup& group : robot().groups()) {
       if (group.controlled())
         groups.append(nb::make_tuple(group.name, group.command_low, group.command_high));
     }
@@ -92,7 +93,7 @@ void PythonTask::initialize_task() {
     for (nb::handle body : task_.get().attr("_mjs_graspable")()) {
       const auto full = nb::cast<std::string>(body);
       const int id = scene::resolve(model(), mjOBJ_BODY, full, fmt::format("task '{}'", name_));
-      graspable_.push_back({id, last_part(full), episode::object_shape(model(), id)});
+      graspable_.push_back({id, last_part(full), tasks::episode::object_shape(model(), id)});
     }
     for (int w = 0; w < num_worlds(); ++w) {
       set_objects(w, task_.get().attr("_mjs_roles")(w));
@@ -101,7 +102,7 @@ void PythonTask::initialize_task() {
 }
 
 void PythonTask::set_objects(int world, nb::handle roles) {
-  std::vector<episode::TaskObject> found;
+  std::vector<tasks::episode::TaskObject> found;
   for (auto [role, body] : nb::cast<nb::dict>(roles)) {
     const auto full = nb::cast<std::string>(body);
     const auto name = nb::cast<std::string>(role);
@@ -111,9 +112,9 @@ void PythonTask::set_objects(int world, nb::handle roles) {
                      .name = last_part(full),
                      .thin = name.find("handle") != std::string::npos});
   }
-  std::vector<episode::TaskObject>& now = objects_[world];
-  if (!now.empty() &&
-      !std::ranges::equal(now, found, {}, &episode::TaskObject::role, &episode::TaskObject::role)) {
+  std::vector<tasks::episode::TaskObject>& now = objects_[world];
+  if (!now.empty() && !std::ranges::equal(now, found, {}, &tasks::episode::TaskObject::role,
+                                          &tasks::episode::TaskObject::role)) {
     throw ValueError(
         fmt::format("task '{}': the roles of its objects must be the same, in the same order, "
                     "in every episode",
@@ -122,7 +123,7 @@ void PythonTask::set_objects(int world, nb::handle roles) {
   now = std::move(found);
   starts_[world].resize(now.size());
   if (now.empty() || graspable_.empty()) return;
-  const auto at = std::ranges::find(graspable_, now[0].body, &episode::GraspObject::body);
+  const auto at = std::ranges::find(graspable_, now[0].body, &tasks::episode::GraspObject::body);
   if (at == graspable_.end()) {
     throw ValueError(fmt::format("task '{}': the object '{}' is body '{}', which is not graspable",
                                  name_, now[0].role, now[0].name));
@@ -130,7 +131,8 @@ void PythonTask::set_objects(int world, nb::handle roles) {
   target_[world] = static_cast<int>(at - graspable_.begin());
 }
 
-std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {
+std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng,
+                                             const tasks::robots::StateRow& state) {
   robot().write_joints(state, rng);  // before sample(), which may change them
   return call("sample", [&]() -> std::optional<Pose> {
     nb::object base = task_.get().attr("_mjs_sample")(world, episode(world), cfg().seed);
@@ -141,15 +143,15 @@ std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const robots::
 }
 
 void PythonTask::begin(const World& world) {
-  episode::Task::begin(world);
+  tasks::episode::Task::begin(world);
   for (std::size_t i = 0; i < objects_[world.id].size(); ++i) {
     const int body = objects_[world.id][i].body;
     starts_[world.id][i] = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
   }
 }
 
-void PythonTask::begin_all(episode::ActiveWorlds& worlds) {
-  episode::Task::begin_all(worlds);
+void PythonTask::begin_all(tasks::episode::ActiveWorlds& worlds) {
+  tasks::episode::Task::begin_all(worlds);
   call("begin", [&] {
     nb::list ids;
     for (int w : worlds.ids()) ids.append(w);
@@ -157,7 +159,8 @@ void PythonTask::begin_all(episode::ActiveWorlds& worlds) {
   });
 }
 
-void PythonTask::evaluate_all(episode::ActiveWorlds& worlds, std::span<episode::Evaluation> out) {
+void PythonTask::evaluate_all(tasks::episode::ActiveWorlds& worlds,
+                              std::span<tasks::episode::Evaluation> out) {
   call("evaluate", [&] {
     nb::list ids;
     for (int w : worlds.ids()) ids.append(w);
@@ -217,11 +220,11 @@ std::string PythonTask::description(int world) const {
               [&] { return nb::cast<std::string>(task_.get().attr("_mjs_description")(world)); });
 }
 
-episode::Task::Referrals PythonTask::referrals(int world) const {
+tasks::episode::Task::Referrals PythonTask::referrals(int world) const {
   return call("referrals", [&] {
     Referrals all;
     for (auto [role, texts] : nb::cast<nb::dict>(task_.get().attr("_mjs_referrals")(world))) {
-      std::vector<episode::Referral> list;
+      std::vector<tasks::episode::Referral> list;
       for (nb::handle text : texts)
         list.push_back({nb::cast<std::string>(text[0]), nb::cast<double>(text[1])});
       all.emplace_back(nb::cast<std::string>(role), std::move(list));
@@ -241,7 +244,7 @@ std::vector<std::pair<std::string, std::string>> PythonTask::scene_info(int worl
 
 std::size_t PythonTask::role_index(std::string_view role) const {
   std::vector<std::string> roles;
-  for (const episode::TaskObject& object : objects_[0]) {
+  for (const tasks::episode::TaskObject& object : objects_[0]) {
     if (object.role == role) return roles.size();
     roles.push_back(object.role);
   }
@@ -260,10 +263,10 @@ std::optional<Pose> PythonTask::goal_pose(int /*world*/, std::string_view role) 
 std::vector<std::shared_ptr<Sensor>> PythonTask::create_task_sensors() const {
   std::vector<std::shared_ptr<Sensor>> sensors;
   if (!objects_[0].empty()) {
-    sensors.push_back(episode::start_pose_sensor(*this, "obj_start", objects_[0][0].role));
+    sensors.push_back(tasks::episode::start_pose_sensor(*this, "obj_start", objects_[0][0].role));
   }
-  for (const episode::TaskObject& object : objects_[0]) {
-    if (auto held = episode::grasp_state_sensor(*this, object.role))
+  for (const tasks::episode::TaskObject& object : objects_[0]) {
+    if (auto held = tasks::episode::grasp_state_sensor(*this, object.role))
       sensors.push_back(std::move(held));
   }
   call("sensors", [&] {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bindings of robots: the contents of a robot.toml, and kinematics of the robot alone.
 
-#include "mjsense/robots/robot.h"
+#include "mjsense_tasks/robots/robot.h"
 
 #include <mujoco/mujoco.h>
 #include <nanobind/nanobind.h>
@@ -13,9 +13,9 @@
 
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/files/embedded_files.h"
-#include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense_tasks/robots/load_robot.h"
 #include "python/bindings/bindings.h"
 
 namespace nb = nanobind;
@@ -26,31 +26,31 @@ namespace {
 using Values = std::vector<std::vector<double>>;
 
 // Name of the kind, e.g. "joint_position".
-const char* controller_kind(const robots::ControllerCfg& cfg) {
+const char* controller_kind(const tasks::robots::ControllerCfg& cfg) {
   return std::visit([]<class C>(const C&) { return struct_of<C>().kind; }, cfg);
 }
 
 // A robot in a scene without other objects.
 class PyRobot {
  public:
-  explicit PyRobot(const std::string& name_or_path) : cfg_(robots::robot_cfg(name_or_path)) {
+  explicit PyRobot(const std::string& name_or_path) : cfg_(tasks::robots::robot_cfg(name_or_path)) {
     scene::SceneCfg scene;
     scene::EntityCfg entity;
     entity.model = cfg_.model;
     scene.entities = {{"robot_0", entity}};
     scene_ = std::make_unique<scene::Scene>(std::move(scene));
-    robot_ = std::make_unique<robots::Robot>(cfg_, scene_->model(), 1);
+    robot_ = std::make_unique<tasks::robots::Robot>(cfg_, scene_->model(), 1);
   }
 
-  const robots::RobotCfg& cfg() const { return cfg_; }
-  std::string xml() const { return robots::robot_xml(cfg_); }
+  const tasks::robots::RobotCfg& cfg() const { return cfg_; }
+  std::string xml() const { return tasks::robots::robot_xml(cfg_); }
 
   nb::list groups() const {
     nb::list out;
     const mjModel* m = scene_->model();
     for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
-      const robots::MoveGroup& group = robot_->groups()[g];
-      const robots::MoveGroupCfg& cfg = cfg_.groups[g];
+      const tasks::robots::MoveGroup& group = robot_->groups()[g];
+      const tasks::robots::MoveGroupCfg& cfg = cfg_.groups[g];
       nb::dict info;
       info["name"] = group.name;
       info["kind"] = std::string(enum_name(group.kind));
@@ -80,7 +80,7 @@ class PyRobot {
   }
   nb::list cameras() const {
     nb::list out;
-    for (const robots::CameraMount& camera : cfg_.cameras)
+    for (const tasks::robots::CameraMount& camera : cfg_.cameras)
       out.append(nb::make_tuple(camera.name, camera.mjcf_camera, camera.record_depth));
     return out;
   }
@@ -94,7 +94,7 @@ class PyRobot {
   std::vector<double> ik(const std::string& group, const std::vector<double>& pose,
                          const Values& values, int max_iterations) const {
     const int g = robot_->group_index(group);
-    robots::RobotValues q = read(values);
+    tasks::robots::RobotValues q = read(values);
     const Pose target{vec3(pose.data()), normalized(quat(pose.data() + 3))};
     if (!robot_->ik(g, target, q, max_iterations)) return {};
     const auto found = q[g].view();
@@ -102,15 +102,15 @@ class PyRobot {
   }
 
  private:
-  robots::RobotValues read(const Values& values) const {
-    robots::RobotValues q;
+  tasks::robots::RobotValues read(const Values& values) const {
+    tasks::robots::RobotValues q;
     for (std::size_t g = 0; g < values.size(); ++g) q[static_cast<int>(g)].set(values[g]);
     return q;
   }
 
-  robots::RobotCfg cfg_;
+  tasks::robots::RobotCfg cfg_;
   std::unique_ptr<scene::Scene> scene_;
-  std::unique_ptr<robots::Robot> robot_;
+  std::unique_ptr<tasks::robots::Robot> robot_;
 };
 
 }  // namespace
@@ -126,7 +126,8 @@ void bind_robot(nb::module_& m) {
       "robot_python_sensors",
       [](const std::string& name_or_path) {
         nb::list out;
-        for (const robots::PythonSensorRef& sensor : robots::robot_cfg(name_or_path).python_sensors)
+        for (const tasks::robots::PythonSensorRef& sensor :
+             tasks::robots::robot_cfg(name_or_path).python_sensors)
           out.append(nb::make_tuple(sensor.name, sensor.class_name, sensor.args));
         return out;
       },

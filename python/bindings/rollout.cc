@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bindings of episodes: recording them, and playing them with the caller's actions.
 
-#include "mjsense/rollout/rollout.h"
+#include "mjsense_tasks/rollout/rollout.h"
 
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
@@ -16,9 +16,9 @@
 #include <numeric>
 
 #include "mjsense/core/fields/fields.h"
-#include "mjsense/rollout/record_job.h"
-#include "mjsense/rollout/registry.h"
-#include "mjsense/scenes/scene_file.h"
+#include "mjsense_tasks/rollout/record_job.h"
+#include "mjsense_tasks/rollout/registry.h"
+#include "mjsense_tasks/scenes/scene_file.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/mujoco_callbacks.h"
@@ -50,11 +50,11 @@ class Parts {
 
   const std::shared_ptr<PythonHost>& host() const { return host_; }
 
-  void join(rollout::RolloutCfg& cfg) const {
+  void join(tasks::rollout::RolloutCfg& cfg) const {
     cfg.code = code_;
     if (!task_.get().is_none()) {
       const bool own_horizon = !cfg.horizon;
-      cfg.make_task = [task = task_, host = host_, own_horizon](episode::TaskCfg wanted) {
+      cfg.make_task = [task = task_, host = host_, own_horizon](tasks::episode::TaskCfg wanted) {
         nb::gil_scoped_acquire lock;
         return PythonTask::make(nb::borrow(task.get()), host, std::move(wanted), own_horizon);
       };
@@ -72,7 +72,7 @@ class Parts {
       };
     }
     const auto members = [host = host_](const PyHandle& sensors) {
-      return [sensors, host](rollout::Rollout& rollout) {
+      return [sensors, host](tasks::rollout::Rollout& rollout) {
         nb::gil_scoped_acquire lock;
         return host->members(sensors.get(), rollout.simulation_ptr());
       };
@@ -91,10 +91,10 @@ class Parts {
         suite.select(nb::cast<std::vector<std::string>>(nb::borrow(select.get())(known)));
       };
     }
-    cfg.on_construct_begin = [host = host_](rollout::Rollout& rollout) {
+    cfg.on_construct_begin = [host = host_](tasks::rollout::Rollout& rollout) {
       host->set_rollout(rollout);
     };
-    cfg.on_constructed = [](rollout::Rollout& rollout) {
+    cfg.on_constructed = [](tasks::rollout::Rollout& rollout) {
       if (auto* policy = dynamic_cast<PythonPolicy*>(rollout.policy())) policy->observe(rollout);
     };
   }
@@ -102,9 +102,9 @@ class Parts {
  private:
   std::shared_ptr<PythonHost> host_;
   // Reads the configuration, including a Python function that creates its models.
-  static scenes::SceneFileCfg read_scene_file(nb::object scene,
-                                              const std::shared_ptr<PythonHost>& host) {
-    scenes::SceneFileCfg cfg;
+  static tasks::scenes::SceneFileCfg read_scene_file(nb::object scene,
+                                                     const std::shared_ptr<PythonHost>& host) {
+    tasks::scenes::SceneFileCfg cfg;
     read_struct(scene, cfg);
     if (!scene.attr("models").is_none()) {
       cfg.models = [scene = PyHandle(scene), host,
@@ -117,11 +117,11 @@ class Parts {
   }
 
   PyHandle task_, policy_, sensors_, scene_;
-  decltype(rollout::RolloutCfg::code) code_;
+  decltype(tasks::rollout::RolloutCfg::code) code_;
   PyHandle robot_sensors_, select_;
 };
 
-nb::dict progress_dict(const rollout::RecordProgress& p) {
+nb::dict progress_dict(const tasks::rollout::RecordProgress& p) {
   nb::dict d;
   d["kept"] = p.kept;
   d["wanted"] = p.wanted;
@@ -138,13 +138,13 @@ nb::dict progress_dict(const rollout::RecordProgress& p) {
 
 nb::dict record(nb::dict options, nb::object progress, nb::object objects,
                 nb::object make_simulation) {
-  rollout::RecordJobCfg cfg;
-  read_options(options, struct_of<rollout::RecordJobCfg>(), &cfg);
+  tasks::rollout::RecordJobCfg cfg;
+  read_options(options, struct_of<tasks::rollout::RecordJobCfg>(), &cfg);
   const Parts parts(objects, make_simulation);
   parts.join(cfg.rollout);
-  rollout::StopFlag stop{0};
+  tasks::rollout::StopFlag stop{0};
   nb::object error;  // raised by `progress`, or KeyboardInterrupt
-  const auto report = [&](const rollout::RecordProgress& p) {
+  const auto report = [&](const tasks::rollout::RecordProgress& p) {
     nb::gil_scoped_acquire lock;
     if (error) return;
     try {
@@ -155,12 +155,13 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
       stop = 2;
     }
   };
-  rollout::RecordSummary s;
+  tasks::rollout::RecordSummary s;
   refuse_python_callbacks();
   try {
     nb::gil_scoped_release unlock;
     // User code that runs inside may read the worlds but not step or reset them.
-    parts.host()->sim_lock()->work([&] { s = rollout::record_episodes(cfg, report, &stop); });
+    parts.host()->sim_lock()->work(
+        [&] { s = tasks::rollout::record_episodes(cfg, report, &stop); });
   } catch (...) {
     parts.host()->close();
     throw;
@@ -196,14 +197,14 @@ class PyRollout {
   PyRollout(nb::dict options, nb::object objects, nb::object make_simulation)
       : parts_(objects, make_simulation), sim_lock_(parts_.host()->sim_lock()) {
     refuse_python_callbacks();
-    rollout::RolloutCfg cfg;
+    tasks::rollout::RolloutCfg cfg;
     cfg.default_view = nb::cast<bool>(options.attr("pop")("default_view", false));
     cfg.replay_sensor = nb::cast<bool>(options.attr("pop")("replay_sensor", false));
-    read_options(options, struct_of<rollout::RolloutCfg>(), &cfg);
+    read_options(options, struct_of<tasks::rollout::RolloutCfg>(), &cfg);
     parts_.join(cfg);
     nb::gil_scoped_release unlock;
     try {
-      rollout_ = make_shared_guarded<rollout::Rollout>(cfg);
+      rollout_ = make_shared_guarded<tasks::rollout::Rollout>(cfg);
     } catch (...) {
       parts_.host()->end();
       throw;
@@ -215,7 +216,7 @@ class PyRollout {
     rollout_.reset();
   }
 
-  rollout::Rollout& rollout() { return *rollout_; }
+  tasks::rollout::Rollout& rollout() { return *rollout_; }
   // mjsense.Simulation of the worlds, which shares the rollout's lock.
   nb::object simulation() const { return parts_.host()->simulation(rollout_->simulation_ptr()); }
 
@@ -235,7 +236,7 @@ class PyRollout {
   using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
   void repeat(
       const std::vector<std::tuple<int, Row, std::optional<Row>, std::optional<Row>>>& steps) {
-    std::vector<rollout::Rollout::RecordedStep> recorded;
+    std::vector<tasks::rollout::Rollout::RecordedStep> recorded;
     const auto span = [](const Row& row) { return std::span(row.data(), row.size()); };
     const mjModel* m = rollout_->simulation().model();
     const auto state = static_cast<std::size_t>(mj_stateSize(m, mjSTATE_INTEGRATION));
@@ -274,7 +275,7 @@ class PyRollout {
   void step_chunk(const Chunks& values, bool stop_on_success) {
     check(values.shape(0), values.shape(2), "(B, steps, n)");
     const std::size_t B = values.shape(0), steps = values.shape(1);
-    std::vector<robots::Action> actions(B * steps);
+    std::vector<tasks::robots::Action> actions(B * steps);
     for (std::size_t w = 0; w < B; ++w) {
       for (std::size_t k = 0; k < steps; ++k)
         actions[k * B + w] = action(values.data() + (w * steps + k) * width());
@@ -283,7 +284,7 @@ class PyRollout {
   }
   // (phase, positions [N, 3] in the world frame) of each part of the policy's plan in a world.
   nb::list planned_paths(int world) {
-    std::vector<episode::PlannedPath> paths;
+    std::vector<tasks::episode::PlannedPath> paths;
     sim_lock_->read([&] {
       if (rollout_->policy() == nullptr || !rollout_->active(world)) return;
       const std::array<int, 1> ids{world};
@@ -291,7 +292,7 @@ class PyRollout {
                          [&](const World& w) { paths = rollout_->policy()->planned_paths(w); });
     });
     nb::list out;
-    for (const episode::PlannedPath& path : paths) {
+    for (const tasks::episode::PlannedPath& path : paths) {
       const auto rows =
           std::make_shared<Array>(DType::kFloat64, Shape{static_cast<int>(path.poses.size()), 3});
       double* row = rows->all<double>().data();
@@ -324,7 +325,7 @@ class PyRollout {
  private:
   std::size_t width() const {
     std::size_t width = 0;
-    for (const robots::MoveGroup& group : rollout_->task().robot().groups())
+    for (const tasks::robots::MoveGroup& group : rollout_->task().robot().groups())
       width += group.command_size;
     return width;
   }
@@ -334,8 +335,8 @@ class PyRollout {
     throw ValueError(fmt::format("actions: {} worlds of {} commands, expected {} = {} worlds of {}",
                                  worlds, width, what, rollout_->num_worlds(), this->width()));
   }
-  robots::Action action(const double* commands) const {
-    robots::Action action;
+  tasks::robots::Action action(const double* commands) const {
+    tasks::robots::Action action;
     const auto groups = rollout_->task().robot().groups();
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const std::size_t n = groups[g].command_size;
@@ -347,7 +348,7 @@ class PyRollout {
 
   Parts parts_;
   std::shared_ptr<SimulationLock> sim_lock_;
-  std::shared_ptr<rollout::Rollout> rollout_;
+  std::shared_ptr<tasks::rollout::Rollout> rollout_;
 };
 
 // (reward, success, terminal, truncated), each [B], and {world: fault}.
@@ -357,9 +358,9 @@ nb::tuple outcomes(PyRollout& self) {
   const auto reward = make(DType::kFloat64), success = make(DType::kBool),
              terminal = make(DType::kBool), truncated = make(DType::kBool);
   std::vector<std::pair<int, std::string>> faults;
-  self.read([&](rollout::Rollout& rollout) {
+  self.read([&](tasks::rollout::Rollout& rollout) {
     for (int w = 0; w < B; ++w) {
-      const episode::Evaluation& e = rollout.evaluation(w);
+      const tasks::episode::Evaluation& e = rollout.evaluation(w);
       reward->all<double>()[w] = e.reward;
       success->all<bool>()[w] = e.success;
       terminal->all<bool>()[w] = e.terminal;
@@ -384,14 +385,14 @@ void bind_rollout(nb::module_& m) {
       "rollout_options",
       [] {
         std::vector<std::string> names;
-        for (const FieldDecl& field : struct_of<rollout::RolloutCfg>().fields)
+        for (const FieldDecl& field : struct_of<tasks::rollout::RolloutCfg>().fields)
           names.emplace_back(field.name);
         return names;
       },
       "Names of the options of a rollout, which are also those of a recording's settings.");
-  m.def("task_names", &rollout::task_names, "Names of the tasks there are.");
-  m.def("robot_names", &robots::robot_names, "Names of the robots there are.");
-  m.def("policy_names", &rollout::policy_names, "Names of the policies there are.");
+  m.def("task_names", &tasks::rollout::task_names, "Names of the tasks there are.");
+  m.def("robot_names", &tasks::robots::robot_names, "Names of the robots there are.");
+  m.def("policy_names", &tasks::rollout::policy_names, "Names of the policies there are.");
   nb::class_<PyRollout>(m, "Rollout", "The C++ rollout.")
       .def(nb::init<nb::dict, nb::object, nb::object>(), nb::arg("options"), nb::arg("objects"),
            nb::arg("make_simulation"))

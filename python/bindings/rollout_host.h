@@ -50,7 +50,7 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
   // The mjsense.Simulation of these worlds, created on first use. Requires the GIL.
   nb::object simulation(const std::shared_ptr<sim::Simulation>& sim);
   // Sets the rollout under construction. Task and robot sensors may access it until end().
-  void set_rollout(rollout::Rollout& rollout) { *cell_ = &rollout; }
+  void set_rollout(tasks::rollout::Rollout& rollout) { *cell_ = &rollout; }
   void end() { *cell_ = nullptr; }
   // Converts Python sensors to members of a suite. Requires the GIL.
   std::vector<std::shared_ptr<Sensor>> members(nb::handle sensors,
@@ -63,7 +63,7 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
 
   std::shared_ptr<SimulationLock> sim_lock_ = std::make_shared<SimulationLock>();
   PyHandle make_, scene_, alive_, simulation_;
-  TaskView::Cell cell_ = std::make_shared<rollout::Rollout*>(nullptr);
+  TaskView::Cell cell_ = std::make_shared<tasks::rollout::Rollout*>(nullptr);
   PySimulation* core_ = nullptr;  // kept alive by simulation_
 };
 

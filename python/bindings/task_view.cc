@@ -37,14 +37,14 @@ nb::object array_of(const Pose& pose) {
   return array_of(row);
 }
 
-std::string name_of_kind(robots::GroupKind kind) {
-  return std::string(kEnumNames<robots::GroupKind>[static_cast<std::size_t>(kind)]);
+std::string name_of_kind(tasks::robots::GroupKind kind) {
+  return std::string(kEnumNames<tasks::robots::GroupKind>[static_cast<std::size_t>(kind)]);
 }
 
 nb::list groups(const TaskView& view) {
-  const robots::Robot& robot = view.robot();
+  const tasks::robots::Robot& robot = view.robot();
   nb::list all;
-  for (const robots::MoveGroup& group : robot.groups()) {
+  for (const tasks::robots::MoveGroup& group : robot.groups()) {
     nb::dict d;
     d["name"] = group.name;
     d["kind"] = name_of_kind(group.kind);
@@ -64,11 +64,11 @@ nb::list groups(const TaskView& view) {
 }
 
 nb::dict targets(const TaskView& view, int world) {
-  const robots::Robot& robot = view.robot();
-  const robots::RobotValues& values = robot.targets(view.checked(world));
+  const tasks::robots::Robot& robot = view.robot();
+  const tasks::robots::RobotValues& values = robot.targets(view.checked(world));
   nb::dict d;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const robots::MoveGroup& group = robot.groups()[g];
+    const tasks::robots::MoveGroup& group = robot.groups()[g];
     if (group.target_size > 0) d[group.name.c_str()] = array_of(values[static_cast<int>(g)].view());
   }
   return d;
@@ -76,8 +76,8 @@ nb::dict targets(const TaskView& view, int world) {
 
 // {group: [x, y, z, qw, qx, qy, qz]} of all groups, in the base frame, m.
 nb::dict fk(const TaskView& view, nb::dict values) {
-  const robots::Robot& robot = view.robot();
-  robots::RobotValues q;
+  const tasks::robots::Robot& robot = view.robot();
+  tasks::robots::RobotValues q;
   for (auto [name, row] : values) {
     const auto numbers = nb::cast<std::vector<double>>(row);
     q[robot.group_index(nb::cast<std::string>(name))].set(numbers);
@@ -90,11 +90,11 @@ nb::dict fk(const TaskView& view, nb::dict values) {
 
 // The action as the policy returned it; None before the first one.
 nb::object last_action(const TaskView& view, int world) {
-  const robots::Action* action = view.task().last_action(view.checked(world));
+  const tasks::robots::Action* action = view.task().last_action(view.checked(world));
   if (!action) return nb::none();
   nb::dict d;
   for (std::size_t g = 0; g < view.robot().groups().size(); ++g) {
-    const robots::GroupValues& values = action->commands[static_cast<int>(g)];
+    const tasks::robots::GroupValues& values = action->commands[static_cast<int>(g)];
     if (values.given) d[view.robot().groups()[g].name.c_str()] = array_of(values.view());
   }
   if (action->success) d["success"] = *action->success;
@@ -121,7 +121,7 @@ std::string info(const TaskView& view, int world) {
 }
 
 nb::tuple evaluate(const TaskView& view, int world) {
-  episode::Evaluation e;
+  tasks::episode::Evaluation e;
   visit(view, world, [&](const World& w) { e = view.task().evaluate(w); });
   // A task that is evaluated after the sensors has not evaluated this observation yet.
   if (view.task().info_follows_evaluation()) e.terminal = view.task().done_received(world);
@@ -130,8 +130,8 @@ nb::tuple evaluate(const TaskView& view, int world) {
 
 nb::list objects(const TaskView& view, int world) {
   nb::list all;
-  const episode::Task& task = view.task();
-  for (const episode::TaskObject& object : task.objects(view.checked(world)))
+  const tasks::episode::Task& task = view.task();
+  for (const tasks::episode::TaskObject& object : task.objects(view.checked(world)))
     all.append(nb::make_tuple(object.role, scene::name_of(task.model(), mjOBJ_BODY, object.body)));
   return all;
 }
@@ -145,7 +145,7 @@ nb::dict referrals(const TaskView& view, int world) {
   nb::dict d;
   for (const auto& [role, texts] : view.task().referrals(view.checked(world))) {
     nb::list list;
-    for (const episode::Referral& referral : texts)
+    for (const tasks::episode::Referral& referral : texts)
       list.append(nb::make_tuple(referral.text, referral.probability));
     d[role.c_str()] = list;
   }
@@ -154,8 +154,8 @@ nb::dict referrals(const TaskView& view, int world) {
 
 nb::list cameras(const TaskView& view) {
   nb::list all;
-  rollout::Rollout& rollout = view.rollout();
-  for (const rollout::RecordedCamera& camera : rollout.cameras()) {
+  tasks::rollout::Rollout& rollout = view.rollout();
+  for (const tasks::rollout::RecordedCamera& camera : rollout.cameras()) {
     nb::dict d;
     d["name"] = camera.name;
     d["mjcf_camera"] = camera.mjcf_camera;
@@ -176,13 +176,13 @@ nb::object own(const TaskView& view) {
 }
 
 // Null if the policy has no phases.
-const episode::PlannerPolicy* planner_of(const TaskView& view) {
-  return dynamic_cast<const episode::PlannerPolicy*>(view.task().policy());
+const tasks::episode::PlannerPolicy* planner_of(const TaskView& view) {
+  return dynamic_cast<const tasks::episode::PlannerPolicy*>(view.task().policy());
 }
 
 // (phase, retries, grasp pose); None if the policy has no phases.
 nb::object plan(const TaskView& view, int world) {
-  const episode::PlannerPolicy* planner = planner_of(view);
+  const tasks::episode::PlannerPolicy* planner = planner_of(view);
   if (!planner) return nb::none();
   const int w = view.checked(world);
   return nb::make_tuple(planner->phase(w), planner->num_retries(w),
@@ -191,8 +191,8 @@ nb::object plan(const TaskView& view, int world) {
 
 nb::dict phases(const TaskView& view) {
   nb::dict d;
-  if (const episode::Policy* policy = view.task().policy()) {
-    for (const episode::Phase& phase : policy->phases())
+  if (const tasks::episode::Policy* policy = view.task().policy()) {
+    for (const tasks::episode::Phase& phase : policy->phases())
       d[std::string(phase.name).c_str()] = phase.number;
   }
   return d;
@@ -200,7 +200,7 @@ nb::dict phases(const TaskView& view) {
 
 }  // namespace
 
-rollout::Rollout& TaskView::rollout() const {
+tasks::rollout::Rollout& TaskView::rollout() const {
   if (!*cell_) throw RuntimeError("the recording or environment of this task has ended");
   return **cell_;
 }

@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "mjsense/rollout/rollout.h"
+#include "mjsense_tasks/rollout/rollout.h"
 
 namespace mjsense::python {
 
@@ -17,13 +17,13 @@ class TaskView {
  public:
   // Shared by all objects that refer to a rollout. The owner sets the pointer to null when the
   // rollout ends.
-  using Cell = std::shared_ptr<rollout::Rollout*>;
+  using Cell = std::shared_ptr<tasks::rollout::Rollout*>;
   TaskView(Cell cell, std::shared_ptr<SimulationLock> sim_lock)
       : cell_(std::move(cell)), sim_lock_(std::move(sim_lock)) {}
 
-  rollout::Rollout& rollout() const;
-  episode::Task& task() const { return rollout().task(); }
-  const robots::Robot& robot() const { return rollout().task().robot(); }
+  tasks::rollout::Rollout& rollout() const;
+  tasks::episode::Task& task() const { return rollout().task(); }
+  const tasks::robots::Robot& robot() const { return rollout().task().robot(); }
   SimulationLock& sim_lock() const { return *sim_lock_; }
   // Throws ValueError if there is no such world.
   int checked(int world) const;

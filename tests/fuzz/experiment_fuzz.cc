@@ -4,15 +4,15 @@
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
-#include "mjsense/rollout/record_job.h"
+#include "mjsense_tasks/rollout/record_job.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace mjsense;
-  rollout::RecordJobCfg job;
+  tasks::rollout::RecordJobCfg job;
   try {
     app::read_toml_text({reinterpret_cast<const char*>(data), size}, "experiment.toml",
-                        struct_of<rollout::RecordJobCfg>(), &job);
+                        struct_of<tasks::rollout::RecordJobCfg>(), &job);
     check_fields(job, "");  // the fields were also checked while reading
   } catch (const Error& e) {
     if (!std::string_view(e.what()).starts_with("experiment.toml"))

@@ -23,7 +23,6 @@
 #include "mjsense/effects/effect_sensor.h"
 #include "mjsense/effects/noise.h"
 #include "mjsense/effects/timing.h"
-#include "mjsense/rollout/rollout.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
@@ -33,6 +32,7 @@
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 #include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
 #include "mjsense/sim/simulation.h"
+#include "mjsense_tasks/rollout/rollout.h"
 
 namespace mjsense {
 namespace {
@@ -117,7 +117,7 @@ Hashes play(scene::SceneCfg cfg, int steps) {
 
 Hashes pick() {
   unsetenv("MJSENSE_FRANKA_MESHES");
-  rollout::RolloutCfg cfg;
+  tasks::rollout::RolloutCfg cfg;
   cfg.scene = "table";
   cfg.policy = "top_down_planner";
   cfg.num_worlds = 2;
@@ -126,7 +126,7 @@ Hashes pick() {
   cfg.width = 64;
   cfg.height = 48;
   cfg.depth = true;
-  rollout::Rollout rollout(cfg);
+  tasks::rollout::Rollout rollout(cfg);
   const int worlds[] = {0, 1};
   const std::int64_t episodes[] = {0, 7};
   rollout.start(worlds, episodes);
@@ -135,7 +135,7 @@ Hashes pick() {
     add_state(rollout.simulation(), out);
     for (const auto& sensor : rollout.suite().sensors()) add_rows(*sensor, out);
     for (const int w : worlds) {
-      const episode::Evaluation& e = rollout.evaluation(w);
+      const tasks::episode::Evaluation& e = rollout.evaluation(w);
       out["reward"].add(&e.reward, sizeof e.reward);
     }
     rollout.act();

@@ -80,7 +80,7 @@ def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
 
 def test_image_options_are_those_that_the_recorder_gives_to_its_cameras():
     """An option that is added to the recorder is kept by render, whose table follows from the declarations."""
-    source = (Path(__file__).parents[2] / "src/mjsense/rollout/episode_cameras.cc").read_text()
+    source = (Path(__file__).parents[2] / "src/mjsense_tasks/rollout/episode_cameras.cc").read_text()
     given = {option: field for field, option in re.findall(r"out\.(\w+) = cfg\.(\w+);", source)}
     assert render_cameras.image_options() == given and {"shadows", "samples", "shadow_samples"} <= given.keys()
     assert not {"width", "height"} & given.keys()

@@ -28,14 +28,14 @@ RecordOptions read(const std::string& toml) {
   const std::string name = folder.file("experiment.toml");
   std::ofstream(name) << toml;
   RecordOptions options;
-  read_toml(name, struct_of<rollout::RecordJobCfg>(), &options.job);
+  read_toml(name, struct_of<tasks::rollout::RecordJobCfg>(), &options.job);
   return options;
 }
 
 // The options that a file can set, as one text; options that it does not set keep their value.
 std::string text(const RecordOptions& options) {
-  const rollout::RecordJobCfg& job = options.job;
-  const rollout::RolloutCfg& r = job.rollout;
+  const tasks::rollout::RecordJobCfg& job = options.job;
+  const tasks::rollout::RolloutCfg& r = job.rollout;
   std::string cameras = r.cameras ? "" : "all";
   for (const std::string& name : r.cameras.value_or(std::vector<std::string>{}))
     cameras += name + ",";
@@ -128,10 +128,10 @@ TEST(ConfigFile, LettersBeyondAscii) {
     letter += static_cast<char>(c >= 0x800 ? 0x80 | (c >> 6 & 0x3F) : 0xC0 | c >> 6);
     letter += static_cast<char>(0x80 | (c & 0x3F));
     const bool space = spaces.contains(c) || (c >= 0x2000 && c <= 0x200B);
-    rollout::RecordJobCfg job;
+    tasks::rollout::RecordJobCfg job;
     const auto parse = [&] {
       read_toml_text("seed = 1\n" + letter + "task = 'place'", "x",
-                     struct_of<rollout::RecordJobCfg>(), &job);
+                     struct_of<tasks::rollout::RecordJobCfg>(), &job);
     };
     if (space) {
       try {
@@ -140,7 +140,7 @@ TEST(ConfigFile, LettersBeyondAscii) {
       }
     } else {
       EXPECT_THROW(parse(), ValueError) << c;
-      EXPECT_EQ(job.rollout.task, rollout::RecordJobCfg().rollout.task) << c;
+      EXPECT_EQ(job.rollout.task, tasks::rollout::RecordJobCfg().rollout.task) << c;
     }
   }
 }
@@ -151,17 +151,17 @@ TEST(ConfigFile, InvalidHeadersAreErrors) {
        {"+a",   "[+a",    "=", "#",  ".",        ".a",  "a.", "a.+", "a..b",
         ",",    "{",      "'", "\"", "''' a'''", " ",   "\n", "\r",  "\x01",
         "\x7f", "\u00e9", "[", "[[", "a",        "a b", "[a]"}) {
-    rollout::RecordJobCfg job;
-    EXPECT_THROW(
-        read_toml_text("seed = 1\n[" + header, "x", struct_of<rollout::RecordJobCfg>(), &job),
-        ValueError)
+    tasks::rollout::RecordJobCfg job;
+    EXPECT_THROW(read_toml_text("seed = 1\n[" + header, "x",
+                                struct_of<tasks::rollout::RecordJobCfg>(), &job),
+                 ValueError)
         << header;
   }
 }
 
 TEST(Options, Sizes) {
-  rollout::RolloutCfg rollout;
-  read_size(struct_of<rollout::RolloutCfg>(), &rollout, "640x368");
+  tasks::rollout::RolloutCfg rollout;
+  read_size(struct_of<tasks::rollout::RolloutCfg>(), &rollout, "640x368");
   EXPECT_EQ(rollout.width, 640);
   EXPECT_EQ(rollout.height, 368);
 }

@@ -10,11 +10,11 @@
 
 #include "mjsense/app/terminal.h"
 #include "mjsense/app/text_table.h"
-#include "mjsense/robots/load_robot.h"
-#include "mjsense/rollout/registry.h"
-#include "mjsense/rollout/task_defaults.h"
-#include "mjsense/scenes/load_scene.h"
-#include "mjsense/scenes/object_catalogue.h"
+#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/rollout/registry.h"
+#include "mjsense_tasks/rollout/task_defaults.h"
+#include "mjsense_tasks/scenes/load_scene.h"
+#include "mjsense_tasks/scenes/object_catalogue.h"
 
 namespace mjsense::app {
 namespace {
@@ -73,9 +73,9 @@ constexpr struct {
 };
 
 // Packages that entities of a scene come from: "package:<package>/...".
-std::string packages_of(const scenes::SceneFileCfg& scene) {
+std::string packages_of(const tasks::scenes::SceneFileCfg& scene) {
   std::vector<std::string> found;
-  for (const scenes::SceneEntityCfg& entity : scene.entities) {
+  for (const tasks::scenes::SceneEntityCfg& entity : scene.entities) {
     constexpr std::string_view kPrefix = "package:";  // of the model, or of files in its MJCF text
     const std::size_t at = entity.model.find(kPrefix);
     if (at == std::string::npos) continue;
@@ -93,14 +93,15 @@ std::string packages_of(const scenes::SceneFileCfg& scene) {
 
 std::string list_tasks(bool json) {
   std::vector<Line> lines;
-  for (const std::string& name : rollout::task_names()) {
+  for (const std::string& name : tasks::rollout::task_names()) {
     Line line{name, "", ""};
     for (const auto& one : kTasks) {
       if (name == one.name) line = {name, one.what, one.needs};
     }
     if (!line.what.empty())
-      line.needs += fmt::format(" Default: {} in {}.", rollout::default_robot(name),
-                                rollout::default_scene(rollout::task_components(name)[0]));
+      line.needs +=
+          fmt::format(" Default: {} in {}.", tasks::rollout::default_robot(name),
+                      tasks::rollout::default_scene(tasks::rollout::task_components(name)[0]));
     lines.push_back(line);
   }
   return text_of(lines, json);
@@ -108,15 +109,15 @@ std::string list_tasks(bool json) {
 
 std::string list_robots(bool json) {
   std::vector<Line> lines;
-  for (const std::string& name : robots::robot_names())
-    lines.push_back({name, robots::robot_cfg(name).description, ""});
+  for (const std::string& name : tasks::robots::robot_names())
+    lines.push_back({name, tasks::robots::robot_cfg(name).description, ""});
   return text_of(lines, json);
 }
 
 std::string list_scenes(bool json) {
   std::vector<Line> lines;
-  for (const std::string& name : scenes::scene_names()) {
-    const scenes::SceneFileCfg scene = scenes::load_scene(name);
+  for (const std::string& name : tasks::scenes::scene_names()) {
+    const tasks::scenes::SceneFileCfg scene = tasks::scenes::load_scene(name);
     const char* houses = !scene.generator.empty() ? " Each house number gives a different house."
                          : scene.catalogue_count >= 0 ? " Each house number gives other objects."
                                                       : "";
@@ -128,15 +129,16 @@ std::string list_scenes(bool json) {
 std::string list_objects(bool json) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
   Table table{{"name", "kind", "source", "licence", "installed", ""}, "", {}};
-  for (const scenes::CatalogueObjectCfg& object : scenes::object_catalogue().objects) {
-    const scenes::ObjectSourceCfg& source = scenes::source_of(object);
-    const bool installed = scenes::is_installed(object);
+  for (const tasks::scenes::CatalogueObjectCfg& object :
+       tasks::scenes::object_catalogue().objects) {
+    const tasks::scenes::ObjectSourceCfg& source = tasks::scenes::source_of(object);
+    const bool installed = tasks::scenes::is_installed(object);
     std::string note = object.receptacle ? "receptacle" : "";
     if (!object.excluded.empty()) note = "not used: " + object.excluded;
     table.rows.push_back(
         {object.name, object.kind, source.name, source.license, installed ? "yes" : "no", note});
     std::vector<std::string> meshes;
-    for (const scenes::CataloguePartCfg& part : object.parts) meshes.push_back(part.mesh);
+    for (const tasks::scenes::CataloguePartCfg& part : object.parts) meshes.push_back(part.mesh);
     out.push_back({{"name", object.name},
                    {"description", object.text},
                    {"kind", object.kind},

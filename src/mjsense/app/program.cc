@@ -33,9 +33,9 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/system/print_stderr.h"
 #include "mjsense/replay/recording_tools.h"
-#include "mjsense/rollout/registry.h"
 #include "mjsense/scene/mujoco_log.h"
-#include "mjsense/scenes/load_scene.h"
+#include "mjsense_tasks/rollout/registry.h"
+#include "mjsense_tasks/scenes/load_scene.h"
 
 namespace mjsense::app {
 namespace {
@@ -50,8 +50,8 @@ void list_names(CLI::Option* option, const std::vector<std::string>& names) {
 }
 
 void list_names(CLI::App& app) {
-  list_names(app.get_option("--robot"), robots::robot_names());
-  list_names(app.get_option("--policy"), rollout::policy_names());
+  list_names(app.get_option("--robot"), tasks::robots::robot_names());
+  list_names(app.get_option("--policy"), tasks::rollout::policy_names());
 }
 
 // Throws if the words that the command did not expect include an option.
@@ -68,12 +68,12 @@ void throw_unknown_option(const CLI::App& command) {
 
 Choices choices() {
   Choices choices;
-  add_choices(struct_of<rollout::RecordJobCfg>(), choices);
+  add_choices(struct_of<tasks::rollout::RecordJobCfg>(), choices);
   add_choices(struct_of<sensors::LidarSensorCfg>(), choices);
-  choices["--robot"] = robots::robot_names();
-  choices["--policy"] = rollout::policy_names();
-  choices["--scene"] = scenes::scene_names();
-  choices["task"] = choices["what"] = rollout::task_names();
+  choices["--robot"] = tasks::robots::robot_names();
+  choices["--policy"] = tasks::rollout::policy_names();
+  choices["--scene"] = tasks::scenes::scene_names();
+  choices["task"] = choices["what"] = tasks::rollout::task_names();
   choices["shell"] = {"bash", "zsh", "fish"};
   return choices;
 }
@@ -83,9 +83,9 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   list_names(app.add_option("task", options.job.rollout.task, "Name of the task.")
                  ->capture_default_str()
                  ->type_name("TASK"),
-             rollout::task_names());
-  add_field_options(app, struct_of<rollout::RecordJobCfg>(), &options.job, {"task"});
-  add_set_options(app, struct_of<rollout::RecordJobCfg>(), &options.job);
+             tasks::rollout::task_names());
+  add_field_options(app, struct_of<tasks::rollout::RecordJobCfg>(), &options.job, {"task"});
+  add_set_options(app, struct_of<tasks::rollout::RecordJobCfg>(), &options.job);
   list_names(app);
   app.add_option("--config",
                  "TOML file with these options; options on the command line take precedence.")
@@ -150,9 +150,10 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
       app.add_option("what", options.what, "An MJCF file, embedded:FILE, or the name of a task.")
           ->required()
           ->type_name("SCENE.xml|TASK"),
-      rollout::task_names());
-  add_field_options(app, struct_of<rollout::RolloutCfg>(), &options.rollout, {"task", "worlds"});
-  add_set_options(app, struct_of<rollout::RolloutCfg>(), &options.rollout);
+      tasks::rollout::task_names());
+  add_field_options(app, struct_of<tasks::rollout::RolloutCfg>(), &options.rollout,
+                    {"task", "worlds"});
+  add_set_options(app, struct_of<tasks::rollout::RolloutCfg>(), &options.rollout);
   list_names(app);
   app.add_option("--steps", options.steps,
                  "Number of steps over which the cost is measured; 0: do not measure.")
@@ -248,9 +249,9 @@ void read_config_argument(int argc, char** argv, RecordOptions& options) {
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--config" && i + 1 < argc)
-      read_toml(argv[i + 1], struct_of<rollout::RecordJobCfg>(), &options.job);
+      read_toml(argv[i + 1], struct_of<tasks::rollout::RecordJobCfg>(), &options.job);
     if (word.starts_with("--config="))
-      read_toml(word.substr(9), struct_of<rollout::RecordJobCfg>(), &options.job);
+      read_toml(word.substr(9), struct_of<tasks::rollout::RecordJobCfg>(), &options.job);
   }
 }
 

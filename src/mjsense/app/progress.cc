@@ -27,7 +27,7 @@ std::string bytes_text(double bytes) {
                                      : fmt::format("{:.1f} {}", bytes, units[unit]);
 }
 
-std::string progress_text(const rollout::RecordProgress& p) {
+std::string progress_text(const tasks::rollout::RecordProgress& p) {
   const int ended = p.succeeded + p.failed;
   std::string text = fmt::format("{}/{} episodes", p.kept, p.wanted);
   text += ended ? fmt::format("  {:.0f} % success", 100.0 * p.succeeded / ended) : "";
@@ -55,7 +55,7 @@ void StatusLine::show(const std::string& text) {
 ProgressLine::ProgressLine(std::string title, bool quiet)
     : title_(std::move(title)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 
-void ProgressLine::show(const rollout::RecordProgress& progress, int stop_level) {
+void ProgressLine::show(const tasks::rollout::RecordProgress& progress, int stop_level) {
   if (quiet_) return;
   if (!title_.empty()) print_stderr("{}\n", std::exchange(title_, {}));
   text_ = progress_text(progress);

@@ -7,14 +7,14 @@
 #include <chrono>
 #include <string>
 
-#include "mjsense/rollout/record_job.h"
+#include "mjsense_tasks/rollout/record_job.h"
 
 namespace mjsense::app {
 
 class ProgressLine {
  public:
   ProgressLine(std::string title, bool quiet);
-  void show(const rollout::RecordProgress& progress, int stop_level);
+  void show(const tasks::rollout::RecordProgress& progress, int stop_level);
   void finish();  // ends the line and keeps its text
 
  private:
@@ -43,7 +43,7 @@ class StatusLine {
 };
 
 // "3/8 episodes  100 % success  412 steps/s  824 frames/s  0:42 left"
-std::string progress_text(const rollout::RecordProgress& progress);
+std::string progress_text(const tasks::rollout::RecordProgress& progress);
 // "1:05:09", "0:42"
 std::string clock_text(double seconds);
 // "412 B", "3.4 kB", "1.2 MB"

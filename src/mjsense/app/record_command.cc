@@ -17,7 +17,7 @@
 namespace mjsense::app {
 namespace {
 
-rollout::StopFlag stop_flag{0};
+tasks::rollout::StopFlag stop_flag{0};
 
 // Handles Ctrl-C and SIGTERM during its lifetime. The first signal finishes the running episodes,
 // the second discards them, the third exits immediately.
@@ -52,8 +52,8 @@ std::uint64_t bytes_below(const std::filesystem::path& folder) {
 }
 
 // "pick with NAME (the task's robot) in table: 8 episodes into data".
-std::string title(const rollout::RecordJobCfg& job) {
-  const rollout::RolloutCfg cfg = rollout::resolved(job.rollout);
+std::string title(const tasks::rollout::RecordJobCfg& job) {
+  const tasks::rollout::RolloutCfg cfg = tasks::rollout::resolved(job.rollout);
   std::string text = cfg.task;
   if (!cfg.robot.empty()) {
     const bool named = cfg.robot == job.rollout.robot;
@@ -67,7 +67,7 @@ std::string title(const rollout::RecordJobCfg& job) {
 }
 
 // Wall time (s) per stage; the last entry is the remainder.
-std::vector<std::pair<std::string, double>> time_split(const rollout::RecordSummary& s) {
+std::vector<std::pair<std::string, double>> time_split(const tasks::rollout::RecordSummary& s) {
   std::vector<std::pair<std::string, double>> split = {{"policy", s.times.policy + s.times.reset},
                                                        {"physics", s.times.physics},
                                                        {"sensing", s.times.sensing},
@@ -84,8 +84,8 @@ struct Sheet {
   std::string path, shows;
 };
 
-std::string summary_text(const rollout::RecordSummary& s, const Sheet& sheet, bool tree) {
-  const rollout::RecordProgress& p = s.progress;
+std::string summary_text(const tasks::rollout::RecordSummary& s, const Sheet& sheet, bool tree) {
+  const tasks::rollout::RecordProgress& p = s.progress;
   const int ended = p.succeeded + p.failed;
   std::string out;
   if (ended > 0) {
@@ -118,9 +118,9 @@ std::string summary_text(const rollout::RecordSummary& s, const Sheet& sheet, bo
   return out;
 }
 
-std::string summary_json(const rollout::RecordSummary& s, const Sheet& sheet) {
+std::string summary_json(const tasks::rollout::RecordSummary& s, const Sheet& sheet) {
   nlohmann::json out;
-  const rollout::RecordProgress& p = s.progress;
+  const tasks::rollout::RecordProgress& p = s.progress;
   out["kept"] = p.kept;
   out["wanted"] = p.wanted;
   out["attempts"] = p.succeeded + p.failed;
@@ -147,14 +147,14 @@ std::string summary_json(const rollout::RecordSummary& s, const Sheet& sheet) {
 int run_record(const RecordOptions& options) {
   if (options.job.out.empty())
     throw ValueError("record: the output directory is missing: pass --out DIR");
-  const rollout::RecordJobCfg job = rollout::without_shard(options.job);
-  rollout::RecordSummary summary;
+  const tasks::rollout::RecordJobCfg job = tasks::rollout::without_shard(options.job);
+  tasks::rollout::RecordSummary summary;
   {
     const StopOnSignal signals;
     ProgressLine line(title(job), options.quiet);
     try {
-      summary = rollout::record_episodes(
-          job, [&](const rollout::RecordProgress& p) { line.show(p, stop_flag.load()); },
+      summary = tasks::rollout::record_episodes(
+          job, [&](const tasks::rollout::RecordProgress& p) { line.show(p, stop_flag.load()); },
           &stop_flag);
     } catch (...) {
       line.finish();

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/rollout/record_job.h"
+#include "mjsense_tasks/rollout/record_job.h"
 
 namespace mjsense::app {
 
 struct RecordOptions {
-  rollout::RecordJobCfg job;
+  tasks::rollout::RecordJobCfg job;
   bool json = false;
   bool quiet = false;
   bool sheet = true;  // write the contact sheet

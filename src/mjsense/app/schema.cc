@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/fields/fields.h"
-#include "mjsense/rollout/record_job.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/scenes/scene_file.h"
 #include "mjsense/sensors/all_sensors.h"
+#include "mjsense_tasks/rollout/record_job.h"
+#include "mjsense_tasks/scenes/scene_file.h"
 
 namespace mjsense::app {
 namespace {
@@ -173,9 +173,9 @@ const Schema& schema() {
       schema.add(*kind.cfg);
       if (kind.data) schema.add(*kind.data, kind.cfg->kind);
     }
-    schema.add(struct_of<scenes::SceneFileCfg>());
-    schema.add(struct_of<rollout::RecordJobCfg>());
-    schema.add(struct_of<rollout::RolloutCfg>());
+    schema.add(struct_of<tasks::scenes::SceneFileCfg>());
+    schema.add(struct_of<tasks::rollout::RecordJobCfg>());
+    schema.add(struct_of<tasks::rollout::RolloutCfg>());
     return schema;
   }();
   return kSchema;

@@ -82,7 +82,7 @@ void print(const std::vector<Line>& lines, bool json) {
   fmt::print("{}", table.text());
 }
 
-std::vector<Line> task_lines(rollout::Rollout& rollout, int steps) {
+std::vector<Line> task_lines(tasks::rollout::Rollout& rollout, int steps) {
   const int worlds[] = {0};
   const std::int64_t episodes[] = {0};
   rollout.start(worlds, episodes);
@@ -124,9 +124,9 @@ int run_sensors(const SensorsOptions& options) {
     print(scene_lines(simulation, options.steps, options.what), options.json);
     return 0;
   }
-  rollout::RolloutCfg rollout_cfg = options.rollout;
+  tasks::rollout::RolloutCfg rollout_cfg = options.rollout;
   rollout_cfg.task = options.what;
-  rollout::Rollout rollout(rollout_cfg);
+  tasks::rollout::Rollout rollout(rollout_cfg);
   print(task_lines(rollout, options.steps), options.json);
   return 0;
 }

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense_tasks/scenes/generators/surface_finishes.h"
+
+namespace mjsense::tasks::scenes {
+namespace {
+
+constexpr Colour kWoods[] = {{0.72, 0.55, 0.38},
+                             {0.62, 0.44, 0.28},
+                             {0.80, 0.66, 0.48},
+                             {0.47, 0.33, 0.22},
+                             {0.68, 0.57, 0.45}};
+constexpr Colour kPaints[] = {{0.90, 0.89, 0.86}, {0.34, 0.42, 0.40}, {0.30, 0.36, 0.46},
+                              {0.62, 0.66, 0.60}, {0.75, 0.70, 0.62}, {0.86, 0.83, 0.76}};
+constexpr Colour kWalls[] = {{0.88, 0.87, 0.83},
+                             {0.80, 0.84, 0.84},
+                             {0.86, 0.82, 0.74},
+                             {0.78, 0.82, 0.76},
+                             {0.87, 0.84, 0.85}};
+constexpr Colour kTiles[] = {{0.72, 0.70, 0.66}, {0.55, 0.55, 0.55}, {0.70, 0.62, 0.54}};
+
+}  // namespace
+
+Colour pick(Rng& rng, std::span<const Colour> colours) {
+  return colours[rng.below(static_cast<std::uint32_t>(colours.size()))];
+}
+
+Colour wood_colour(Rng& rng) { return brighter(pick(rng, kWoods), rng.uniform(0.9, 1.1)); }
+Colour paint_colour(Rng& rng) { return brighter(pick(rng, kPaints), rng.uniform(0.92, 1.06)); }
+
+void write_shell_finishes(RoomWriter& room, Rng& rng) {
+  if (rng.below(3) > 0) {
+    room.tiled("floor", planks_png(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2,
+               {.specular = 0.15, .shininess = 0.3, .reflectance = 0.04});
+  } else {
+    const Colour tile = pick(rng, kTiles);
+    room.tiled("floor", tiles_png(tile, brighter(tile, 0.7), 3, false, rng.next()), 1.2,
+               {.specular = 0.2, .shininess = 0.4, .reflectance = 0.05});
+  }
+  const Colour wall = pick(rng, kWalls);
+  room.tiled("wall", plaster_png(wall, rng.next()), 1.5, {.specular = 0.03, .shininess = 0.05});
+  room.tiled("ceiling", plaster_png({0.93, 0.93, 0.92}, rng.next()), 1.5,
+             {.specular = 0.0, .shininess = 0.05});
+  room.plain("skirting", {0.92, 0.92, 0.90}, {.specular = 0.15, .shininess = 0.3});
+  room.glowing("lamp_glass", {1.0, 0.98, 0.92}, 0.9);
+  room.glowing("window_pane", {0.25, 0.28, 0.31}, 2.2);
+}
+
+}  // namespace mjsense::tasks::scenes

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense_tasks/scenes/scene_task.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/sim/simulation.h"
+#include "mjsense_tasks/scenes/load_scene.h"
+#include "mjsense_tasks/scenes/robot_floor.h"
+
+namespace mjsense::tasks::scenes {
+
+SceneTask::SceneTask(episode::TaskCfg cfg, std::string_view own_scene)
+    : episode::Task(std::move(cfg)), scene_(task_scene(this->cfg(), own_scene)) {}
+
+void SceneTask::bind(const std::shared_ptr<sim::Simulation>& simulation) {
+  simulation_ = simulation;
+  scene_.bind(*simulation);
+}
+
+void SceneTask::initialize_task() {
+  scene_.initialize(model(), num_worlds(), robot().prefix());
+  // A robot on wheels stands on the ground, not at the height of the scene's pedestal for arms.
+  const std::optional<double> ground = ground_height(model());
+  if (ground && driving_base(robot()) >= 0) scene_.put_robot_at(*ground);
+}
+
+void SceneTask::vary_scene(int world) {
+  const std::shared_ptr<sim::Simulation> simulation = simulation_.lock();
+  if (scene_.vary(world, cfg().seed, static_cast<std::uint64_t>(episode(world))) && simulation)
+    simulation->worlds().model_changed();
+}
+
+mjModel SceneTask::world_model(int world) const {
+  const std::shared_ptr<sim::Simulation> simulation = simulation_.lock();
+  return simulation ? simulation->worlds().model_of(world) : *model();
+}
+
+std::vector<int> SceneTask::adopt_scene(int world, const robots::StateRow& state) {
+  return scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), state);
+}
+
+std::string SceneTask::context() const {
+  return fmt::format("task '{}': scene '{}'", name(), scene_.cfg().name);
+}
+
+}  // namespace mjsense::tasks::scenes
