@@ -56,18 +56,20 @@ if(NOT embree_FOUND)
   mjsense_find(embree 3)
 endif()
 
-# OMPL, for motion planning. Its CMake package is not used, because it requires headers and libraries that Debian does not install
-# with it.
-find_library(OMPL_LIBRARY ompl)
-find_path(OMPL_INCLUDE ompl/config.h PATH_SUFFIXES ompl-1.5 ompl-1.6)
-find_path(EIGEN_INCLUDE Eigen/Core PATH_SUFFIXES eigen3)
-if(NOT OMPL_LIBRARY OR NOT OMPL_INCLUDE OR NOT EIGEN_INCLUDE)
-  mjsense_missing("libompl not found: apt-get install libompl-dev")
-endif()
-if(NOT TARGET ompl::ompl)
-  add_library(ompl::ompl SHARED IMPORTED GLOBAL)
-  set_target_properties(ompl::ompl PROPERTIES IMPORTED_LOCATION ${OMPL_LIBRARY}
-                                              INTERFACE_INCLUDE_DIRECTORIES "${OMPL_INCLUDE};${EIGEN_INCLUDE}")
+# OMPL with Eigen, for the motion planning of mjsense_tasks. Its CMake package is not used, because it requires headers and libraries that
+# Debian does not install with it.
+if(NOT CMAKE_FIND_PACKAGE_NAME STREQUAL "mjsense" OR mjsense_tasks_FOUND)
+  find_library(OMPL_LIBRARY ompl)
+  find_path(OMPL_INCLUDE ompl/config.h PATH_SUFFIXES ompl-1.5 ompl-1.6)
+  find_path(EIGEN_INCLUDE Eigen/Core PATH_SUFFIXES eigen3)
+  if(NOT OMPL_LIBRARY OR NOT OMPL_INCLUDE OR NOT EIGEN_INCLUDE)
+    mjsense_missing("libompl not found: apt-get install libompl-dev")
+  endif()
+  if(NOT TARGET ompl::ompl)
+    add_library(ompl::ompl SHARED IMPORTED GLOBAL)
+    set_target_properties(ompl::ompl PROPERTIES IMPORTED_LOCATION ${OMPL_LIBRARY}
+                                                INTERFACE_INCLUDE_DIRECTORIES "${OMPL_INCLUDE};${EIGEN_INCLUDE}")
+  endif()
 endif()
 
 # The serial HDF5 C library, static, so that a file written here never depends on a user's libhdf5.
@@ -112,7 +114,10 @@ if(NOT MJSENSE_LINKED STREQUAL MJSENSE_LOADED AND EXISTS "${MJSENSE_LOADED}" AND
   string(APPEND CMAKE_CXX_STANDARD_LIBRARIES " ${MJSENSE_LOADED}")
 endif()
 
-set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 embree ompl::ompl mjsense_hdf5 Threads::Threads)
+# What each library links, and all of it.
+set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 embree mjsense_hdf5 Threads::Threads)
+set(MJSENSE_TASKS_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json ompl::ompl)
 if(MJSENSE_STATIC)
   include(StaticLibraries)
 endif()
+set(MJSENSE_ALL_LIBS ${MJSENSE_PRIVATE_LIBS} ${MJSENSE_TASKS_PRIVATE_LIBS})

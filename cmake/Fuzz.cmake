@@ -4,7 +4,7 @@
 if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "MJSENSE_FUZZ needs clang: cmake --preset fuzz")
 endif()
-set(MJSENSE_FUZZ_SOURCES ${MJSENSE_SOURCES})
+set(MJSENSE_FUZZ_SOURCES ${MJSENSE_SOURCES} ${MJSENSE_APP_SOURCES})
 list(FILTER MJSENSE_FUZZ_SOURCES INCLUDE REGEX "/mjsense/(core|hdf5|record|replay)/|/app/(config_file|field_options)\\.cc$|/lidar/npy\\.cc$")
 list(FILTER MJSENSE_FUZZ_SOURCES EXCLUDE REGEX "/(in_child|embedded)\\.cc$")
 set(flags -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
@@ -12,7 +12,7 @@ add_library(mjsense_fuzzed STATIC EXCLUDE_FROM_ALL ${MJSENSE_FUZZ_SOURCES} tests
 target_compile_options(mjsense_fuzzed PUBLIC ${flags} PRIVATE -fsanitize=fuzzer-no-link)
 target_link_options(mjsense_fuzzed PUBLIC ${flags})
 target_include_directories(mjsense_fuzzed PUBLIC src ${PROJECT_SOURCE_DIR})
-target_link_libraries(mjsense_fuzzed PUBLIC mujoco::mujoco ${MJSENSE_PRIVATE_LIBS})
+target_link_libraries(mjsense_fuzzed PUBLIC mujoco::mujoco ${MJSENSE_ALL_LIBS})
 
 set_source_files_properties(src/mjsense/core/fields/toml_value.cc PROPERTIES
                             COMPILE_OPTIONS -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/fuzz/ignored.txt)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Checks that every header compiles without other includes: ninja headers_alone. A source file that includes only this header is
 # generated for each header that is not the first include of an x.cc in the same folder (tools/check_rooms.py).
-file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/src CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.h)
+file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/src CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*.h)
 if(NOT MJSENSE_OPENGL)
   list(FILTER headers EXCLUDE REGEX "/opengl/")
 endif()
@@ -16,6 +16,6 @@ foreach(header IN LISTS headers)
   list(APPEND sources ${source})
 endforeach()
 add_library(headers_alone OBJECT EXCLUDE_FROM_ALL ${sources})
-target_link_libraries(headers_alone PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS} GTest::gtest GTest::gmock)
+target_link_libraries(headers_alone PRIVATE mjsense_tasks ${MJSENSE_ALL_LIBS} GTest::gtest GTest::gmock)
 target_compile_options(headers_alone PRIVATE -O0 -Wall -Wextra -Wno-missing-field-initializers -Wno-unused-function
                                              -Wno-unused-variable)

@@ -25,7 +25,8 @@ mjsense_static(mjsense_static_embree embree ${MJSENSE_STATIC_DIR}/libembree.a)
 mjsense_static(mjsense_static_ompl ompl::ompl ${MJSENSE_STATIC_DIR}/libompl.a)
 mjsense_static(mjsense_static_hdf5 mjsense_hdf5 ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC} ${ZLIB_STATIC} ${CMAKE_DL_LIBS} m)
 set(MJSENSE_PRIVATE_LIBS mjsense_static_fmt nlohmann_json::nlohmann_json mjsense_static_pcre2 mjsense_static_embree
-                         mjsense_static_ompl mjsense_static_hdf5 Threads::Threads)
+                         mjsense_static_hdf5 Threads::Threads)
+set(MJSENSE_TASKS_PRIVATE_LIBS mjsense_static_fmt nlohmann_json::nlohmann_json mjsense_static_ompl)
 
 # Links libstdc++ statically and uses glibc's symbol versions chosen by packaging/libraries.sh.
 set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpath-link,${MJSENSE_STATIC_DIR}/glibc

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Code shared by tests, in folders testing/. Tests of a module may use it from the modules below it.
+# Code shared by tests, in folders testing/ of the first library. Tests of a module may use it from the modules below it.
 file(GLOB_RECURSE shared CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.cc)
 list(FILTER shared INCLUDE REGEX "/testing/[^/]*\\.cc$")
 add_library(mjsense_testing STATIC ${shared})

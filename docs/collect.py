@@ -13,8 +13,8 @@ import re
 from mkdocs.structure.files import File
 
 ROOT = pathlib.Path(__file__).parent.parent
-SOURCE = ROOT / "src" / "mjsense"
-FOLDERS = {"sensors": SOURCE, "robots": ROOT / "models", "tasks": SOURCE, "policies": SOURCE}
+SOURCE, TASKS = ROOT / "src" / "mjsense", ROOT / "src" / "mjsense_tasks"
+FOLDERS = {"sensors": SOURCE, "robots": ROOT / "models", "tasks": TASKS, "policies": TASKS}
 SINGLE = ("effects",)
 FROM_ROOT = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 INTRODUCTIONS = {

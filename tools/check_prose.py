@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 CHECKED = [
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CMakeLists.txt", "src/mjsense", "python", "tests", "tools", "bench", "examples", "docs",
+    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CMakeLists.txt", "src", "python", "tests", "tools", "bench", "examples", "docs",
     "packaging", "models", "cmake", "dev", ".ci", ".github",
 ]  # fmt: skip
 

@@ -54,7 +54,7 @@ NEUTRAL = re.compile(r"\bv\(~[^;]*;|\b(?:throw|static_assert|assert|fail|refuse|
                      r"|\.(?:reserve|shrink_to_fit)\([^;]*;|(?m:^)[ \t]*(?:const )?\w[\w:]* \w+\[\d+\](?:\[\d+\])*")
 # Objects that a header may be part of. To build a mutant of a header is to build all of them.
 MOST_OBJECTS = 12
-INCLUDE = re.compile(r'^#include "(mjsense/[^"]+)"', re.M)
+INCLUDE = re.compile(r'^#include "(mjsense\w*/[^"]+)"', re.M)
 PYTHON_CONDITION = re.compile(r"^\s*(?:if|elif) (.*):$")
 PYTHON_STATEMENT = re.compile(r"^\s*(?!return\b|raise\b|import\b|from\b|yield\b|assert\b|pass\b)[\w.\[\]]+(?: [-+*/]?= .*|\(.*\))$")
 
@@ -71,7 +71,7 @@ def sources(root: Path, room: str) -> list[Path]:
     if room == "python":
         files = [*(root / "python/bindings").rglob("*.cc"), *(root / "python/mjsense").rglob("*.py")]
         return sorted(f for f in files if f.name not in GENERATED)
-    files = [f for f in (root / "src/mjsense" / room).rglob("*") if f.suffix in (".h", ".cc")]
+    files = [f for f in (root / "src").glob(f"*/{room}/**/*") if f.suffix in (".h", ".cc")]
     return sorted(f for f in files if not re.search(r"_(test|bench)\.cc$|/testing/", f.as_posix()))
 
 

@@ -33,16 +33,16 @@ def within(limit: float, tests: list[str], seconds: dict[str, float]) -> list[st
 class Judge:
     def __init__(self, runner, root: Path, build: Path, rooms: list[str], pytests: dict[str, list[str]]) -> None:
         self.runner, self.root, self.build, self.pytests = runner, root, build, pytests
-        self.rooms = [room for room in rooms if any((root / "src/mjsense" / room).rglob("*_test.cc"))]
+        self.rooms = [room for room in rooms if any((root / "src").glob(f"*/{room}/**/*_test.cc"))]
         self.original: dict[str, str] = {}  # hash of each program without a mutant
         self.seconds: dict[str, dict[str, float]] = {}  # program: test: seconds
         self.tests: dict[str, dict[str, str]] = {}  # room: suite: text of the file with its tests
         self.uses: dict[str, set[str]] = {}  # room: what its files include, code and tests
         self.version: dict[str, str] = {}  # room: hash of its tests
         for room in self.rooms:
-            files = list((root / "src/mjsense" / room).rglob("*.cc")) + list((root / "src/mjsense" / room).rglob("*.h"))
+            files = [f for f in (root / "src").glob(f"*/{room}/**/*") if f.suffix in (".cc", ".h")]
             texts = {f: f.read_text() for f in files}
-            self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense/([^"]+)"', text, re.M)}
+            self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense\w*/([^"]+)"', text, re.M)}
             self.tests[room] = {suite: f"{f.parent.relative_to(root)}\n{text}" for f, text in texts.items() if f.name.endswith("_test.cc")
                                 for suite in re.findall(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),", text, re.M)}
 
@@ -72,7 +72,7 @@ class Judge:
 
     def users(self, file: str) -> list[str]:
         """Rooms that use a file's room: those that include its header first, then in the order of the rooms."""
-        room, header = file.split("/")[2], re.sub(r"\.cc$", ".h", file.removeprefix("src/mjsense/"))
+        room, header = file.split("/")[2], re.sub(r"\.cc$", ".h", file.split("/", 2)[2])
         users = [r for r in self.rooms if r != room and any(name.startswith(f"{room}/") for name in self.uses[r])]
         return sorted(users, key=lambda r: header not in self.uses[r])
 

@@ -39,7 +39,7 @@ BUILD = TREE / "build/dev"
 # In the order of docs/architecture.md: dependencies point up this list, so a mistake shows in a room or in one below.
 ROOMS = [*re.findall(r"^\| `(\w+)/", (ROOT / "docs/architecture.md").read_text(), re.M), "python"]
 # Rooms with a test program: those with x_test.cc files, as in cmake/Tests.cmake.
-PROGRAMS = [room for room in ROOMS if any((ROOT / "src/mjsense" / room).rglob("*_test.cc"))]
+PROGRAMS = [room for room in ROOMS if any((ROOT / "src").glob(f"*/{room}/**/*_test.cc"))]
 PYTESTS = {
     "hdf5": ["tests/record"],
     "record": ["tests/record", "tests/program", "tests/faults"],

@@ -19,7 +19,7 @@ from mjsense import commands
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/**/page.md")),
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Module that pages import -> names used of it. Modules that are not installed are replaced by stubs.
@@ -105,7 +105,7 @@ def squeezed(text):
 
 @pytest.mark.parametrize("page", pages("cpp", "cmake"))
 def test_cpp_blocks_are_in_compiled_files(page):
-    files = [*ROOT.glob("examples/cpp/*"), *ROOT.glob("src/mjsense/**/*_test.cc")]
+    files = [*ROOT.glob("examples/cpp/*/*"), *ROOT.glob("src/**/*_test.cc")]
     compiled = "".join(squeezed(f.read_text()) for f in files if f.is_file())
     for line, code in blocks(page, "cpp", "cmake"):
         assert all(squeezed(part) in compiled for part in code.strip().split("\n\n")), f"{page}:{line}"

@@ -32,20 +32,26 @@ def test_example(name, tmp_path):
 
 
 @pytest.mark.skipif(not (BUILD / "CMakeCache.txt").exists(), reason="not imported from a build folder")
-def test_cpp_project(tmp_path):
-    """The installed program runs; examples/cpp finds the installed library, builds, and takes a picture."""
+def test_cpp_projects(tmp_path):
+    """The installed program runs. examples/cpp find the installed libraries and are built: one takes a picture, one records episodes."""
 
     def run(*command):
         env = {k: v for k, v in os.environ.items() if k != "LD_LIBRARY_PATH"}
         done = subprocess.run([str(c) for c in command], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
 
     run("cmake", "--install", BUILD, "--prefix", "installed")
     headers = {str(h.relative_to(tmp_path / "installed/include")) for h in (tmp_path / "installed/include").rglob("*.h")}
     assert headers == set(PUBLIC)
     run("installed/bin/mjsense", "sensors", EXAMPLES.parent / "models/robots/quadruped.xml")
-    run("cmake", "-S", EXAMPLES / "cpp", "-B", "build", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}")
-    run("cmake", "--build", "build")
-    run("build/sees", EXAMPLES.parent / "bench" / "gallery.xml", "front")
+    for name in ("sees", "records"):
+        run("cmake", "-S", EXAMPLES / "cpp" / name, "-B", name, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}")
+        run("cmake", "--build", name)
+    assert "OMPL" not in (tmp_path / "sees/CMakeCache.txt").read_text(), "the first library needs OMPL"
+    run("sees/sees", EXAMPLES.parent / "bench" / "gallery.xml", "front")
     header, pixels = (tmp_path / "front.ppm").read_bytes().split(b"255\n", 1)
     assert header == b"P6 320 240 " and len(pixels) == 3 * 320 * 240 and len(set(pixels)) > 100
+    printed = run("records/records", "recording")
+    assert printed.startswith("2 episodes, ") and "intact: 1 files, 2 episodes" in printed
+    assert len(list((tmp_path / "recording/house_0").glob("*.h5"))) == 1

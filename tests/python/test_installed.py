@@ -7,24 +7,30 @@ from pathlib import Path
 from mjsense import _libmujoco
 
 ROOT = Path(__file__).parents[2]
-PUBLIC = re.findall(r"^  (mjsense/\S+\.h)$", (ROOT / "cmake/PublicHeaders.cmake").read_text(), re.MULTILINE)
+UMBRELLAS = ("mjsense/mjsense.h", "mjsense_tasks/mjsense_tasks.h")
+PUBLIC = re.findall(r"^  (mjsense\S+\.h)$", (ROOT / "cmake/PublicHeaders.cmake").read_text(), re.MULTILINE)
 
 
 def includes(header):
-    return re.findall(r'^#\s*include\s+["<](mjsense/[^">]+)[">]', (ROOT / "src" / header).read_text(), re.MULTILINE)
+    return re.findall(r'^#\s*include\s+["<](mjsense(?:_tasks)?/[^">]+)[">]', (ROOT / "src" / header).read_text(), re.MULTILINE)
 
 
 def test_public_headers_include_public_headers_only():
-    assert sorted(set(PUBLIC), key=lambda h: (h != "mjsense/mjsense.h", h)) == PUBLIC
+    assert sorted(set(PUBLIC), key=lambda h: (h not in UMBRELLAS, h)) == PUBLIC
     for header in PUBLIC:
+        if header.startswith("mjsense/"):
+            assert not [i for i in includes(header) if i.startswith("mjsense_tasks/")], f"{header} includes headers of the second library"
         private = [i for i in includes(header) if i not in PUBLIC]
         assert not private, f"{header} includes what is not installed: {private} (cmake/PublicHeaders.cmake)"
         libraries = set(re.findall(r"^#\s*include\s+<([a-z0-9_]+)/", (ROOT / "src" / header).read_text(), re.MULTILINE))
         assert libraries <= {"mujoco"}, f"{header} includes a library that users need not have: {libraries}"
 
 
-def test_umbrella_header_includes_every_public_header():
-    assert ["mjsense/mjsense.h", *includes("mjsense/mjsense.h")] == PUBLIC
+def test_umbrella_headers_include_every_public_header():
+    sensing, tasks = map(includes, UMBRELLAS)
+    assert all(header.startswith("mjsense/") for header in sensing)
+    assert tasks[0] == UMBRELLAS[0]
+    assert [*UMBRELLAS, *sensing, *tasks[1:]] == PUBLIC
 
 
 def test_one_series_of_mujoco():

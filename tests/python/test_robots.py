@@ -117,7 +117,7 @@ def test_no_code_knows_a_robot_by_its_name():
         ("task_defaults.cc", '{"nav_and_pick", "mobile_franka", 1200, 0, 0, 0},'),
         ("rollout.h", '"the meshes if the robot\'s environment variable (``MJSENSE_FRANKA_MESHES``) names their "'),
     }
-    for path in (ROOT / "src/mjsense").rglob("*"):
+    for path in (ROOT / "src").rglob("*"):
         if path.suffix not in (".h", ".cc") or path.name.endswith(("_test.cc", "_bench.cc")) or "testing" in path.parts:
             continue
         for line in path.read_text().splitlines():
