@@ -36,6 +36,8 @@ Where to look (``help(mjs.Simulation)`` and so on):
 ``python -m mjsense --help`` is the program.
 """
 
+import typing as _typing
+
 from mjsense import _libmujoco
 
 _libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses
@@ -89,6 +91,7 @@ from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
+from mjsense.errors import did_you_mean as _did_you_mean
 from mjsense.export import (
     export_lerobot,
     export_lerobot21,
@@ -122,6 +125,11 @@ from mjsense.view.viewer import Viewer
 assets.name_package_folders()
 
 _gymnasium.register_all()
+
+if not _typing.TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        raise AttributeError(f"module 'mjsense' has no attribute '{name}'{_did_you_mean(name, __all__)}")
 
 # fmt: off
 __all__ = [

@@ -19,6 +19,7 @@ from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
 from mjsense._written_values import numbers
 from mjsense.assets import use_installed_meshes
+from mjsense.errors import did_you_mean
 from mjsense.native_sensor import box_of
 from mjsense.scene import Scene
 from mjsense.simulation import Simulation, warp_module
@@ -270,6 +271,8 @@ class TaskVectorEnv(VectorEnv):
         """Actions of the policy given to ``make_vec(..., policy="planner")`` for the current state, ``[num_envs, n]``; sets
         ``expert_done``."""
         self._check_open()
+        if not self._has_policy:
+            raise ValueError("expert_action(): the environment has no policy: make it with policy='planner', or another one")
         self._rollout.act()
         actions, done = self._rollout.actions()
         self.expert_done = np.array(done, bool)
@@ -338,7 +341,7 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
         return mode
     words = [known.name.lower() for known in AutoresetMode]
     if mode not in words:
-        raise ValueError(f"autoreset_mode must be one of {', '.join(words)}, not {mode!r}")
+        raise ValueError(f"autoreset_mode must be one of {', '.join(words)}, not {mode!r}{did_you_mean(mode, words)}")
     return AutoresetMode[mode.upper()]
 
 
