@@ -18,9 +18,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from mjsense.export import Source
 
 import mjsense as mjs
+from mjsense.exporting import Source
 
 ROOT = Path(__file__).parents[1]
 REPEATS = 4  # of each episode in an export, whose beginning takes as long as 16 episodes

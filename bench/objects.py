@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mjsense._png import png_of
-from mjsense.assets import name_package_folders
 
 import mjsense as mjs
 from mjsense import _core
+from mjsense.core.png import png_of
+from mjsense.tasks.assets import name_package_folders
 
 SCENE = """
 name = "one_object"

@@ -11,9 +11,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from mjsense.export import record_lerobot
-
 import mjsense as mjs
+from mjsense.exporting import record_lerobot
 
 ARGUMENTS: dict[str, Any] = dict(task="pick", horizon=80, keep_failures=True, worlds=2, threads=1, seed=5, format="lerobot", progress=False)
 used = 0.0

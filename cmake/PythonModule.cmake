@@ -27,7 +27,7 @@ add_custom_target(mjsense_python_hdf5 DEPENDS ${MJSENSE_PY_HDF5})
 add_dependencies(mjsense_python mjsense_python_hdf5)
 
 # The extension needs libmj_mjsense.so, a copy of libmujoco under a name of its own (cmake/private_mujoco.py). Where the environment's
-# mujoco is of the same series, mjsense/_libmujoco.py loads that one's libmujoco and shared/libmj_mjsense.so, an empty library of the same
+# mujoco is of the same series, mjsense/core/libmujoco.py loads that one's libmujoco and shared/libmj_mjsense.so, an empty library of the same
 # name, before the extension: the dynamic linker then takes the functions from the libmujoco that `import mujoco` uses.
 set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
 set(MJSENSE_PY_LIB ${MJSENSE_PY_DIR}/_lib)

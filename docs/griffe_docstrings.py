@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Griffe extension: turns the reStructuredText marks of our docstrings (roles, double backticks, `::`) into Markdown, gives the
-configurations (`mjsense._dataclass`) the signature that their fields make, and shows components of the state (`_State("text")`) as arrays.
+configurations (`mjsense.core.lazy_dataclass`) the signature that their fields make, and shows components of the state (`_State("text")`) as arrays.
 Members of a private base class in the same module are shown as those of the class."""
 
 import copy

@@ -43,14 +43,14 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from mjsense import _config_methods
-from mjsense._dataclass import dataclass
-from mjsense._field_docs import show_field_docs
+from mjsense.sensors import config_methods
+from mjsense.core.lazy_dataclass import dataclass
+from mjsense.core.field_docs import show_field_docs
 
 if TYPE_CHECKING:
     import mujoco
 
-    from mjsense.effects import Effect
+    from mjsense.sensors.effects import Effect
 ''',
     "effects": '''# SPDX-License-Identifier: Apache-2.0
 """Effects: errors of real sensors. An effect sensor applies them in this order to the rows of a sensor of the scene, in the unit
@@ -72,10 +72,10 @@ from collections.abc import Sequence
 from dataclasses import field
 from typing import ClassVar, Literal
 
-from mjsense import _config_methods
-from mjsense._dataclass import dataclass
-from mjsense._field_docs import show_field_docs
-from mjsense.configs import SensorCfg
+from mjsense.sensors import config_methods
+from mjsense.core.lazy_dataclass import dataclass
+from mjsense.core.field_docs import show_field_docs
+from mjsense.sensors.configs import SensorCfg
 ''',
 }
 
@@ -92,8 +92,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjsense._field_docs import show_field_docs
-from mjsense._sensor_data import SensorData, make_data
+from mjsense.core.field_docs import show_field_docs
+from mjsense.core.sensor_data import SensorData, make_data
 '''
 
 # Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).

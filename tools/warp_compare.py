@@ -11,10 +11,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from mjsense._arrays import on_host
 from warp_scenes import STATE, OfTask, SceneOfCheck
 
 import mjsense as mjs
+from mjsense.core.arrays import on_host
 
 FORCES = ("N", "N m", "m/s^2", "rad/s^2")
 """Units of quantities that depend on the constraint solver, whose tolerance is larger than the rounding of float32."""

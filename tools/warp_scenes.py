@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import mjsense as mjs
-from mjsense import effects
+from mjsense.sensors import effects
 
 STATE = ("qpos", "qvel", "act", "mocap_pos", "mocap_quat")
 

@@ -35,8 +35,9 @@ def judge(task, act, worlds=128, steps=500):
 
 def with_rsl(task, env):
     """(policy, what trains it for some iterations)"""
-    from mjsense.rl.rsl import RslRlVecEnv
     from rsl_rl.runners import OnPolicyRunner
+
+    from mjsense.tasks.rl.rsl import RslRlVecEnv
 
     torch.manual_seed(0)
     net = {"class_name": "MLPModel", "hidden_dims": (256, 128, 64), "activation": "elu", "obs_normalization": True}
@@ -63,9 +64,10 @@ def with_rsl(task, env):
 
 def with_sb3(task, env):
     """(policy, what trains it for some iterations)"""
-    from mjsense.rl.sb3 import SB3VecEnv
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecNormalize
+
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     worlds = VecNormalize(SB3VecEnv(env, action_mean=task.stand, action_scale=SCALE), norm_reward=False)
     worlds.action_space = type(worlds.action_space)(-10, 10, worlds.action_space.shape, np.float32)  # servos have limits of their own

@@ -16,7 +16,7 @@
 namespace mjsense::python {
 namespace {
 
-// Translates to mjsense.errors.UnknownNameError, a KeyError whose text is printed without quotes.
+// Translates to mjsense.core.errors.UnknownNameError, a KeyError whose text is printed without quotes.
 void translate(const std::exception_ptr& error, void*) {
   try {
     std::rethrow_exception(error);
@@ -33,7 +33,7 @@ void translate(const std::exception_ptr& error, void*) {
         PyErr_SetString(PyExc_RuntimeError, what.c_str());
         break;
       case ErrorKind::kKey:
-        PyErr_SetString(nb::module_::import_("mjsense.errors").attr("UnknownNameError").ptr(),
+        PyErr_SetString(nb::module_::import_("mjsense.core.errors").attr("UnknownNameError").ptr(),
                         what.c_str());
         break;
     }

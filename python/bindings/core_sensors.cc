@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of the core suite's sensors. python/mjsense/core_sensors.py defines their public
+// Bindings of the core suite's sensors. python/mjsense/sensors/core_sensors.py defines their public
 // classes, which resolve names.
 
 #include <nanobind/nanobind.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks that the libmujoco loaded by Python is the one this extension was compiled for. The
-// extension is not linked to a file name (mjsense/_libmujoco.py loads the installed library), so it
+// extension is not linked to a file name (mjsense/core/libmujoco.py loads the installed library), so it
 // compares the layouts of the structs that both use.
 
 #include <mujoco/mjbatch.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the fields of MuJoCo's structs are, for the views of python/mjsense/_mujoco.py: MjModel and MjData without the mujoco package.
+// Where the fields of MuJoCo's structs are, for the views of python/mjsense/core/mujoco_names.py: MjModel and MjData without the mujoco package.
 
 #include <mujoco/mjxmacro.h>
 #include <mujoco/mujoco.h>

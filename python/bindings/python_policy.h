@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Adapter of a policy written in Python (mjsense.Policy, python/mjsense/policy.py) for a rollout.
+// Adapter of a policy written in Python (mjsense.Policy, python/mjsense/tasks/policy.py) for a rollout.
 // It is called once per step for all worlds, or once per chunk of actions.
 
 #include <memory>

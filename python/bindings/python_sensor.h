@@ -51,7 +51,7 @@ PythonSensorSpec read_python_spec(nb::handle sensor);
 SensorSpec read_row_spec(nb::handle field);
 
 // Calls _mjs_edit_spec(), _mjs_compute_rows(ids, seeds), _mjs_control_step(ids, dt, seeds) and
-// _mjs_reset(ids, seeds) of a mjsense.Sensor (python/mjsense/sensor.py). The seeds are for random
+// _mjs_reset(ids, seeds) of a mjsense.Sensor (python/mjsense/sensors/sensor.py). The seeds are for random
 // numbers drawn in each of these worlds. The Python simulation calls its initialize(sim) once it is
 // created. Any thread may call and destroy this object; it acquires the GIL where necessary.
 class PythonSensor final : public Sensor, public ControlStepListener {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Adapter of a task written in Python (mjsense.Task, python/mjsense/task.py) for a rollout. Python
+// Adapter of a task written in Python (mjsense.Task, python/mjsense/tasks/task.py) for a rollout. Python
 // is called once per step for all worlds, and at the start of an episode.
 
 #include <map>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of the recorder for user-defined loops. python/mjsense/recorder.py defines the public
+// Bindings of the recorder for user-defined loops. python/mjsense/recording/recorder.py defines the public
 // class.
 
 #include "mjsense/record/recorder.h"

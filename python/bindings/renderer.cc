@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of images of abstract scenes. python/mjsense/renderer.py defines the public class, which
+// Bindings of images of abstract scenes. python/mjsense/rendering/renderer.py defines the public class, which
 // lets only one thread at a time call a renderer.
 
 #include <nanobind/nanobind.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of scenes. python/mjsense/scene.py defines the public class.
+// Bindings of scenes. python/mjsense/scene/scene.py defines the public class.
 
 #include "python/bindings/scene.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of simulations. python/mjsense/simulation.py defines the public class.
+// Bindings of simulations. python/mjsense/sim/simulation.py defines the public class.
 
 #include "mjsense/sim/simulation.h"
 

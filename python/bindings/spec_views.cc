@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mjSpec for the views of python/mjsense/_spec.py: a scene's spec without the mujoco package.
+// mjSpec for the views of python/mjsense/core/spec_views.py: a scene's spec without the mujoco package.
 
 #include <mujoco/mjspecmacro.h>
 #include <mujoco/mujoco.h>

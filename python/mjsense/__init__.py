@@ -30,7 +30,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
-    trainers                     mjsense.rl.sb3, mjsense.rl.rsl
+    trainers                     mjsense.tasks.rl.sb3, mjsense.tasks.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
 
 ``python -m mjsense --help`` is the program.
@@ -38,36 +38,18 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
 import typing as _typing
 
-from mjsense import _libmujoco
+from mjsense.core import libmujoco
 
-_libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses
+libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses
 
 from mjsense import _core
 
 _core.leave_no_log_file()
 
-from mjsense import _gymnasium, assets, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
-from mjsense._recording import RecordProgress, RecordSummary
-from mjsense._user_code import SensorError
-from mjsense.attach import Attached, attach
-from mjsense.configs import *  # noqa: F403
-from mjsense.contact import ContactSensor
-from mjsense.core_sensors import (
-    CameraImageSensor,
-    CameraParameterSensor,
-    EnvStatesSensor,
-    FunctionSensor,
-    GraspStateSensor,
-    ImagePointsSensor,
-    JointPositionSensor,
-    JointVelocitySensor,
-    PoseSensor,
-    RobotBasePoseSensor,
-    TcpPoseSensor,
-)
-from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
+from mjsense.core.errors import UnknownNameError
+from mjsense.core.errors import did_you_mean as _did_you_mean
 from mjsense.dataset import (
     Dataset,
     Deviation,
@@ -87,12 +69,7 @@ from mjsense.dataset import (
 from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
 from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
-from mjsense.drawing import DebugShapes
-from mjsense.effects import EffectSensorCfg
-from mjsense.env import TaskEnv, make
-from mjsense.errors import UnknownNameError
-from mjsense.errors import did_you_mean as _did_you_mean
-from mjsense.export import (
+from mjsense.exporting import (
     export_lerobot,
     export_lerobot21,
     export_mcap,
@@ -101,30 +78,54 @@ from mjsense.export import (
     export_robomimic,
     export_zarr,
 )
-from mjsense.imu import ImuSensor
-from mjsense.native_sensor import BuiltinSensor, NativeSensor
-from mjsense.pipeline import ObservationPipeline
-from mjsense.plot import plot
-from mjsense.policy import Policy, policy_names, register_policy
-from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.record import record
-from mjsense.record_episodes import RecordEpisodes, RecordVectorEpisodes
-from mjsense.recorder import Recorder
-from mjsense.renderer import Renderer
-from mjsense.robot import MoveGroup, Robot, RobotCamera
-from mjsense.scene import Entity, Scene
-from mjsense.sensor import Sensor
-from mjsense.simulation import Simulation
-from mjsense.suite import SensorSuite
-from mjsense.task import Task, WorldState, register_task, task_names
-from mjsense.teleoperation import Teleoperation, play
-from mjsense.vector import TaskVectorEnv, make_vec
-from mjsense.view import view
-from mjsense.view.viewer import Viewer
+from mjsense.recording.record_episodes import RecordEpisodes, RecordVectorEpisodes
+from mjsense.recording.recorder import Recorder
+from mjsense.rendering.renderer import Renderer
+from mjsense.scene.scene import Entity, Scene
+from mjsense.sensors import configs, effects, observations
+from mjsense.sensors.configs import *  # noqa: F403
+from mjsense.sensors.contact import ContactSensor
+from mjsense.sensors.core_sensors import (
+    CameraImageSensor,
+    CameraParameterSensor,
+    EnvStatesSensor,
+    FunctionSensor,
+    GraspStateSensor,
+    ImagePointsSensor,
+    JointPositionSensor,
+    JointVelocitySensor,
+    PoseSensor,
+    RobotBasePoseSensor,
+    TcpPoseSensor,
+)
+from mjsense.sensors.data import CameraData, ContactData, ImuData, RayCastData, SensorData
+from mjsense.sensors.drawing import DebugShapes
+from mjsense.sensors.effects import EffectSensorCfg
+from mjsense.sensors.imu import ImuSensor
+from mjsense.sensors.native_sensor import BuiltinSensor, NativeSensor
+from mjsense.sensors.pipeline import ObservationPipeline
+from mjsense.sensors.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.sensors.sensor import Sensor
+from mjsense.sensors.suite import SensorSuite
+from mjsense.sensors.user_code import SensorError
+from mjsense.sim.attached import Attached, attach
+from mjsense.sim.simulation import Simulation
+from mjsense.tasks import assets, gymnasium_registry
+from mjsense.tasks.env import TaskEnv, make
+from mjsense.tasks.policy import Policy, policy_names, register_policy
+from mjsense.tasks.record_job import RecordProgress, RecordSummary
+from mjsense.tasks.recording import record
+from mjsense.tasks.robot import MoveGroup, Robot, RobotCamera
+from mjsense.tasks.task import Task, WorldState, register_task, task_names
+from mjsense.tasks.teleoperation import Teleoperation, play
+from mjsense.tasks.vector import TaskVectorEnv, make_vec
+from mjsense.viewer import view
+from mjsense.viewer.plots import plot
+from mjsense.viewer.viewer import Viewer
 
 assets.name_package_folders()
 
-_gymnasium.register_all()
+gymnasium_registry.register_all()
 
 if not _typing.TYPE_CHECKING:
 

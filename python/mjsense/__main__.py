@@ -8,10 +8,10 @@ import signal
 import sys
 
 from mjsense import _core, commands
-from mjsense.assets import use_installed_files
 from mjsense.cluster import program as cluster
 from mjsense.cluster import tools
 from mjsense.commands import quality, record_format
+from mjsense.tasks.assets import use_installed_files
 
 
 def main() -> int:

@@ -16,10 +16,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from mjsense.pipeline import ObservationPipeline
 
 import mjsense as mjs
-from mjsense import observations
+from mjsense.sensors import observations
+from mjsense.sensors.pipeline import ObservationPipeline
 
 KINDS = {
     "builtin": mjs.BuiltinSensorCfg,

@@ -73,7 +73,7 @@ SEEDS = {
 def words(name: str) -> list[str]:
     """The dictionary of a target: keys of experiment files, names of MP4 boxes and similar."""
     if name == "experiment":
-        fields = (ROOT / "python/mjsense/configs.py").read_text()
+        fields = (ROOT / "python/mjsense/sensors/configs.py").read_text()
         return sorted(set(re.findall(r"^    (\w+):", fields, re.MULTILINE))) + ["true", "false", "inf", "nan", "0x", "'''", '"""', "[[", "no_"]
     if name == "npy":
         return ["\\x93NUMPY\\x01\\x00", "'descr': ", "'fortran_order': ", "'shape': (", "'<f8'", "'<f4'", "False", "9223372036854775807"]

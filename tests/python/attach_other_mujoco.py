@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 import mjsense as mjs
-from mjsense import _foreign_model
+from mjsense.sim import foreign_model
 
 MODEL = """
 <mujoco>
@@ -92,7 +92,7 @@ for step in range(200):
         assert abs(attached["feet"].data.current_air_time[world, 0] - air[world]) < 1e-6
 assert 20 < contacts < 380
 if hasattr(model, "M_rownnz"):
-    for name, value in _foreign_model._sparse_matrices(model).items():
+    for name, value in foreign_model._sparse_matrices(model).items():
         np.testing.assert_array_equal(value, getattr(model, name), name)
 position = max(worst[n] for n in ("pos", "quat", "angle", "length", "range", "com", "distance", "clock"))
 velocity = max(worst[n] for n in ("gyro", "speed", "rate"))
@@ -115,7 +115,7 @@ if not mujoco.mj_versionString().startswith("4.0"):
     else:
         raise AssertionError("a model with flexes was attached")
     try:
-        _foreign_model._refuse_unknown(types.SimpleNamespace(geom_smell=np.ones(3)), attached.simulation.model, "5.0")
+        foreign_model._refuse_unknown(types.SimpleNamespace(geom_smell=np.ones(3)), attached.simulation.model, "5.0")
     except ValueError as error:
         assert "the model of MuJoCo 5.0 has geom_smell, which mjsense's MuJoCo 4.0 does not know" in str(error), error
     else:

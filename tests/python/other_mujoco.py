@@ -18,7 +18,8 @@ import gymnasium
 import numpy as np
 from tasks import Cart, Driver
 
-from mjsense import _core, _libmujoco
+from mjsense import _core
+from mjsense.core import libmujoco
 
 seen = hashlib.sha256()
 
@@ -71,7 +72,7 @@ see(model.geom_friction, model.opt.gravity, model.opt.timestep, model.vis.global
     data.efc_force, data.contact.dist, data.contact[0].pos, data.joint(1).qpos, data.sensordata)  # fmt: skip
 
 shared = "mujoco" in sys.modules and sys.modules["mujoco"].mj_versionString().startswith("4.0")
-assert (_libmujoco.shared is not None) == shared, _libmujoco.why_not_shared
+assert (libmujoco.shared is not None) == shared, libmujoco.why_not_shared
 if order != "alone":
     # The MuJoCo of the environment continues to work with its own objects.
     own = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>")

@@ -106,7 +106,7 @@ WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5],
 def test_argument_errors_do_not_mention_bindings(cls, live):
     objects, _sim = live
     if cls not in objects:
-        core = cls.__module__ == "mjsense.core_sensors"  # NativeSensors, made of a simulation's robot
+        core = cls.__module__ == "mjsense.sensors.core_sensors"  # NativeSensors, made of a simulation's robot
         assert core or cls in (mjs.NativeSensor, mjs.BuiltinSensor), "give the fixture an object of it"
         return
     for function in methods_of(cls):

@@ -4,7 +4,8 @@ import os
 
 import pytest
 
-from mjsense import _core, assets
+from mjsense import _core
+from mjsense.tasks import assets
 
 
 @pytest.fixture

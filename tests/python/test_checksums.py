@@ -10,9 +10,8 @@ from edited_recordings import changed, file_of
 
 pytest.importorskip("av")
 
-from mjsense.export import export_lerobot, export_robomimic
-
 import mjsense as mjs
+from mjsense.exporting import export_lerobot, export_robomimic
 
 CAMERA = "wrist_camera"
 

@@ -8,12 +8,12 @@ import zipfile
 import mujoco
 import numpy as np
 import pytest
-from mjsense._png import png_of
+
+import mjsense as mjs
+from mjsense.core.png import png_of
 from mjsense.dataset import archive
 from mjsense.dataset.closed_model import check_archive, closed_model, compile_closed
 from mjsense.dataset.model_sizes import MAX_PIXELS
-
-import mjsense as mjs
 
 MODEL = "<mujoco><asset>{}</asset><worldbody><body name='b'><joint/><geom size='.1'/>{}</body></worldbody></mujoco>"
 OBJ = b"v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

@@ -17,11 +17,10 @@ import pytest
 pytest.importorskip("ray", reason="Ray is not installed")
 h5py = pytest.importorskip("h5py")
 
+import mjsense as mjs
 from mjsense.cluster import Job, export_on_ray, exporting, record_on_ray, render_on_ray, tasks
 from mjsense.cluster import driver as driver_module
 from mjsense.cluster.job import Shard, ShardResult
-
-import mjsense as mjs
 
 ARGUMENTS = {"task": "pick", "horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5}
 EPISODES, ATTEMPTS = 6, 2
@@ -140,7 +139,7 @@ class TestExport:
     def test_it_equals_that_of_one_process(self, format, library, index, tmp_path, monkeypatch):
         pytest.importorskip(library, reason=f"needs {library}")
         monkeypatch.setattr(exporting, "_CHUNK", 2)  # three parts
-        monkeypatch.setattr("mjsense.export.rlds._SHARD_BYTES", 50_000)
+        monkeypatch.setattr("mjsense.exporting.rlds._SHARD_BYTES", 50_000)
         shown = []
         (tmp_path / "ray").mkdir()
         ours = export_on_ray(format, index, tmp_path / "ray/data", progress=lambda *now: shown.append(now))

@@ -23,7 +23,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Module that pages import -> names used of it. Modules that are not installed are replaced by stubs.
-OTHERS: dict[str, list[str]] = {"matplotlib": ["matplotlib.pyplot"], "rerun": [], "stable_baselines3": ["mjsense.rl.sb3"], "torch": []}
+OTHERS: dict[str, list[str]] = {"matplotlib": ["matplotlib.pyplot"], "rerun": [], "stable_baselines3": ["mjsense.tasks.rl.sb3"], "torch": []}
 EXPORT_LIBRARIES = {"lerobot": "pyarrow", "lerobot21": "pyarrow", "rlds": "google_crc32c", "zarr": "zarr", "rerun": "rerun", "mcap": "mcap_protobuf"}
 MISSING = [name for name in OTHERS if importlib.util.find_spec(name) is None]
 SHORT = ["--episodes", "1", "--horizon", "2", "--keep-failures", "--size", "64x48", "-q", "--no-sheet"]  # of recordings

@@ -4,7 +4,7 @@ import pytest
 from scenes import ball_scene
 
 import mjsense as mjs
-from mjsense import effects
+from mjsense.sensors import effects
 
 
 def simulation(*chain, worlds=3, decimation=5, **kwargs):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense.export: the files of LeRobot's formats, read with PyArrow and PyAV. test_lerobot.py reads them with LeRobot."""
+"""mjsense.exporting: the files of LeRobot's formats, read with PyArrow and PyAV. test_lerobot.py reads them with LeRobot."""
 
 import contextlib
 import json
@@ -15,14 +15,14 @@ pytest.importorskip("av")
 pq = pytest.importorskip("pyarrow.parquet")
 
 import av
-from mjsense.dataset import statistics
-from mjsense.export import Mapping, Source, frame_statistics, lerobot, lerobot_depth, lerobot_files, mapping
-from mjsense.export.mapping import _filled
-from mjsense.export.output import new_output
-from mjsense.export.remux import Concatenation
 
 import mjsense as mjs
 from mjsense import commands
+from mjsense.dataset import statistics
+from mjsense.exporting import Mapping, Source, frame_statistics, lerobot, lerobot_depth, lerobot_files, mapping
+from mjsense.exporting.mapping import _filled
+from mjsense.exporting.output import new_output
+from mjsense.exporting.remux import Concatenation
 
 SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
 

@@ -13,16 +13,16 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
-from mjsense._png import png_of
-from mjsense._rotations import quaternions_of
-from mjsense.dataset.model_xml import model_xml
-from mjsense.dataset.playback import Stepper
-from mjsense.export import FORMATS, Source
-from mjsense.export import zarr as zarr_format
-from mjsense.export.images import depth_unit, to_uint16
-from mjsense.export.scene import bodies
 
 import mjsense as mjs
+from mjsense.core.png import png_of
+from mjsense.core.rotations import quaternions_of
+from mjsense.dataset.model_xml import model_xml
+from mjsense.dataset.playback import Stepper
+from mjsense.exporting import FORMATS, Source
+from mjsense.exporting import zarr as zarr_format
+from mjsense.exporting.images import depth_unit, to_uint16
+from mjsense.exporting.scene import bodies
 
 ROOT = Path(__file__).parents[2]
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION

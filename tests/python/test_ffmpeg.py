@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from mjsense import ffmpeg
+from mjsense.recording import ffmpeg
 
 
 def frames_of(video, options, output, max_bytes):
@@ -97,7 +97,7 @@ def test_ctrl_c(fake):
 
 
 def test_without_ffmpeg(tmp_path):
-    code = "import pathlib; from mjsense.ffmpeg import frames_of; file = open('x.mp4'); frames_of(pathlib.Path('x.mp4'), file.fileno(), [], [], 10)"
+    code = "import pathlib; from mjsense.recording.ffmpeg import frames_of; file = open('x.mp4'); frames_of(pathlib.Path('x.mp4'), file.fileno(), [], [], 10)"
     environment = {**os.environ, "PATH": str(tmp_path), "MJSENSE_FFMPEG": str(tmp_path / "none")}
     (tmp_path / "x.mp4").write_bytes(b"")
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)

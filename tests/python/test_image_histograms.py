@@ -11,11 +11,10 @@ import pytest
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
-from mjsense.dataset import Episode, statistics
-from mjsense.export import frame_statistics
-from mjsense.export.frame_statistics import image_histograms
-
 import mjsense as mjs
+from mjsense.dataset import Episode, statistics
+from mjsense.exporting import frame_statistics
+from mjsense.exporting.frame_statistics import image_histograms
 
 HEIGHT, WIDTH, STEP, LENGTH = 46, 332, 3, 25  # every third row and column: 111 of 332 columns
 

@@ -11,9 +11,9 @@ from fractions import Fraction
 import h5py
 import numpy as np
 import pytest
-from mjsense._png import png_of
 
 import mjsense as mjs
+from mjsense.core.png import png_of
 
 MODEL = """<mujoco><asset>{}</asset><worldbody><geom type="plane" size="1 1 .1"/><body><joint type="hinge"/><geom size=".1"/></body></worldbody></mujoco>"""
 

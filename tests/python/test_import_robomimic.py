@@ -9,9 +9,9 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
-from mjsense._png import png_of as png
 
 import mjsense as mjs
+from mjsense.core.png import png_of as png
 
 
 def test_an_exported_recording_comes_back(tmp_path):

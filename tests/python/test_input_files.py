@@ -2,12 +2,12 @@
 """Files that a user names and that are missing, directories, or of another kind: one message with the path and the nearest names."""
 
 import pytest
-from mjsense.dataset.sensor_tables import sensors_of
-from mjsense.export.mapping import Mapping
-from mjsense.export.record_lerobot import converted
 
 import mjsense as mjs
 from mjsense import commands
+from mjsense.dataset.sensor_tables import sensors_of
+from mjsense.exporting.mapping import Mapping
+from mjsense.exporting.record_lerobot import converted
 
 
 def record_with_map(path):

@@ -4,7 +4,7 @@
 import re
 from pathlib import Path
 
-from mjsense import _libmujoco
+from mjsense.core import libmujoco
 
 ROOT = Path(__file__).parents[2]
 UMBRELLAS = ("mjsense/mjsense.h", "mjsense_tasks/mjsense_tasks.h")
@@ -35,7 +35,7 @@ def test_umbrella_headers_include_every_public_header():
 
 def test_one_series_of_mujoco():
     series = re.search(r"set\(MJSENSE_MUJOCO (\S+)\)", (ROOT / "cmake/Dependencies.cmake").read_text())[1]
-    assert series == ".".join(map(str, _libmujoco.SERIES))
-    for file in ("pyproject.toml", "requirements.txt", "python/mjsense/_libmujoco.py"):
+    assert series == ".".join(map(str, libmujoco.SERIES))
+    for file in ("pyproject.toml", "requirements.txt", "python/mjsense/core/libmujoco.py"):
         found = re.findall(r"mujoco(?:-core)?(>=[\d.]+,<[\d.]+)", (ROOT / file).read_text())
-        assert set(found) == {_libmujoco.REQUIREMENT.removeprefix("mujoco")}, file
+        assert set(found) == {libmujoco.REQUIREMENT.removeprefix("mujoco")}, file

@@ -23,9 +23,8 @@ from waiting import MOVES, WAITS, Waiting
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
-from mjsense.export import Source
-
 import mjsense as mjs
+from mjsense.exporting import Source
 
 BUILD = Path(__file__).parents[2] / "build"
 

@@ -11,7 +11,8 @@ import mujoco
 import pytest
 
 import mjsense
-from mjsense import _core, _libmujoco
+from mjsense import _core
+from mjsense.core import libmujoco
 
 PACKAGE = Path(mjsense.__file__).parent
 LIB = PACKAGE / "_lib"
@@ -28,7 +29,7 @@ def dynamic(file):
 
 
 def test_mujoco_is_shared_here():
-    assert _libmujoco.shared is mujoco
+    assert libmujoco.shared is mujoco
     assert _core.mujoco_version() == mujoco.mj_versionString()
     assert _core.mujoco_layout_difference() == ""
 
@@ -46,10 +47,11 @@ def test_names_of_the_libraries():
 
 STEP = """
 import mjsense as mjs
-from mjsense import _core, _libmujoco
+from mjsense import _core
+from mjsense.core import libmujoco
 sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")})))
 sim.step()
-print(_libmujoco.shared is not None, _core.mujoco_version(), type(sim.model).__name__, _libmujoco.why_not_shared)
+print(libmujoco.shared is not None, _core.mujoco_version(), type(sim.model).__name__, libmujoco.why_not_shared)
 """
 
 
@@ -130,7 +132,7 @@ def test_another_libmujoco_is_an_error():
         mujoco_version = staticmethod(lambda: "4.0.7")
 
     with pytest.raises(ImportError, match=r"another libmujoco, 4\.0\.7, instead of 4\.0.*installed: mujoco-core.*Repair it with: pip install --force"):
-        _libmujoco.check(Other)
+        libmujoco.check(Other)
 
 
 def test_other_structs_are_an_error(monkeypatch):
@@ -140,8 +142,8 @@ def test_other_structs_are_an_error(monkeypatch):
         mujoco_headers = 4000001
 
     with pytest.raises(ImportError, match=r"not laid out as the 4\.0\.1 that mjsense was compiled with: mjOption has 400 bytes.*mujoco-core==4\.0\.1"):
-        _libmujoco.check(Other)
-    monkeypatch.setattr(_libmujoco, "shared", None)
+        libmujoco.check(Other)
+    monkeypatch.setattr(libmujoco, "shared", None)
     Other.mujoco_version = staticmethod(lambda: "4.0.1")
     with pytest.raises(ImportError, match="Repair it with: pip install --force-reinstall --no-deps mjsense"):
-        _libmujoco.check(Other)
+        libmujoco.check(Other)

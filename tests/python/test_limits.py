@@ -138,13 +138,13 @@ def fields_of_mjxmacro():
 
 
 def test_lists_of_fields_equal_mujoco():
-    from mjsense import _randomizable
+    from mjsense.scene import randomizable
 
     fields = fields_of_mjxmacro()
     assert len(fields) > 300
-    for name in _randomizable._WHOLE:
+    for name in randomizable._WHOLE:
         assert fields[name] in ("int", "mjtByte", "mjtBool"), name
-    for name in _randomizable._FIXED:
+    for name in randomizable._FIXED:
         assert fields[name] in ("mjtNum", "float"), name
 
 
@@ -162,9 +162,9 @@ def test_structure_cannot_be_randomized(sim):
             refused += 1
             continue
         if whole:
-            from mjsense import _randomizable
+            from mjsense.scene import randomizable
 
-            assert name in _randomizable._WHOLE
+            assert name in randomizable._WHOLE
     sim.step()
     assert refused > 50
 

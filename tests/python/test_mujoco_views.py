@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import mjsense as mjs
-from mjsense import _core, _libmujoco, _mujoco, _mujoco_views
+from mjsense import _core
+from mjsense.core import libmujoco, mujoco_names, mujoco_views
 
 XML = """
 <mujoco>
@@ -64,14 +65,14 @@ def data(model):
 
 @pytest.fixture(scope="module")
 def model_view(model):
-    return _mujoco_views.MjModelView(_core.OwnedModel.copy(model._address))
+    return mujoco_views.MjModelView(_core.OwnedModel.copy(model._address))
 
 
 @pytest.fixture(scope="module")
 def data_view(model_view, data):
     # One libmujoco serves both here, so its functions can be called with addresses.
-    lib = ctypes.CDLL(_libmujoco._environment()[1])
-    view = _mujoco_views.MjDataView(model_view)
+    lib = ctypes.CDLL(libmujoco._environment()[1])
+    view = mujoco_views.MjDataView(model_view)
     lib.mj_copyData(*(ctypes.c_void_p(address) for address in (view._address, model_view._address, data._address)))
     return view
 
@@ -143,7 +144,7 @@ def test_unknown_elements(model_view, model):
 
 
 def test_arrays_are_the_memory_and_keep_it(model):
-    view = _mujoco_views.MjModelView(_core.OwnedModel.copy(model._address))
+    view = mujoco_views.MjModelView(_core.OwnedModel.copy(model._address))
     view.geom("cube").size = [0.3, 0.2, 0.1]
     view.opt.timestep = 0.5
     assert view.geom_size[1].tolist() == [0.3, 0.2, 0.1] and view.opt.timestep == 0.5
@@ -156,7 +157,7 @@ def test_arrays_are_the_memory_and_keep_it(model):
 
 
 def test_what_a_view_cannot_do(model_view, data_view, monkeypatch):
-    monkeypatch.setattr(_libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
+    monkeypatch.setattr(libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
     with pytest.raises(TypeError, match=r"the installed mujoco is 3\.8\.1; pip install 'mujoco>=4\.0,<4\.1'"):
         mujoco.mj_forward(model_view, data_view)
     with pytest.raises(AttributeError, match=r"MjModelView has no attribute 'bind'.* the installed mujoco is 3\.8\.1; pip install"):
@@ -168,12 +169,12 @@ def test_what_a_view_cannot_do(model_view, data_view, monkeypatch):
 
 
 def test_enumerations_are_mujocos():
-    for ours, theirs, prefix in ((_mujoco.Obj, mujoco.mjtObj, "mjOBJ_"), (_mujoco.Geom, mujoco.mjtGeom, "mjGEOM_"),
-                                 (_mujoco.Joint, mujoco.mjtJoint, "mjJNT_")):  # fmt: skip
+    for ours, theirs, prefix in ((mujoco_names.Obj, mujoco.mjtObj, "mjOBJ_"), (mujoco_names.Geom, mujoco.mjtGeom, "mjGEOM_"),
+                                 (mujoco_names.Joint, mujoco.mjtJoint, "mjJNT_")):  # fmt: skip
         for value in ours:
             assert getattr(theirs, prefix + value.name) == value
-    assert [mujoco.mjtWarning(i).name for i in range(int(mujoco.mjtWarning.mjNWARNING))] == list(_mujoco.WARNINGS)
-    assert mujoco.mjMAXVAL == _mujoco.MAXVAL
+    assert [mujoco.mjtWarning(i).name for i in range(int(mujoco.mjtWarning.mjNWARNING))] == list(mujoco_names.WARNINGS)
+    assert mujoco.mjMAXVAL == mujoco_names.MAXVAL
     assert {*_core.setconst_inputs()} == {*mujoco.MjModel._setconst_inputs}
 
 
@@ -188,13 +189,13 @@ def test_a_spec_of_another_series_goes_over_as_xml(monkeypatch, tmp_path):
     spec.assets = {"kept.obj": b"v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"}
     before = spec.meshes[0].file
     shared = mjs.Scene(mjs.SceneCfg(entities={"r": mjs.EntityCfg(model=spec)})).model
-    kind, _ = _mujoco.source_of(spec)
+    kind, _ = mujoco_names.source_of(spec)
     assert kind == "spec"
-    monkeypatch.setattr(_libmujoco, "shared", None)
-    kind, xml = _mujoco.source_of(spec)
+    monkeypatch.setattr(libmujoco, "shared", None)
+    kind, xml = mujoco_names.source_of(spec)
     assert kind == "xml" and "wedge.obj" in xml and spec.meshes[0].file == before
     found = mjs.Scene(mjs.SceneCfg(entities={"r": mjs.EntityCfg(model=spec)})).model
-    assert isinstance(found, _mujoco_views.MjModelView)
+    assert isinstance(found, mujoco_views.MjModelView)
     np.testing.assert_allclose(found.mesh_vert, shared.mesh_vert)
     np.testing.assert_allclose(found.body("r/b").mass, shared.body("r/b").mass)
 
@@ -246,9 +247,9 @@ def test_editing_a_scene_gives_the_same_model(monkeypatch):
         return mjs.Scene(mjs.SceneCfg(entities={"box": mjs.EntityCfg(model=BOX)}, spec_fn=edit))
 
     real = scene().model
-    monkeypatch.setattr(_libmujoco, "shared", None)
+    monkeypatch.setattr(libmujoco, "shared", None)
     view = scene().model
-    assert isinstance(view, _mujoco_views.MjModelView)
+    assert isinstance(view, mujoco_views.MjModelView)
     check(real, view)
     shorter = mjs.Scene(mjs.SceneCfg(spec_fn=lambda spec: spec.delete(spec.worldbody.add_site(name="doomed")))).model
     assert shorter.nsite == 0
@@ -266,7 +267,7 @@ def test_editing_a_scene_gives_the_same_model(monkeypatch):
     ],
 )
 def test_edits_that_are_errors(monkeypatch, edit, error, text):
-    monkeypatch.setattr(_libmujoco, "shared", None)
-    monkeypatch.setattr(_libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
+    monkeypatch.setattr(libmujoco, "shared", None)
+    monkeypatch.setattr(libmujoco, "why_not_shared", "the installed mujoco is 3.8.1")
     with pytest.raises(error, match=text):
         mjs.Scene(mjs.SceneCfg(spec_fn=edit))

@@ -15,7 +15,8 @@ import pytest
 from wheels import wheel
 
 import mjsense as mjs
-from mjsense import _core, _scene_synthesizer, assets, commands
+from mjsense import _core, commands
+from mjsense.tasks import assets, synthesized_objects
 
 MODELS = Path(__file__).parents[2] / "models"
 BUILT_IN = [
@@ -211,10 +212,10 @@ def test_install_of_generated_objects_leaves_only_their_files(tmp_path, monkeypa
             assert "--no-deps" in command and "scene-synthesizer==1.15.0" in command
         elif env is not None:
             assert env["PYTHONPATH"].split(os.pathsep)[0] == str(temporary[0])
-            assert command[1:3] == ["-m", "mjsense._scene_synthesizer"]
+            assert command[1:3] == ["-m", "mjsense.tasks.synthesized_objects"]
             folder = Path(command[3])
             folder.mkdir()
-            for name in _scene_synthesizer.OBJECTS:
+            for name in synthesized_objects.OBJECTS:
                 (folder / f"{name}.xml").write_text("<mujoco/>")
         else:
             with zipfile.ZipFile(command[-1]) as archive:
@@ -223,7 +224,7 @@ def test_install_of_generated_objects_leaves_only_their_files(tmp_path, monkeypa
 
     monkeypatch.setattr(assets.subprocess, "run", run)
     assert commands.run(["assets", "install", "scene_synthesizer"]) == 0
-    assert f"scene_synthesizer: {len(_scene_synthesizer.OBJECTS)} objects added" in capsys.readouterr().out
+    assert f"scene_synthesizer: {len(synthesized_objects.OBJECTS)} objects added" in capsys.readouterr().out
     assert {path.name for path in packages.iterdir()} == {
         "mjsense_scene_synthesizer",
         "mjsense_scene_synthesizer-1.15.0.dist-info",
@@ -257,14 +258,14 @@ def test_objects_of_scene_synthesizer(tmp_path, monkeypatch):
         "_pip_install",
         lambda source, *what: pip(source, *(what if "--target" in what else ("--target", str(tmp_path), *what))),
     )
-    assert len(assets.install_objects("scene_synthesizer")) == len(_scene_synthesizer.OBJECTS)
-    for name in _scene_synthesizer.OBJECTS:
+    assert len(assets.install_objects("scene_synthesizer")) == len(synthesized_objects.OBJECTS)
+    for name in synthesized_objects.OBJECTS:
         model = mujoco.MjModel.from_xml_path(str(tmp_path / f"mjsense_scene_synthesizer/{name}.xml"))
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         assert np.allclose(extent(model, data, True), extent(model, data, False), atol=0.0025), name
     table = tomllib.loads((MODELS / "objects/scene_synthesizer.toml").read_text())["objects"]
-    assert [one["name"] for one in table] == [f"scene_synthesizer_{name}" for name in _scene_synthesizer.OBJECTS]
+    assert [one["name"] for one in table] == [f"scene_synthesizer_{name}" for name in synthesized_objects.OBJECTS]
     (tmp_path / "scene.toml").write_text(SCENE.format(names='["scene_synthesizer_.*"]'))
     env = mjs.make_vec("pick", scene=str(tmp_path / "scene.toml"), cameras=[], policy=None, observations=["qpos"])
     masses = {one["name"]: env.sim.model.body(f"{one['name']}/{one['name']}").subtreemass[0] for one in table}

@@ -11,12 +11,13 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from mjsense.dataset import sensor_check
-from mjsense.dataset.model_xml import model_xml
 from tasks import Cart, Driver
 
 import mjsense as mjs
-from mjsense import _libmujoco, _mujoco_views, _options
+from mjsense.core import libmujoco, mujoco_views
+from mjsense.dataset import sensor_check
+from mjsense.dataset.model_xml import model_xml
+from mjsense.scene import physics_options
 
 WORLD = """
 <mujoco><option timestep=".002" density="1.2"/><worldbody><light name="l" pos="0 0 3"/><camera name="c" pos="0 -2 1" xyaxes="1 0 0 0 .4 .9"/>
@@ -67,10 +68,10 @@ VALUES = {
 
 
 def test_every_option_is_tested():
-    assert {"timestep", *VALUES} == set(_options.names())
+    assert {"timestep", *VALUES} == set(physics_options.names())
 
 
-@pytest.mark.skipif(_libmujoco.shared is None, reason="needs a mujoco of the series")
+@pytest.mark.skipif(libmujoco.shared is None, reason="needs a mujoco of the series")
 @pytest.mark.parametrize("name", VALUES)
 def test_worlds_with_other_options_equal_plain_mujoco(name):
     import mujoco
@@ -214,10 +215,10 @@ WRITES = {
 @pytest.mark.parametrize("name", WRITES)
 def test_models_for_look_ups_refuse_writes(name, private, monkeypatch):
     if private:  # as without a mujoco of the series
-        monkeypatch.setattr(_libmujoco, "shared", None)
+        monkeypatch.setattr(libmujoco, "shared", None)
     sim = simulation()
     for model in (sim.model, sim.scene.model):
-        assert private == isinstance(model, _mujoco_views.MjModelView)
+        assert private == isinstance(model, mujoco_views.MjModelView)
         before = model.body_mass.tobytes() + model.qpos0.tobytes() + model.geom_rgba.tobytes()
         with pytest.raises((AttributeError, ValueError)) as error:
             WRITES[name](model)
@@ -231,7 +232,7 @@ def test_models_for_look_ups_refuse_writes(name, private, monkeypatch):
         assert (own.opt.timestep, own.body("b").mass[0]) == (0.01, 50)
 
 
-@pytest.mark.skipif(_libmujoco.shared is None, reason="needs a mujoco of the series")
+@pytest.mark.skipif(libmujoco.shared is None, reason="needs a mujoco of the series")
 def test_read_only_models_work_in_mujoco():
     import mujoco
 

@@ -4,11 +4,11 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
-from mjsense.policy import FunctionPolicy
 from tasks import CART, Cart, Driver
 from test_own_task import json_rows, record, trajectories
 
 import mjsense as mjs
+from mjsense.tasks.policy import FunctionPolicy
 
 HOLD = np.array([0, -0.7, 0, -2.3, 0, 1.6, 0, 0])
 

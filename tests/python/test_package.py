@@ -54,14 +54,14 @@ def test_import_loads_nothing_heavy():
     program = "import sys, mjsense; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split())
     heavy = {"h5py", "torch", "jax", "scipy", "matplotlib", "PIL", "pandas", "imageio_ffmpeg", "gymnasium_robotics", "rerun", "viser", "pyarrow",
-             "tomllib", "numpy.testing", "unittest", "mjsense.rl", "mjsense.compat"}  # fmt: skip
-    assert "mjsense.configs" in loaded and not heavy & loaded, heavy & loaded
+             "tomllib", "numpy.testing", "unittest", "mjsense.tasks.rl", "mjsense.compat"}  # fmt: skip
+    assert "mjsense.sensors.configs" in loaded and not heavy & loaded, heavy & loaded
 
 
 def test_methods_of_configurations_are_created_on_first_use():
     program = """
 import mjsense as mjs
-from mjsense._dataclass import _Method
+from mjsense.core.lazy_dataclass import _Method
 classes = [c for m in (mjs.configs, mjs.effects) for c in vars(m).values() if isinstance(c, type) and issubclass(c, mjs.SensorCfg)]
 assert len(classes) > 5 and all(isinstance(vars(c)["__init__"], _Method) for c in classes), classes
 mjs.CameraSensorCfg(name="a")

@@ -7,11 +7,11 @@ import sys
 
 import numpy as np
 import pytest
-from mjsense.plot import _expand
 from scenes import ball_scene, feet_cfg
 
 import mjsense as mjs
-from mjsense import _progress, _show
+from mjsense.core import progress_line, representations
+from mjsense.viewer.plots import _expand
 
 
 @pytest.fixture(scope="module")
@@ -103,10 +103,10 @@ def test_progress_of_recordings(tmp_path, monkeypatch):
 def test_an_interrupted_count_ends_its_line(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
     with pytest.raises(ZeroDivisionError):
-        for k in _progress.tracked(range(3), 3, "files"):
+        for k in progress_line.tracked(range(3), 3, "files"):
             1 / (1 - k)
     assert sys.stderr.getvalue().endswith("1/3 files              \n") or sys.stderr.getvalue().rstrip(" \n").endswith("1/3 files")
-    assert [_progress.clock(s) for s in (7, 65, 9067)] == ["0:07", "1:05", "2:31:07"]
+    assert [progress_line.clock(s) for s in (7, 65, 9067)] == ["0:07", "1:05", "2:31:07"]
 
 
 # ------------------------------------------------------------------------------------------------------------------- notebooks
@@ -114,9 +114,9 @@ def test_an_interrupted_count_ends_its_line(monkeypatch):
 
 def test_depth_has_a_colour_map():
     depth = np.array([[[1.0], [2.0], [0.0]]], np.float32)
-    near, far, none = _show.coloured(depth)[0]
+    near, far, none = representations.coloured(depth)[0]
     assert tuple(near) == (253, 231, 37) and tuple(far) == (68, 1, 84) and tuple(none) == (0, 0, 0)
-    assert _show.is_image((4, 5, 1), "float32") and not _show.is_image((4, 4), "float32") and _show.coloured(np.zeros((2, 2, 2))) is None
+    assert representations.is_image((4, 5, 1), "float32") and not representations.is_image((4, 4), "float32") and representations.coloured(np.zeros((2, 2, 2))) is None
 
 
 def test_notebooks(recording, tmp_path):

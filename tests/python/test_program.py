@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from mjsense import ffmpeg
+from mjsense.recording import ffmpeg
 
 
 def run(*words, **env):

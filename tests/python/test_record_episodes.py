@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
-from mjsense.export.mapping import Source
 
 import mjsense as mjs
+from mjsense.exporting.mapping import Source
 
 spaces = gymnasium.spaces
 

@@ -13,10 +13,9 @@ import pytest
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
-from mjsense.export.output import part_of
-from mjsense.export.record_lerobot import CompleteError
-
 import mjsense as mjs
+from mjsense.exporting.output import part_of
+from mjsense.exporting.record_lerobot import CompleteError
 
 ARGUMENTS = {"horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5, "episodes": 6, "max_attempts": 6, "batches": 3}
 WORDS = ["record", "pick", "--horizon", "12", "--keep-failures", "--size", "32x24", "--worlds", "2", "--seed", "5", "--episodes", "6",

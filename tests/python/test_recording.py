@@ -101,7 +101,7 @@ def test_the_program_writes_the_same_bytes(tmp_path):
 
 def test_meshes_option(tmp_path, monkeypatch):
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES", raising=False)
-    monkeypatch.setattr("mjsense.assets.installed_meshes", lambda texts: {})
+    monkeypatch.setattr("mjsense.tasks.assets.installed_meshes", lambda texts: {})
     with pytest.raises(ValueError, match="robot 'franka': its real meshes were not found"):
         mjs.record(out=tmp_path, meshes="real", **SMALL)
     with pytest.raises(ValueError, match=r"meshes.*must be one of auto, shapes, real"):

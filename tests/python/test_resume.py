@@ -12,9 +12,9 @@ import zlib
 import gymnasium
 import numpy as np
 import pytest
-from mjsense._code_checksums import checksums
 
 import mjsense as mjs
+from mjsense.tasks.code_checksums import checksums
 
 MODELS = pathlib.Path(__file__).parents[2] / "models"
 CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv 0 0 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nf 1 3 2\nf 1 4 3\n"

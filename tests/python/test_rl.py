@@ -9,10 +9,10 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from mjsense.rl._numbers import Actions, Numbers, checked_env
 from wheels import wheel
 
 import mjsense as mjs
+from mjsense.tasks.rl._numbers import Actions, Numbers, checked_env
 
 sys.path.append(str(Path(__file__).parents[2] / "examples/walk"))
 
@@ -122,8 +122,9 @@ def test_walk_with_a_go1():
 
 def test_stable_baselines3():
     pytest.importorskip("stable_baselines3")
-    from mjsense.rl.sb3 import SB3VecEnv
     from stable_baselines3 import PPO
+
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     env = same_step()
     worlds = SB3VecEnv(env)
@@ -148,8 +149,9 @@ def test_stable_baselines3():
 
 def test_stable_baselines3_with_pictures():
     pytest.importorskip("stable_baselines3")
-    from mjsense.rl.sb3 import SB3VecEnv
     from stable_baselines3.common.vec_env import VecTransposeImage
+
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     env = same_step(cameras=["wrist_camera"], width=64, height=48, observations=["qpos", "wrist_camera"])
     worlds = VecTransposeImage(SB3VecEnv(env))
@@ -166,8 +168,9 @@ def test_stable_baselines3_with_pictures():
 def test_stable_baselines3_with_pictures_only():
     """Nothing but images, of which depth is one: a dict without a row of numbers, whose values are those of its space."""
     pytest.importorskip("stable_baselines3")
-    from mjsense.rl.sb3 import SB3VecEnv
     from stable_baselines3 import PPO
+
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     options = dict(cameras=["wrist_camera"], width=40, height=36, depth=True)
     env = same_step(**options, observations=["wrist_camera", "wrist_camera_depth"])
@@ -200,7 +203,8 @@ def test_the_page_s_policy_is_learned():
 def test_rsl_rl():
     pytest.importorskip("rsl_rl")
     import torch
-    from mjsense.rl.rsl import RslRlVecEnv
+
+    from mjsense.tasks.rl.rsl import RslRlVecEnv
 
     env = same_step()
     worlds = RslRlVecEnv(env, {"policy": None, "critic": ["tcp_pose"]})
@@ -218,7 +222,7 @@ def test_rsl_rl():
 @pytest.mark.parametrize("module, missing, package", [("sb3", "stable_baselines3.common.vec_env", "stable-baselines3"),
                                                       ("rsl", "rsl_rl.env", "rsl-rl-lib")])  # fmt: skip
 def test_without_the_trainer(monkeypatch, module, missing, package):
-    monkeypatch.delitem(sys.modules, f"mjsense.rl.{module}", raising=False)
+    monkeypatch.delitem(sys.modules, f"mjsense.tasks.rl.{module}", raising=False)
     monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(ModuleNotFoundError, match=f"pip install {package} "):
-        importlib.import_module(f"mjsense.rl.{module}")
+        importlib.import_module(f"mjsense.tasks.rl.{module}")

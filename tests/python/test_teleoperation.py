@@ -14,13 +14,13 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed")
 
 from devtools import Page, needs_chromium
-from mjsense._rotations import rotation_of
-from mjsense.teleoperation.devices import SpaceMouse, device_of
-from mjsense.teleoperation.page import STEP, TURN
-from mjsense.teleoperation.play import Teleoperation
-from mjsense.teleoperation.pose import Pose
 
 import mjsense as mjs
+from mjsense.core.rotations import rotation_of
+from mjsense.tasks.teleoperation.devices import SpaceMouse, device_of
+from mjsense.tasks.teleoperation.page import STEP, TURN
+from mjsense.tasks.teleoperation.pose import Pose
+from mjsense.tasks.teleoperation.teleoperation import Teleoperation
 
 KEYS = {(0, 1): "I", (0, -1): "K", (1, 1): "J", (1, -1): "L", (2, 1): "U", (2, -1): "M"}
 SEED = 3

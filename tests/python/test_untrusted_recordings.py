@@ -16,12 +16,11 @@ from edited_recordings import changed, describe, file_of, rename_video
 
 pytest.importorskip("av")
 
+import mjsense as mjs
 from mjsense.cluster import tools
 from mjsense.dataset.description import Description
 from mjsense.dataset.places import is_plain_name, open_plain
-from mjsense.export import export_lerobot, export_robomimic
-
-import mjsense as mjs
+from mjsense.exporting import export_lerobot, export_robomimic
 
 CAMERA = "wrist_camera"
 

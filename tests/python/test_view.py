@@ -14,12 +14,12 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
-from mjsense._rotations import rotation_of
-from mjsense.view import curves, geometry, surfaces
-from mjsense.view.poses import PoseStream
 from scenes import BALL
 
 import mjsense as mjs
+from mjsense.core.rotations import rotation_of
+from mjsense.viewer import curves, geometry, surfaces
+from mjsense.viewer.poses import PoseStream
 
 needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
 

@@ -242,7 +242,7 @@ def handshake(viewer):
 
 def test_a_client_that_does_not_read_is_dropped(arm, monkeypatch):
     """Else each one holds what it was sent in memory."""
-    from mjsense.view import gate
+    from mjsense.viewer import gate
 
     monkeypatch.setattr(gate, "_STALLED", 0.3)
     waiting = arm._server._websock_server._client_state_from_id
@@ -373,7 +373,7 @@ def test_names_of_a_model_are_labels(tmp_path, port):
 
 
 def test_labels_are_different_and_lead_to_their_names():
-    from mjsense.view.text import labels
+    from mjsense.viewer.text import labels
 
     names = ["a" * 500 + "1", "a" * 500 + "2", "b\n", "b?", "b "]
     found = labels(names)
@@ -477,7 +477,7 @@ def test_a_page_of_another_server_reaches_nothing(arm, tmp_path):
 
 def test_hostile_commands_are_not_recorded(tmp_path, port):
     """Poses, keys and messages that no page sends do not end `play`, and what is recorded is finite and near the robot."""
-    from mjsense.teleoperation.page import REACH
+    from mjsense.tasks.teleoperation.page import REACH
 
     words = ["play", "pick", "--scene", "table", "--seed", "3", "--out", str(tmp_path / "out"), "--port", str(port), "--no-open", "--keep-failures"]
     log = tmp_path / "log"

@@ -153,8 +153,9 @@ def test_what_is_missing_is_a_clear_error(drive):
 
 def test_rsl_rl_learns_without_a_copy_to_the_host(drive, monkeypatch):
     pytest.importorskip("rsl_rl")
-    from mjsense.rl.rsl import RslRlVecEnv
     from rsl_rl.runners import OnPolicyRunner
+
+    from mjsense.tasks.rl.rsl import RslRlVecEnv
 
     class Coarse(drive):
         sim_dt_ms = 20  # a physics step for each control step, because kernels take long to start on the CPU
@@ -215,8 +216,9 @@ def played(worlds, policy):
 
 def test_stable_baselines3_gets_arrays(drive):
     pytest.importorskip("stable_baselines3")
-    from mjsense.rl.sb3 import SB3VecEnv
     from stable_baselines3 import PPO
+
+    from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     rows = []
     for env in environments(drive, "same_step"):

@@ -14,9 +14,9 @@ from typing import Any, Literal
 from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.tasks import check_pickle, cluster, running
 from mjsense.dataset.remote import absolute
-from mjsense.export import export_lerobot, export_lerobot21, mcap, rerun, rlds, robomimic, zarr
-from mjsense.export.mapping import Mapping, Source
-from mjsense.export.output import own_folder
+from mjsense.exporting import export_lerobot, export_lerobot21, mcap, rerun, rlds, robomimic, zarr
+from mjsense.exporting.mapping import Mapping, Source
+from mjsense.exporting.output import own_folder
 
 _CHUNK = 16  # episodes of one task
 _PARTS: dict[str, ModuleType] = {"mcap": mcap, "rerun": rerun, "rlds": rlds, "robomimic": robomimic, "zarr": zarr}

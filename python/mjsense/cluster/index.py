@@ -6,9 +6,9 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
-from mjsense._optional import optional
 from mjsense.cluster.job import ShardResult
 from mjsense.cluster.storage import Storage
+from mjsense.core.optional import optional
 from mjsense.dataset.files import INDEX
 
 

@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from mjsense import _core
-from mjsense._parts import parts_of
-from mjsense._recording import PARTS, check_names, record_here
-from mjsense.assets import use_installed_files
 from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.storage import Storage
 from mjsense.dataset import Episode, bounded_json, index
 from mjsense.dataset.episode import Store
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.limits import SCENE_BYTES
+from mjsense.tasks.assets import use_installed_files
+from mjsense.tasks.parts import parts_of
+from mjsense.tasks.record_job import PARTS, check_names, record_here
 
 _OF_RECORD = {"sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"}
 """Arguments of ``record`` that do not decide the data."""

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from mjsense._optional import optional
 from mjsense.cluster.alone import Death, alone
+from mjsense.core.optional import optional
 
 _CRASHES = 2  # deaths of workers after which a task runs in a process of its own
 _DEATHS = 2  # deaths of that process by a defect, after which it is not repeated

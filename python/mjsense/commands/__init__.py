@@ -16,7 +16,7 @@ import textwrap
 from types import ModuleType
 from typing import Any
 
-from mjsense.errors import did_you_mean
+from mjsense.core.errors import did_you_mean
 
 COMMANDS = {
     "view": "Show a task, a scene, a recording or a model in the browser.",

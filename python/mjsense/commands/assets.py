@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from mjsense import assets
+    from mjsense.tasks import assets
 
     for name in arguments.names:
         added = assets.install_objects(name)

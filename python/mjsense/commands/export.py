@@ -7,7 +7,7 @@ import argparse
 from typing import Any
 
 from mjsense.commands._ray import add_ray, ray_options
-from mjsense.export import FORMATS
+from mjsense.exporting import FORMATS
 
 EXAMPLES = [
     ("mjsense export lerobot data out", "Write the recording in data as a LeRobot v3.0 data set."),
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     import importlib
     import io
 
-    from mjsense._progress import counter
+    from mjsense.core.progress_line import counter
 
     if arguments.encode_again and arguments.format != "mcap":
         raise ValueError("--encode-again is an option of the format mcap")
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
             export_on_ray(arguments.format, arguments.path, arguments.out, **options, progress=report, **ray_options(arguments))
             return 0
-        function = getattr(importlib.import_module(f"mjsense.export.{arguments.format}"), f"export_{arguments.format}")
+        function = getattr(importlib.import_module(f"mjsense.exporting.{arguments.format}"), f"export_{arguments.format}")
         function(arguments.path, arguments.out, progress=report, **options)
         if not arguments.quiet:
             print(f"Wrote {arguments.out}.")

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from mjsense.commands import FAILED
-    from mjsense.teleoperation import play
+    from mjsense.tasks.teleoperation import play
 
     given = {name: getattr(arguments, name) for name in ("out", "scene", "episodes", "keep_failures", "append", "resume", "device", "arm", "gripper", "seed", "host", "port")}
     summary = play(arguments.task, arguments.robot, open_browser=not arguments.no_open, **given)

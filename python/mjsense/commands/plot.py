@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from mjsense.plot import plot
-    from mjsense.view.open import options_of
+    from mjsense.viewer.open import options_of
+    from mjsense.viewer.plots import plot
 
     options = options_of({"robot": arguments.robot, "scene": arguments.scene})
     plot(arguments.what, arguments.stream, episodes=arguments.episode, world=arguments.world, seconds=arguments.seconds, seed=arguments.seed,

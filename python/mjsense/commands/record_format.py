@@ -27,7 +27,7 @@ def is_wanted(words: list[str]) -> bool:
 def run(words: list[str]) -> int:
     """Runs the command. Returns the exit code of ``mjsense record``."""
     from mjsense import _core
-    from mjsense.ffmpeg import use_installed_ffmpeg
+    from mjsense.recording.ffmpeg import use_installed_ffmpeg
 
     parser = _Parser(prog="mjsense record", add_help=False, allow_abbrev=False)
     parser.add_argument("--format", choices=["lerobot", "mjsense"])
@@ -50,7 +50,7 @@ def run(words: list[str]) -> int:
 
         if given.format == "mjsense":
             return record(given.out)
-        from mjsense.export.record_lerobot import CompleteError, converted
+        from mjsense.exporting.record_lerobot import CompleteError, converted
 
         try:
             with converted(given.out, resume=given.resume, map=given.map, trim_idle=given.trim_idle, keep_recording=given.keep_recording,

@@ -33,8 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from mjsense.view.export import export
-    from mjsense.view.open import options_of, source_of, viewer_of
+    from mjsense.viewer.export import export
+    from mjsense.viewer.open import options_of, source_of, viewer_of
 
     given = {name: getattr(arguments, name) for name in ("robot", "scene", "task", "policy")}
     source = source_of(arguments.what, worlds=max(arguments.worlds, arguments.world + 1), seed=arguments.seed, **options_of(given))

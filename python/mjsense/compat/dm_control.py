@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 from dm_control.mujoco import engine, wrapper  # pyright: ignore[reportMissingImports]
 
-from mjsense.renderer import Renderer
+from mjsense.rendering.renderer import Renderer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -16,7 +16,7 @@ import numpy as np
 import robosuite.environments.base as base  # pyright: ignore[reportMissingImports]
 
 from mjsense.compat._opengl import depth_buffer
-from mjsense.renderer import Renderer
+from mjsense.rendering.renderer import Renderer
 
 
 class RenderContext:

@@ -5,7 +5,7 @@ from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import Episode, Stream
 from mjsense.dataset.quality import EpisodeQuality
-from mjsense.dataset.render import RenderProgress, RenderSummary, render
+from mjsense.dataset.rendering import RenderProgress, RenderSummary, render
 from mjsense.dataset.replay_check import EpisodeCheck, ReplayReport, check_replay, replay
 from mjsense.dataset.sensor_check import SensorCheck
 from mjsense.dataset.video import Video

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from mjsense import _libmujoco
+from mjsense.core import libmujoco
 from mjsense.dataset.archive import MODEL_FILE, fault_of_name, read_archive
 from mjsense.dataset.model_sizes import MAX_ARENA, check_sizes
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     import mujoco
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
 MAX_TEXT = 64 << 20  # bytes
 MAX_ELEMENTS = 300_000

@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from mjsense import _show
-from mjsense._arguments import checked
+from mjsense.core import representations
+from mjsense.core.arguments import checked
+from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name, is_mask
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.places import printable
 from mjsense.dataset.remote import resolved
-from mjsense.errors import UnknownNameError, did_you_mean
 
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
 
@@ -166,11 +166,11 @@ class Dataset:
         """HTML for notebooks: the outcomes, images of the first episode, and all streams, folded."""
         outcomes = Counter(episode.outcome for episode in self.episodes)
         rows = [(count, outcome) for outcome, count in outcomes.most_common()]
-        table = _show.grid(("episodes", "outcome"), rows)
+        table = representations.grid(("episodes", "outcome"), rows)
         streams = [(s.name, s.dtype, list(s.shape), s.unit, s.frame, s.description) for s in self.streams.values()]
-        folded = {f"{len(streams)} streams": _show.grid(("stream", "dtype", "shape", "unit", "frame", ""), streams)}
+        folded = {f"{len(streams)} streams": representations.grid(("stream", "dtype", "shape", "unit", "frame", ""), streams)}
         first = self.episodes[0]._film() if self.episodes else ""
-        return _show.block(f"data set {self.root}: {len(self.episodes)} episodes, {len(self)} observations", table + first, folded)
+        return representations.block(f"data set {self.root}: {len(self.episodes)} episodes, {len(self)} observations", table + first, folded)
 
     def index_of(self, episode: int, frame: int = 0) -> int:
         """Number of an observation: ``frame`` of the episode at position ``episode`` in the recording."""

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mjsense._arguments import checked
-from mjsense._new_output import new_output
-from mjsense._optional import optional
+from mjsense.core.arguments import checked
+from mjsense.core.new_output import new_output
+from mjsense.core.optional import optional
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode import VIDEOS, Episode
 from mjsense.dataset.hdf5 import open_h5, text_of

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from mjsense import _show
-from mjsense._arguments import checked
+from mjsense.core import representations
+from mjsense.core.arguments import checked
+from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import bounded_json, json_rows, playback
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.description import Description, image_size, rate_of
@@ -24,7 +25,6 @@ from mjsense.dataset.limits import NAME_BYTES, PERIOD_MS, SCENE_BYTES
 from mjsense.dataset.places import plain_name, printable
 from mjsense.dataset.quality import EpisodeQuality, idle_steps, kept_rows, quality_of
 from mjsense.dataset.video import FrameReader, Video, VideoInfo
-from mjsense.errors import UnknownNameError, did_you_mean
 
 if TYPE_CHECKING:
     import mujoco
@@ -232,7 +232,7 @@ class Episode:
     def _repr_html_(self) -> str:
         """HTML for notebooks: the episode's attributes, and images of its start, middle and end."""
         facts = [("outcome", self.outcome), ("observations", f"{self.length}, {float(self.length / self.fps):.2f} s"), ("seed", self.seed), ("file", f"{self.path}, {self.trajectory}")]
-        return _show.block(f"episode {self.index}: {self.task}", _show.grid(("", ""), facts) + self._film())
+        return representations.block(f"episode {self.index}: {self.task}", representations.grid(("", ""), facts) + self._film())
 
     def _film(self) -> str:
         """Images of each camera at the start, the middle and the end, as HTML; empty where videos cannot be read."""
@@ -243,7 +243,7 @@ class Episode:
                 images = {f"{name.removeprefix(VIDEOS)}, step {t}": video[t].reshape(*video.shape[1:3], -1) for t in (0, self.length // 2, self.length - 1)}
             except (OSError, RuntimeError):
                 continue
-            strips.append(f"<div>{_show.figures(images)}</div>")
+            strips.append(f"<div>{representations.figures(images)}</div>")
         return "".join(strips)
 
     def __contains__(self, name: str) -> bool:

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _mujoco
-from mjsense._randomizable import field_of
-from mjsense.configs import SceneCfg
+from mjsense.core import mujoco_names
 from mjsense.dataset import playback
 from mjsense.dataset.archive import MODEL_FILE, read_archive
 from mjsense.dataset.closed_model import check_compiled, closed_model
 from mjsense.dataset.model_fields import check_inputs
-from mjsense.scene import Scene
-from mjsense.simulation import Simulation
+from mjsense.scene.randomizable import field_of
+from mjsense.scene.scene import Scene
+from mjsense.sensors.configs import SceneCfg
+from mjsense.sim.simulation import Simulation
 
 if TYPE_CHECKING:
     from mjsense.dataset.episode import Episode
 
 _LIGHT = ("light_ambient", "light_diffuse", "light_specular")
 # Elements that sensors and edits may add to the archived model, which renumbers the others.
-_RENUMBERED = {"cam": (_mujoco.Obj.CAMERA, "ncam"), "light": (_mujoco.Obj.LIGHT, "nlight"), "site": (_mujoco.Obj.SITE, "nsite")}
+_RENUMBERED = {"cam": (mujoco_names.Obj.CAMERA, "ncam"), "light": (mujoco_names.Obj.LIGHT, "nlight"), "site": (mujoco_names.Obj.SITE, "nsite")}
 
 _PARTS = ["time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "userdata"]
 
@@ -73,7 +73,7 @@ class EpisodeWorlds:
         self.sim = Simulation(self.scene, num_worlds, threads=threads)
         self._rows: dict[str, Any] = {}
         for prefix, (kind, count) in _RENUMBERED.items():
-            before, now = ([_mujoco.id2name(m, kind, i) for i in range(getattr(m, count))] for m in (recorded, self.sim.model))
+            before, now = ([mujoco_names.id2name(m, kind, i) for i in range(getattr(m, count))] for m in (recorded, self.sim.model))
             kept = [i for i, name in enumerate(now) if name in before]  # additions have new names
             if len(kept) == len(before) < len(now):
                 self._rows[prefix] = kept

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from mjsense._input_files import missing
+from mjsense.core.input_files import missing
 from mjsense.dataset import index
 from mjsense.dataset.description import Description
 from mjsense.dataset.hdf5 import Group, Rows, open_h5

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mjsense._input_files import unreadable
+from mjsense.core.input_files import unreadable
 from mjsense.dataset.hdf5 import Group, Rows
 
 MAX_JSON = 16 << 20  # bytes

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from mjsense import _core
-from mjsense._input_files import unreadable
-from mjsense._optional import optional
+from mjsense.core.errors import UnknownNameError
+from mjsense.core.input_files import unreadable
+from mjsense.core.optional import optional
 from mjsense.dataset import limits
 from mjsense.dataset.places import is_plain_name, open_plain, printable
-from mjsense.errors import UnknownNameError
 
 _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
 _FILTERS = (_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF)

@@ -14,21 +14,21 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _libmujoco
-from mjsense._arguments import checked
-from mjsense._input_files import missing, read_text
-from mjsense._optional import optional
+from mjsense.core import libmujoco
+from mjsense.core.arguments import checked
+from mjsense.core.errors import UnknownNameError
+from mjsense.core.input_files import missing, read_text
+from mjsense.core.optional import optional
 from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
 from mjsense.dataset.model_sizes import image_size
-from mjsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
     import mujoco
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _RESULTS = ("next.reward", "next.success", "next.done")
@@ -393,7 +393,7 @@ class _Pose:
 
     def __init__(self, scene: Path, source: _Source, joints: Sequence[str] | None) -> None:
         if mujoco is None:
-            raise RuntimeError(f"scene needs the series of MuJoCo that mjsense uses: {_libmujoco.explain()}")
+            raise RuntimeError(f"scene needs the series of MuJoCo that mjsense uses: {libmujoco.explain()}")
         read_text(scene)
         try:
             spec = mujoco.MjSpec.from_file(str(scene))

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _libmujoco
-from mjsense._arguments import checked
+from mjsense.core import libmujoco
+from mjsense.core.arguments import checked
 from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.hdf5 import open_h5
@@ -26,7 +26,7 @@ from mjsense.dataset.model_fields import MAX_STATE
 if TYPE_CHECKING:
     import mujoco
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
 _CONTROL_FREQ = 20  # robosuite's default
 _IMAGES = ("_image", "_rgb")  # endings of the names of images: robosuite's and LIBERO's

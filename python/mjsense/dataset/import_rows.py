@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core, _libmujoco
-from mjsense._written_rows import WrittenRows
+from mjsense import _core
+from mjsense.core import libmujoco
 from mjsense.dataset.archive import MAX_BYTES, MODEL_FILE, archive_bytes, files_of
 from mjsense.dataset.closed_model import check_member, close_names, compile_closed, parsed
 from mjsense.dataset.model_sizes import check_sizes
-from mjsense.recorder import FILE_OPTIONS, VIDEO_OPTIONS
+from mjsense.recording.recorder import FILE_OPTIONS, VIDEO_OPTIONS
+from mjsense.recording.written_rows import WrittenRows
 
 if TYPE_CHECKING:
     import mujoco
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
 OPTIONS = FILE_OPTIONS | VIDEO_OPTIONS
 NOT_A_NUMBER = " NaN: as in the imported file."
@@ -85,5 +86,5 @@ def unique_name(file: str, content: bytes) -> str:
 def compile_archive(archive: bytes, about: str) -> mujoco.MjModel:
     """The model of an archive."""
     if mujoco is None:
-        raise RuntimeError(f"import needs the series of MuJoCo that mjsense uses: {_libmujoco.explain()}")
+        raise RuntimeError(f"import needs the series of MuJoCo that mjsense uses: {libmujoco.explain()}")
     return compile_closed(files_of(io.BytesIO(archive), about), about)

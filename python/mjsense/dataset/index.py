@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from mjsense._optional import optional
+from mjsense.core.optional import optional
 from mjsense.dataset.limits import EPISODES, STEPS, TEXT_BYTES
 from mjsense.dataset.places import open_plain, printable
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _libmujoco
-from mjsense._mujoco import Joint
-from mjsense._options import PREFIX
-from mjsense._randomizable import field_of, is_randomizable, valid_values
+from mjsense.core import libmujoco
+from mjsense.core.mujoco_names import Joint
+from mjsense.scene.physics_options import PREFIX
+from mjsense.scene.randomizable import field_of, is_randomizable, valid_values
 
 if TYPE_CHECKING:
     import mujoco
@@ -129,7 +129,7 @@ def check_inputs(inputs: ReplayInputs, model: mujoco.MjModel, size: int, substep
     """
     found = inputs.state.shape[1]
     if found != size:
-        raise ValueError(f"{about}: the recorded state has {found} numbers, that of MuJoCo {'.'.join(map(str, _libmujoco.SERIES))} has {size}. "
+        raise ValueError(f"{about}: the recorded state has {found} numbers, that of MuJoCo {'.'.join(map(str, libmujoco.SERIES))} has {size}. "
                          "Replay needs a MuJoCo of the series that recorded.")  # fmt: skip
     if inputs.written.shape != inputs.state.shape:
         raise ValueError(f"{about}: replay/written has the shape {[*inputs.written.shape]}, expected {[*inputs.state.shape]}")

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _libmujoco
-from mjsense._randomizable import field_of
+from mjsense.core import libmujoco
 from mjsense.dataset import playback
 from mjsense.dataset.archive import MODEL_FILE, read_archive
 from mjsense.dataset.closed_model import closed_model
+from mjsense.scene.randomizable import field_of
 
 if TYPE_CHECKING:
     import mujoco
 
     from mjsense.dataset.episode import Episode
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
 # Element lists of mjSpec by the prefix of their fields in mjModel. Fields and attributes have the same names, except those in _RENAMED.
 _ELEMENTS = {"body": "bodies", "geom": "geoms", "jnt": "joints", "site": "sites", "cam": "cameras", "light": "lights", "mat": "materials",

@@ -9,7 +9,7 @@ import os
 import stat
 from pathlib import Path
 
-from mjsense._input_files import missing
+from mjsense.core.input_files import missing
 from mjsense.dataset.limits import NAME_BYTES, SPARSE_FREE, SPARSE_RATIO
 
 _KINDS = ((stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))

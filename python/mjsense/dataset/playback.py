@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _libmujoco
+from mjsense.core import libmujoco
 from mjsense.dataset.archive import read_archive
 from mjsense.dataset.closed_model import check_archive, compile_closed
 from mjsense.dataset.hdf5 import open_h5, text_of
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
     from mjsense.dataset.episode import Episode
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
-STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if _libmujoco.shared else 0
+STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if libmujoco.shared else 0
 
 @dataclass(frozen=True)
 class ReplayInputs:
@@ -67,8 +67,8 @@ def inputs_of(episode: Episode) -> ReplayInputs:
 
 
 def _require_mujoco() -> None:
-    if _libmujoco.shared is None:
-        raise RuntimeError(f"replay needs the series of MuJoCo that mjsense records with: {_libmujoco.explain()}")
+    if libmujoco.shared is None:
+        raise RuntimeError(f"replay needs the series of MuJoCo that mjsense records with: {libmujoco.explain()}")
 
 
 def archive_of(episode: Episode) -> Path:
@@ -147,7 +147,7 @@ def check_episode(episode: Episode) -> None:
     Without the package ``mujoco`` the archive and the arrays are checked, but not the values of the model's fields.
     """
     archive = archive_of(episode)
-    if _libmujoco.shared is None:
+    if libmujoco.shared is None:
         check_archive(archive)
         inputs_of(episode)
         return

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mjsense._optional import optional
+from mjsense.core.optional import optional
 from mjsense.dataset.files import INDEX
 from mjsense.dataset.places import is_plain_name, printable
 

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core, _mujoco
-from mjsense._rotations import quaternions_of
-from mjsense.configs import CameraSensorCfg
-from mjsense.core_sensors import CameraImageSensor, CameraParameterSensor
+from mjsense import _core
+from mjsense.core import mujoco_names
+from mjsense.core.errors import UnknownNameError, did_you_mean
+from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.description import is_known_thing
 from mjsense.dataset.hdf5 import open_h5
-from mjsense.errors import UnknownNameError, did_you_mean
+from mjsense.sensors.configs import CameraSensorCfg
+from mjsense.sensors.core_sensors import CameraImageSensor, CameraParameterSensor
 
 if TYPE_CHECKING:
     from mjsense.dataset.episode import Episode
@@ -188,7 +189,7 @@ class CameraSystem:
         self._system.initialize(worlds.sim._core)
         model = worlds.sim.model
         sites = [ROBOT_PREFIX + group["leaf_site"] for group in self._robot.groups if group["kind"] == "gripper"]
-        self._sites = [_mujoco.name2id(model, _mujoco.Obj.SITE, site) for site in sites]
+        self._sites = [mujoco_names.name2id(model, mujoco_names.Obj.SITE, site) for site in sites]
 
     def place(self, world: int, episode: Episode) -> None:
         """Places the cameras for an episode, of which the world shows the first state."""
@@ -197,7 +198,7 @@ class CameraSystem:
         sim = self._worlds.sim
         objects = episode.obs_scene.get("objects", {})
         names = [role.get("body") for role in (objects.values() if isinstance(objects, dict) else ()) if isinstance(role, dict)]
-        bodies = [_mujoco.name2id(sim.model, _mujoco.Obj.BODY, name) for name in names if isinstance(name, str)]
+        bodies = [mujoco_names.name2id(sim.model, mujoco_names.Obj.BODY, name) for name in names if isinstance(name, str)]
         points = [sim.data.xpos[world, body] for body in bodies if body >= 0]
         points += [sim.data.site_xpos[world, site] for site in self._sites if site >= 0]
         centre = sum(points, np.zeros(3)) * (1.0 / len(points)) if points else np.zeros(3)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from mjsense import _libmujoco
-from mjsense._arguments import checked
-from mjsense._mujoco import Obj, id2name
-from mjsense._progress import counter
+from mjsense.core import libmujoco
+from mjsense.core.arguments import checked
+from mjsense.core.mujoco_names import Obj, id2name
+from mjsense.core.progress_line import counter
 from mjsense.dataset.dataset import Dataset, opened
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode_worlds import OwnStepper
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from mjsense.dataset.episode import Episode
 else:
-    mujoco = _libmujoco.shared
+    mujoco = libmujoco.shared
 
 
 @checked

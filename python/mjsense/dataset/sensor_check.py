@@ -13,9 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
-from mjsense._options import PREFIX
-from mjsense._randomizable import field_of
-from mjsense.assets import use_installed_meshes
 from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
 from mjsense.dataset.description import named_file
@@ -26,9 +23,12 @@ from mjsense.dataset.hdf5 import Rows, open_h5, text_of
 from mjsense.dataset.limits import TEXT_BYTES
 from mjsense.dataset.places import open_plain
 from mjsense.dataset.playback import ReplayInputs, fields_of, inputs_of
-from mjsense.ffmpeg import use_installed_ffmpeg
-from mjsense.recorder import FILE_OPTIONS, recorded_sensors
-from mjsense.simulation import Simulation
+from mjsense.recording.ffmpeg import use_installed_ffmpeg
+from mjsense.recording.recorder import FILE_OPTIONS, recorded_sensors
+from mjsense.scene.physics_options import PREFIX
+from mjsense.scene.randomizable import field_of
+from mjsense.sim.simulation import Simulation
+from mjsense.tasks.assets import use_installed_meshes
 
 if TYPE_CHECKING:
     from mjsense.dataset.episode import Episode

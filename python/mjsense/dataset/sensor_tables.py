@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mjsense import configs
-from mjsense._input_files import read_toml
-from mjsense.errors import did_you_mean
-from mjsense.robot import sensor_of_class
+from mjsense.core.errors import did_you_mean
+from mjsense.core.input_files import read_toml
+from mjsense.sensors import configs
+from mjsense.tasks.robot import sensor_of_class
 
 _PYTHON = "python"
 

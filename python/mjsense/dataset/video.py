@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from mjsense._arguments import checked
+from mjsense.core.arguments import checked
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.places import open_plain
 from mjsense.dataset.video_decoder import Decoder, Packets, check_sum, have_av, to_array
-from mjsense.ffmpeg import frames_of
+from mjsense.recording.ffmpeg import frames_of
 
 _CHUNK_BYTES = 1 << 28  # of the frames that one start of ffmpeg decodes, at most
 _CHUNK = 64  # frames that one start of ffmpeg decodes; a start costs as much as about 50 frames of 640x368

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mjsense._optional import optional
+from mjsense.core.optional import optional
 from mjsense.dataset.places import PlainFile, open_plain, printable
 
 CODECS = "h264,ffv1"

@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from mjsense._arrays import on_host
+from mjsense.core.arrays import on_host
 
 
 @cache

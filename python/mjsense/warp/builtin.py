@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 from mujoco_warp._src import types
 
-from mjsense import _mujoco
+from mjsense.core import mujoco_names
 from mjsense.warp.sensor import Stage, WarpSensor, Worlds, implements, unsupported
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 
 @implements("builtin")
@@ -20,7 +20,7 @@ class Builtin(WarpSensor):
     def __init__(self, worlds: Worlds, sensor: NativeSensor) -> None:
         super().__init__(worlds, sensor)
         model = worlds.compiled.model
-        index = _mujoco.name2id(model, _mujoco.Obj.SENSOR, sensor.name)
+        index = mujoco_names.name2id(model, mujoco_names.Obj.SENSOR, sensor.name)
         if "history" in sensor.specs:
             raise unsupported(sensor.name, f"nsample = {sensor.specs['history'].shape[0]}")
         self.needs = Stage(int(model.sensor_needstage[index]))

@@ -9,12 +9,12 @@ import mujoco_warp as mjw
 import numpy as np
 import warp as wp
 
-from mjsense import _mujoco
+from mjsense.core import mujoco_names
 from mjsense.warp.camera_normals import CameraNormals
 from mjsense.warp.sensor import WarpSensor, Worlds, declared, implements, unsupported
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 wp.set_module_options({"enable_backward": False})
 
@@ -129,7 +129,7 @@ class Camera(WarpSensor):
         self.check_options()
         if cfg.intrinsics is None and not (cfg.camera_name and cfg.fovy):
             self.fixed_fields = ("cam_fovy", "cam_intrinsic", "cam_sensorsize")
-        self.camera = _mujoco.name2id(model, _mujoco.Obj.CAMERA, cfg.camera_name or self.name)
+        self.camera = mujoco_names.name2id(model, mujoco_names.Obj.CAMERA, cfg.camera_name or self.name)
         self.fields = declared(worlds, sensor)
         self.pixels = cfg.width * cfg.height
         self._make_context(model)
@@ -199,7 +199,7 @@ class Camera(WarpSensor):
 
     def _make_owners(self, model: Any) -> None:
         entities = list(self.worlds.compiled.scene.entities)
-        names = [_mujoco.id2name(model, _mujoco.Obj.GEOM, i) or "" for i in range(model.ngeom)]
+        names = [mujoco_names.id2name(model, mujoco_names.Obj.GEOM, i) or "" for i in range(model.ngeom)]
         owners = np.full(max(model.ngeom, 1), -1)
         for i, entity in enumerate(entities):
             prefix = f"{entity}/"

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from mjsense import _core, _mujoco
+from mjsense import _core
+from mjsense.core import mujoco_names
 from mjsense.warp import contact_memory
 from mjsense.warp.contact_kernels import (
     MAXFORCE,
@@ -26,7 +27,7 @@ from mjsense.warp.contact_lists import ContactLists
 from mjsense.warp.sensor import Stage, WarpSensor, Worlds, declared, implements, rows_view, vec3_view
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 _REDUCE = {"none": NONE, "mindist": MINDIST, "maxforce": MAXFORCE, "netforce": NETFORCE}
 
@@ -118,17 +119,17 @@ def _needs_forces(cfg: Any) -> bool:
 def _members(model: Any, match: Any, names: tuple[str, ...]) -> np.ndarray:
     """Which geoms belong to each of the matched elements, bool ``[len(names), ngeom]``."""
     geoms = match.mode == "geom"
-    kind = _mujoco.Obj.GEOM if geoms else _mujoco.Obj.BODY
+    kind = mujoco_names.Obj.GEOM if geoms else mujoco_names.Obj.BODY
     rows = []
     for name in names:
         full = f"{match.entity}/{name}" if match.entity and match.entity != "terrain" else name
-        index = _mujoco.name2id(model, kind, full)
+        index = mujoco_names.name2id(model, kind, full)
         if geoms:
             rows.append(np.arange(model.ngeom) == index)
         elif match.mode == "body":
             rows.append(model.geom_bodyid == index)
         else:
-            rows.append(_mujoco.bodies_below(model, index)[model.geom_bodyid])
+            rows.append(mujoco_names.bodies_below(model, index)[model.geom_bodyid])
     return np.array(rows, np.uint8).reshape(len(names), model.ngeom)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from mjsense import effects as configs
+from mjsense.sensors import effects as configs
 from mjsense.warp.random import Rng, make_rng, normal, uniform
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})  # the arithmetic of the C++ library, bit for bit

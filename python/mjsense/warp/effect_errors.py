@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import warp as wp
 
-from mjsense import effects as configs
+from mjsense.sensors import effects as configs
 from mjsense.warp.effect_base import (
     GAUSSIAN,
     ONE,

@@ -9,7 +9,7 @@ from mjsense.warp.effects import Chain, needs_every_step
 from mjsense.warp.sensor import Stage, WarpSensor, Worlds, declared, implements
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 
 class ChainSensor(WarpSensor):

@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from mjsense import effects as configs
+from mjsense.sensors import effects as configs
 from mjsense.warp.effect_base import ROW_TYPES, ZERO, Clock, Effect, episode_rng, step_rng
 from mjsense.warp.random import below, uniform, uniform_of_words, word
 

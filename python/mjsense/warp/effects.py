@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The effects of ``mjsense.effects`` on rows ``[B, size]`` of a device. Arithmetic is float64 in the order of the C++ library, and
+"""The effects of ``mjsense.sensors.effects`` on rows ``[B, size]`` of a device. Arithmetic is float64 in the order of the C++ library, and
 random numbers are the same, so that rows are equal bit for bit where the device's log, sin, cos and exp are those of the host; see
 the page of the backend for the bound elsewhere.
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import warp as wp
 
-from mjsense import effects as configs
+from mjsense.sensors import effects as configs
 from mjsense.warp import effect_errors, effect_timing
 from mjsense.warp.effect_base import ROW_TYPES, ZERO, Clock
 from mjsense.warp.random import stream_of
@@ -85,7 +85,7 @@ class Chain:
 
     Args:
         worlds: Clocks, keys and seed of the worlds.
-        effects: Configurations from ``mjsense.effects``, checked already.
+        effects: Configurations from ``mjsense.sensors.effects``, checked already.
         stream: Name of the stream of random numbers: the sensor, or ``sensor/field``.
         source: The rows, ``[B, ...]``.
         out: Where the results go: ``[B, ...]``, or ``[B, history_length, ...]``. Without history it may be ``source``.

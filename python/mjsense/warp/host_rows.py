@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from mjsense._written_rows import WrittenRows
-from mjsense.sensor import Sensor
+from mjsense.recording.written_rows import WrittenRows
+from mjsense.sensors.sensor import Sensor
 
 
 class HostRows:

@@ -6,14 +6,15 @@ from __future__ import annotations
 from math import radians
 from typing import TYPE_CHECKING, Any
 
-from mjsense import _mujoco, effects
-from mjsense.configs import ImuAxis, ImuModel
+from mjsense.core import mujoco_names
+from mjsense.sensors import effects
+from mjsense.sensors.configs import ImuAxis, ImuModel
 from mjsense.warp.effect_sensor import ChainSensor
 from mjsense.warp.effects import Chain, needs_every_step
 from mjsense.warp.sensor import Stage, Worlds, declared, implements
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 _G = 9.80665  # m/s^2
 PRESETS = {
@@ -60,7 +61,7 @@ class Imu(ChainSensor):
         errors = {"acc": [*effects_of(device.accelerometer), *cfg.effects], "gyro": [*effects_of(device.gyroscope), *cfg.effects]}
         self.chains = []
         for part, out in self.fields.items():
-            begin = int(model.sensor_adr[_mujoco.name2id(model, _mujoco.Obj.SENSOR, f"{self.name}_{part}")])
+            begin = int(model.sensor_adr[mujoco_names.name2id(model, mujoco_names.Obj.SENSOR, f"{self.name}_{part}")])
             clean = worlds.data.sensordata[:, begin : begin + out.shape[1]]
             self.chains.append(Chain(worlds, errors.get(part, []), f"{self.name}/{part}", clean, out))
         self.every_step = needs_every_step(errors["acc"]) or needs_every_step(errors["gyro"])

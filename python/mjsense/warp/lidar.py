@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import warp as wp
 
-from mjsense.configs import SpinningScanCfg
+from mjsense.sensors.configs import SpinningScanCfg
 from mjsense.warp.random import make_rng, normal, normal_at, stream_of, uniform
 from mjsense.warp.rays import Frames, Hits, RayCast, Rays, world_ray
 from mjsense.warp.sensor import Worlds, implements, vec3_view
 from mjsense.warp.surfaces import Surfaces, colour
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from mjsense import _mujoco
+from mjsense.core import mujoco_names
 from mjsense.warp.pose_history import Pose, PoseHistory, clear, make_history, pose_at, push
 from mjsense.warp.sensor import WarpSensor, Worlds, declared, implements, unsupported, vec3_view
 from mjsense.warp.surfaces import Filter, Surfaces, nearest_hit, ray_scene
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 wp.set_module_options({"enable_backward": False})
 
@@ -259,16 +259,16 @@ class RayCast(WarpSensor):
         times = np.asarray(getattr(pattern, "times", ()), float)
         if camera := getattr(pattern, "camera_name", None):
             model = self.worlds.compiled.model
-            directions = camera_rays(model, _mujoco.name2id(model, _mujoco.Obj.CAMERA, camera))
+            directions = camera_rays(model, mujoco_names.name2id(model, mujoco_names.Obj.CAMERA, camera))
             return np.zeros_like(directions), directions, times, 1
         return *pattern.generate_rays(), times, 1
 
     def _make_frames(self, refs: Any) -> None:
         worlds, data, model = self.worlds, self.worlds.data, self.worlds.compiled.model
         kinds = {"body": 0, "xbody": 0, "site": 1, "geom": 2, "camera": 3}
-        objects = [_mujoco.Obj.BODY, _mujoco.Obj.SITE, _mujoco.Obj.GEOM, _mujoco.Obj.CAMERA]
+        objects = [mujoco_names.Obj.BODY, mujoco_names.Obj.SITE, mujoco_names.Obj.GEOM, mujoco_names.Obj.CAMERA]
         kind = [kinds[ref.type] for ref in refs]
-        ids = [_mujoco.name2id(model, objects[k], ref.full_name) for k, ref in zip(kind, refs, strict=True)]
+        ids = [mujoco_names.name2id(model, objects[k], ref.full_name) for k, ref in zip(kind, refs, strict=True)]
         owners = [np.arange(model.nbody), model.site_bodyid, model.geom_bodyid, model.cam_bodyid]
         self.bodies = [int(owners[k][i]) for k, i in zip(kind, ids, strict=True)]
         f = self.frames = Frames()

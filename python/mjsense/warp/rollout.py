@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from mjsense import _core
-from mjsense._arrays import on_host
-from mjsense._written_values import numbers
-from mjsense.configs import SceneCfg
-from mjsense.scene import Scene
-from mjsense.simulation import Simulation
-from mjsense.task import Task, WorldState
-from mjsense.vector import TaskVectorEnv
+from mjsense.core.arrays import on_host
+from mjsense.scene.scene import Scene
+from mjsense.scene.written_values import numbers
+from mjsense.sensors.configs import SceneCfg
+from mjsense.sim.simulation import Simulation
+from mjsense.tasks.task import Task, WorldState
+from mjsense.tasks.vector import TaskVectorEnv
 from mjsense.warp.arrays import torch
 from mjsense.warp.host_rows import stream_of
 from mjsense.warp.scene_robot import SceneRobot

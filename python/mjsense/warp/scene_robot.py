@@ -11,10 +11,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from mjsense import _mujoco
-from mjsense.errors import UnknownNameError
-from mjsense.sensor import Sensor
-from mjsense.task import WorldState
+from mjsense.core import mujoco_names
+from mjsense.core.errors import UnknownNameError
+from mjsense.sensors.sensor import Sensor
+from mjsense.tasks.task import WorldState
 from mjsense.warp.arrays import torch
 
 _HINGE_OR_SLIDE = (2, 3)
@@ -41,7 +41,7 @@ class SceneRobot:
 
     def __init__(self, model: Any, entity: str, groups: Sequence[tuple[str, Sequence[str]]], context: str) -> None:
         prefix = f"{entity}/" if entity else ""
-        kinds = _mujoco.Obj
+        kinds = mujoco_names.Obj
         bodies = _named(model, kinds.BODY, model.nbody, prefix)
         if entity and not bodies:
             known = sorted({name.split("/")[0] for name in _named(model, kinds.BODY, model.nbody, "") if "/" in name})
@@ -60,7 +60,7 @@ class SceneRobot:
         for group in self.groups:
             for actuator in group.actuators:
                 if actuator in owners:
-                    name = _mujoco.id2name(model, kinds.ACTUATOR, actuator)
+                    name = mujoco_names.id2name(model, kinds.ACTUATOR, actuator)
                     raise ValueError(
                         f"{context}: actuator '{name}' belongs to the move groups '{owners[actuator]}' and '{group.name}'"
                     )
@@ -130,7 +130,7 @@ class _BasePose(Sensor):
 
 def _named(model: Any, kind: Any, count: int, prefix: str) -> dict[str, int]:
     """Local name -> id of the elements whose names begin with the prefix."""
-    names = [_mujoco.id2name(model, kind, i) or "" for i in range(count)]
+    names = [mujoco_names.id2name(model, kind, i) or "" for i in range(count)]
     return {name[len(prefix) :]: i for i, name in enumerate(names) if name.startswith(prefix)}
 
 

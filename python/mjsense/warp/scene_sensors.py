@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
-from mjsense import data
-from mjsense.sensor import Sensor
+from mjsense.sensors import data
+from mjsense.sensors.sensor import Sensor
 from mjsense.warp import arrays, builtin, camera, contact, effect_sensor, imu, lidar, physics, rays, terrain_height
 from mjsense.warp.graphs import Graphs
 from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, unsupported

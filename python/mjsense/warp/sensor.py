@@ -14,8 +14,8 @@ import numpy as np
 import warp as wp
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
-    from mjsense.simulation import Simulation
+    from mjsense.sensors.native_sensor import NativeSensor
+    from mjsense.sim.simulation import Simulation
 
 DTYPES: dict[str, Any] = {
     "float32": wp.float32, "float64": wp.float64, "int32": wp.int32, "int64": wp.int64, "uint8": wp.uint8, "bool": wp.bool,

@@ -11,13 +11,13 @@ import mujoco_warp as mjw
 import numpy as np
 import warp as wp
 
-from mjsense import _mujoco
-from mjsense._arguments import KnownAttributes, Seed, checked
-from mjsense._arrays import ids_of_worlds, on_host
-from mjsense._options import PREFIX
-from mjsense._randomizable import check_randomizable, valid_values
-from mjsense.errors import did_you_mean
-from mjsense.sensor import Sensor
+from mjsense.core import mujoco_names
+from mjsense.core.arguments import KnownAttributes, Seed, checked
+from mjsense.core.arrays import ids_of_worlds, on_host
+from mjsense.core.errors import did_you_mean
+from mjsense.scene.physics_options import PREFIX
+from mjsense.scene.randomizable import check_randomizable, valid_values
+from mjsense.sensors.sensor import Sensor
 from mjsense.warp import arrays, builtin, host_rows, kernels, limits, physics
 from mjsense.warp.graphs import Graphs
 from mjsense.warp.scene_sensors import SceneSensors
@@ -27,8 +27,8 @@ from mjsense.warp.stepper import FINITE, Stepper
 from mjsense.warp.world_models import WorldModels
 
 if TYPE_CHECKING:
-    from mjsense.scene import Scene
-    from mjsense.simulation import Simulation
+    from mjsense.scene.scene import Scene
+    from mjsense.sim.simulation import Simulation
 
 @checked
 class WarpSimulation(KnownAttributes):
@@ -381,7 +381,7 @@ class WarpSimulation(KnownAttributes):
         """Row of the start states."""
         model = self.model
         if isinstance(key, str):
-            found = _mujoco.name2id(model, _mujoco.Obj.KEY, key)
+            found = mujoco_names.name2id(model, mujoco_names.Obj.KEY, key)
             if found < 0:
                 raise ValueError(f"no keyframe '{key}'; there are {[model.key(i).name for i in range(model.nkey)]}")
             key = found

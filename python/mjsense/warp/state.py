@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import warp as wp
 
-from mjsense.errors import did_you_mean
+from mjsense.core.errors import did_you_mean
 from mjsense.warp import arrays
 from mjsense.warp.sensor import scalar_view
 

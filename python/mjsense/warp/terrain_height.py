@@ -13,7 +13,7 @@ from mjsense.warp.shapes import NO_HIT
 from mjsense.warp.surfaces import Surfaces, nearest_hit
 
 if TYPE_CHECKING:
-    from mjsense.native_sensor import NativeSensor
+    from mjsense.sensors.native_sensor import NativeSensor
 
 wp.set_module_options({"enable_backward": False})
 

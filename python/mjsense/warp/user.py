@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from mjsense._arrays import on_host
-from mjsense._rows import leaves, nested, rows_of_space
-from mjsense._user_code import named, required, takes
+from mjsense.core.arrays import on_host
+from mjsense.sensors.row_declarations import leaves, nested, rows_of_space
+from mjsense.sensors.user_code import named, required, takes
 from mjsense.warp import arrays
 from mjsense.warp.sensor import DTYPES, Stage, WarpSensor, Worlds, unsupported
 
 if TYPE_CHECKING:
-    from mjsense.sensor import Sensor
+    from mjsense.sensors.sensor import Sensor
 
 
 class UserSensor(WarpSensor):

@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from mjsense import _core
-from mjsense.errors import did_you_mean
+from mjsense.core.errors import did_you_mean
 from mjsense.warp import physics
 
 _SET_CONST = (

@@ -46,7 +46,7 @@ print(f"largest differences: rays {np.abs(rays - our_rays).max():.1e} m, forces 
       f"air time {np.abs(air - our_air).max():.1e} s; depth: median {np.median(error):.1e} m")  # fmt: skip
 print(f"CPU time of 4 physics steps and all sensors, {worlds} worlds: mjlab {times[0][1]:.1f} ms, mjsense {times[1][1]:.2f} ms")
 if len(sys.argv) > 3:
-    from mjsense._png import png_of
+    from mjsense.core.png import png_of
 
     Path(sys.argv[3]).write_bytes(png_of(np.concatenate((rgb[0], our_rgb[0]), 1)))
 np.testing.assert_allclose(our_rays, rays, atol=1e-5)

@@ -47,7 +47,7 @@ for width, height in ((84, 84), (256, 256), (640, 480)) if rounds else ((84, 84)
     red = [(image[..., 0] > 100) & (image[..., 1] < 60) for image in (theirs[0], ours[0])]
     assert (red[0] & red[1]).sum() > 0.9 * (red[0] | red[1]).sum() > 0.02 * width * height
     if len(sys.argv) > 3 and width == 256:
-        from mjsense._png import png_of
+        from mjsense.core.png import png_of
 
         Path(sys.argv[3]).write_bytes(png_of(np.concatenate((theirs[0], ours[0]), 1)))
     if rounds:

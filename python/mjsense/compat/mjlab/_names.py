@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from mjsense.errors import UnknownNameError
+from mjsense.core.errors import UnknownNameError
 
 
 def matching(expressions: str | Iterable[str], names: Sequence[str]) -> list[str]:

@@ -10,9 +10,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsense import configs
 from mjsense.compat.mjlab._names import find, value_of
 from mjsense.compat.mjlab.actuator import ActuatorCfg, TransmissionType, XmlActuatorCfg
+from mjsense.sensors import configs
 
 _FREE = mujoco.mjtJoint.mjJNT_FREE
 

@@ -11,13 +11,15 @@ from typing import Any
 import mujoco
 
 import mjsense
-from mjsense import _core, _mujoco, configs
+from mjsense import _core
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.compat.mjlab.entity import Entity, EntityCfg
 from mjsense.compat.mjlab.sensor import BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorCfg, SensorContext
 from mjsense.compat.mjlab.sensor.sensor import GivenSensor, OwnSensor, native_sensor
 from mjsense.compat.mjlab.terrains import TerrainEntityCfg
-from mjsense.errors import UnknownNameError
+from mjsense.core import mujoco_names
+from mjsense.core.errors import UnknownNameError
+from mjsense.sensors import configs
 
 
 @dataclass(kw_only=True)
@@ -88,7 +90,7 @@ class Scene:
         self._sensors = {name: _wrapped(sensor, by_name.get(name)) for name, sensor in self.native.sensors.items()}
         cameras = [sensor for sensor in self._sensors.values() if isinstance(sensor, CameraSensor)]
         for camera in cameras:
-            camera.camera_idx = _mujoco.name2id(self.native.model, _mujoco.Obj.CAMERA, camera.camera_name)
+            camera.camera_idx = mujoco_names.name2id(self.native.model, mujoco_names.Obj.CAMERA, camera.camera_name)
         rays = [sensor for sensor in self._sensors.values() if isinstance(sensor, RayCastSensor)]
         self._context = SensorContext(cameras, rays) if cameras or rays else None
         self._entities = {name: Entity(e, scene_cfg.entities.get(name, scene_cfg.terrain)) for name, e in self.native.entities.items()}

@@ -9,11 +9,11 @@ from typing import Any
 import mujoco
 
 import mjsense
-from mjsense import configs
 from mjsense.compat.mjlab._data import Data
 from mjsense.compat.mjlab._tensors import ids
 from mjsense.compat.mjlab.scene import scene_of
 from mjsense.compat.mjlab.sensor.sensor_context import SensorContext
+from mjsense.sensors import configs
 
 
 @dataclass

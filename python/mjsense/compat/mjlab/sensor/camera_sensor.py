@@ -7,8 +7,8 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
-from mjsense import configs
 from mjsense.compat.mjlab.sensor.sensor import NativeSensor, SensorCfg
+from mjsense.sensors import configs
 
 
 @dataclass

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from mjsense import configs
 from mjsense.compat.mjlab.sensor.builtin_sensor import ObjRef
 from mjsense.compat.mjlab.sensor.sensor import NativeSensor, SensorCfg
+from mjsense.sensors import configs
 
 
 @dataclass

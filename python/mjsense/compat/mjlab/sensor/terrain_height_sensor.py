@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mjsense import configs
 from mjsense.compat.mjlab.sensor.raycast_sensor import RayCastData, RayCastSensor, RayCastSensorCfg
+from mjsense.sensors import configs
 
 
 @dataclass

@@ -12,8 +12,8 @@ from typing import Any
 
 import mujoco
 
-from mjsense import configs
 from mjsense.compat.mjlab.entity import EntityCfg
+from mjsense.sensors import configs
 
 
 @dataclass(kw_only=True)

@@ -8,8 +8,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from mjsense.sensor import Sensor
-from mjsense.suite import SensorSuite
+from mjsense.sensors.sensor import Sensor
+from mjsense.sensors.suite import SensorSuite
 
 
 class CoreSensor(Sensor):

@@ -11,10 +11,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from mjsense._mujoco import bodies_below
 from mjsense.compat.molmospaces.env.abstract_sensors import CoreSensor, Sensor
-from mjsense.core_sensors import TcpPoseSensor
-from mjsense.peer.matrices import matrix_of, pose_of_matrix
+from mjsense.compat.peer.matrices import matrix_of, pose_of_matrix
+from mjsense.core.mujoco_names import bodies_below
+from mjsense.sensors.core_sensors import TcpPoseSensor
 
 _POSE = gymnasium.spaces.Box(-np.inf, np.inf, (7,), np.float32)
 _NUMBER = gymnasium.spaces.Box(-(2**31), 2**31 - 1, (), np.int64)

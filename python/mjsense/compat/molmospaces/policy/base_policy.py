@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mjsense.compat.molmospaces.env.sensors import PolicyNumRetriesSensor, PolicyPhaseSensor
-from mjsense.policy import Policy
-from mjsense.task import snake_case
+from mjsense.tasks.policy import Policy
+from mjsense.tasks.task import snake_case
 
 
 class BasePolicy:

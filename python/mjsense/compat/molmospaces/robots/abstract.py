@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots."""
 
-from mjsense.robot import Robot
+from mjsense.tasks.robot import Robot
 
 __all__ = ["Robot"]

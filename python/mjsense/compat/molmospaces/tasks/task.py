@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 import mjsense
-from mjsense._streams import nest, stream_path
 from mjsense.compat.molmospaces.env.abstract_sensors import CoreSensor
 from mjsense.compat.molmospaces.env.sensors import RoleName
-from mjsense.peer.config import PeerConfig, PeerTaskConfig
-from mjsense.suite import SensorSuite
+from mjsense.compat.peer.config import PeerConfig, PeerTaskConfig
+from mjsense.sensors.nested_streams import nest, stream_path
+from mjsense.sensors.suite import SensorSuite
 
 
 class TaskConfig(PeerTaskConfig):

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from mjsense.compat.molmospaces.env.sensors import CameraSensor, DepthSensor
-from mjsense.core_sensors import CameraImageSensor
-from mjsense.native_sensor import NativeSensor
-from mjsense.sensor import encode_json
-from mjsense.suite import SensorSuite
+from mjsense.sensors.core_sensors import CameraImageSensor
+from mjsense.sensors.native_sensor import NativeSensor
+from mjsense.sensors.sensor import encode_json
+from mjsense.sensors.suite import SensorSuite
 
 
 def is_camera_sensor(sensor_name: str, sensor_suite: SensorSuite | None) -> bool:

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images of models and data of any MuJoCo, with the interface of ``mujoco.Renderer``."""

@@ -1,0 +1,547 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjsense.Renderer``: the interface of ``mujoco.Renderer``, without OpenGL."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from concurrent.futures import ThreadPoolExecutor, wait
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _core
+from mjsense.core.arguments import OutputArray, checked
+from mjsense.core.errors import nearest
+from mjsense.core.one_thread import OneThread, guarded
+from mjsense.rendering import scene_layout
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import mujoco
+
+# fmt: off
+_MODEL_ARRAYS = (
+    "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_normaladr", "mesh_normalnum", "mesh_texcoordadr",
+    "mesh_texcoordnum", "mesh_graphadr", "mesh_vert", "mesh_normal", "mesh_texcoord", "mesh_face", "mesh_facenormal", "mesh_facetexcoord",
+    "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
+    "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
+    "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
+)
+"""The model's arrays that an image depends on and that are not in the abstract scene."""
+
+_SCENE_ARRAYS = (
+    "flexedgeadr", "flexedgenum", "flexedge", "flexvertadr", "flexvertnum", "flexfaceadr", "flexfaceused", "flexvert", "flexface",
+    "flexnormal", "flextexcoord", "skinfacenum", "skinvertadr", "skinvertnum", "skinvert", "skinnormal",
+)
+
+_SIZES = (
+    "nq", "nv", "nbody", "ngeom", "nsite", "ncam", "nlight", "nmesh", "nskin", "nflex", "nflexvert", "ntendon", "nu", "ntex", "nmat",
+)
+# fmt: on
+
+# Flags of renderer.scene.flags (mjtRndFlag) by their effect here.
+_REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
+_REFUSED_IF_CLEAR = ("mjRND_CULL_FACE",)
+_SHOWN = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")
+
+
+_KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
+    "rgb": (np.uint8, (3,)),
+    "depth": (np.float32, ()),
+    "segmentation": (np.int32, (2,)),
+}
+"""Element type and channels by kind of image."""
+
+_NO_POSES = "`data` has no poses yet, and no geoms are drawn: call mujoco.mj_forward(model, data)"
+_NO_CAMERA = "the image is empty, because its camera has no pose: call mujoco.mj_forward(model, data) and update_scene(data) before"
+
+
+def _has_poses(data: mujoco.MjData) -> bool:
+    return bool(data.xmat[0].any())  # otherwise MuJoCo has not even computed that of the world
+
+
+class _Pool:
+    """Threads of this process, with a renderer for each."""
+
+    def __init__(self, make: Callable[[], Renderer]) -> None:
+        self.process = os.getpid()
+        count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self.threads = ThreadPoolExecutor(count)
+        self.free: SimpleQueue[Renderer] = SimpleQueue()
+        self._make = make
+
+    def take(self) -> Renderer:
+        try:
+            return self.free.get_nowait()
+        except Empty:
+            return self._make()
+
+
+def camera_of_name(model: mujoco.MjModel, name: str) -> int:
+    """The id of a camera; ValueError with the nearest names if there is none."""
+    import mujoco
+
+    kind = mujoco.mjtObj.mjOBJ_CAMERA.value
+    id = mujoco.mj_name2id(model, kind, name)
+    if id == -1:
+        names = [mujoco.mj_id2name(model, kind, i) or f"(camera {i}, unnamed)" for i in range(model.ncam)]
+        near = nearest(name, names, cutoff=0.0)
+        known = f"Nearest: {', '.join(near)}." if near else "The model has no cameras."
+        raise ValueError(f'The camera "{name}" does not exist. {known}')
+    return id
+
+
+@checked
+class Renderer:
+    """Renders MuJoCo scenes on the CPU, with the interface of ``mujoco.Renderer`` and without OpenGL.
+
+    Works with models and data of the MuJoCo that the environment has installed. MuJoCo itself builds the scene
+    (``mujoco.mjv_updateScene``), so that cameras, ``scene_option`` and decoration geoms mean what they mean there; the image is
+    ray-cast.
+
+        renderer = mjsense.Renderer(model, height=240, width=320)
+        renderer.update_scene(data, camera="front")
+        image = renderer.render()  # uint8 [240, 320, 3]
+
+    One thread at a time can use a renderer: a call during that of another thread is an error, and ``close()`` waits for it. Use one
+    renderer per thread, or ``render_batch``, which several threads may call at the same time.
+
+    Args:
+        model: the ``mujoco.MjModel``.
+        height: height of the images in pixels; not limited by ``offheight``.
+        width: width of the images in pixels; not limited by ``offwidth``.
+        max_geom: maximum number of geoms in the scene, decoration included.
+        font_scale: accepted for compatibility; labels are not drawn.
+
+    Raises:
+        ValueError: for a height or width below 1.
+        TypeError: if `model` is not an ``MjModel``.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, height: int = 240, width: int = 320, max_geom: int = 10000, font_scale: Any = 150
+    ) -> None:
+        import mujoco
+
+        self._checked_size(height, width)
+        self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
+
+    @classmethod
+    def of_scene(cls, model: mujoco.MjModel, scene: mujoco.MjvScene, height: int, width: int) -> Renderer:
+        """A renderer of a scene that the caller updates with ``mujoco.mjv_updateScene``; ``render()`` draws its current contents.
+
+        `scene` must have room for at least two geoms.
+        """
+        made = cls.__new__(cls)
+        made._set_up(model, height, width, scene)
+        return made
+
+    def _set_up(self, model: mujoco.MjModel, height: int, width: int, scene: mujoco.MjvScene) -> None:
+        import mujoco
+
+        self._guard = OneThread("Renderer: another thread is using it; use one renderer per thread")
+        self._batch: _Pool | None = None
+        self._batch_guard = OneThread("")
+        self._warned: set[str] = set()
+        self._mujoco = mujoco
+        self._version = tuple(int(x) for x in mujoco.mj_versionString().split(".")[:2])
+        self._model = model
+        self._height, self._width = int(height), int(width)
+        self._scene = scene
+        self._scene_option = mujoco.MjvOption()
+        self._fixed_camera = -1
+        """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
+        self._depth = self._segmentation = self._point_lights = False
+        self._sizes = self._sizes_of(model)
+        flag = mujoco.mjtRndFlag
+        self._flags = {name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)}
+        """Indices into the scene's flags."""
+        self._native: Any = self._make_native()
+
+    def _make_native(self) -> Any:
+        model, scene = self._model, self._scene
+        arrays = {name: getattr(model, name) for name in _MODEL_ARRAYS if hasattr(model, name)}
+        if arrays["tex_adr"].dtype != np.int64:
+            arrays["tex_adr"] = arrays["tex_adr"].astype(np.int64)
+        arrays |= {name: getattr(model, name) for name in _core.scene_index_fields() if hasattr(model, name)}
+        soft = {name: getattr(scene, name) for name in _SCENE_ARRAYS}
+        self._alive = (arrays, soft)  # the native renderer reads their memory
+        quality, map_, rgba, extent = model.vis.quality, model.vis.map, model.vis.rgba, float(model.stat.extent)
+        settings = {
+            "samples": max(1, int(quality.offsamples)),
+            "shadows": bool(quality.shadowsize > 0),
+            "shadow_clip": float(extent * map_.shadowclip),
+            "shadow_scale": float(map_.shadowscale),
+            "shadow_near": float(extent * map_.znear),
+            "haze": float(map_.haze),
+            "haze_rgb": tuple(float(x) for x in rgba.haze[:3]),
+            "fog_start": extent * map_.fogstart,
+            "fog_slope": 1 / (extent * max(map_.fogend - map_.fogstart, 1e-6)),
+            "fog_rgb": tuple(float(x) for x in rgba.fog[:3]),
+            "line_width": float(model.vis.global_.linewidth),
+            # 3.12 wraps 2D textures around spheres, cylinders and so on, and repeats those of meshes; earlier versions project them along z.
+            "projected_textures": self._version < (3, 12),
+            "point_lights_at_camera": self._version < (3, 12),
+            "sized_soft_textures": self._version < (3, 13),
+        }
+        # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.
+        geoms = self._mujoco.MjvScene.geoms.fget(scene)
+        lights, cameras = scene.lights, scene.camera
+        first = {"geoms": geoms[0], "lights": lights[0], "left_camera": cameras[0], "right_camera": cameras[1]}
+        where = {name: scene_layout.address(element.pos) for name, element in first.items()}
+        where["geom_stride"] = scene_layout.address(geoms[1].pos) - where["geoms"]
+        where["light_stride"] = scene_layout.address(lights[1].pos) - where["lights"]
+        return _core.SceneRenderer(arrays, settings, scene_layout.layouts(), where, soft)
+
+    @staticmethod
+    def _checked_size(height: int, width: int) -> tuple[int, int]:
+        for name, value in (("height", height), ("width", width)):
+            if int(value) < 1:
+                raise ValueError(f"Renderer: {name} must be at least 1, got {value}")
+        return int(height), int(width)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        return self._model
+
+    @property
+    def scene(self) -> mujoco.MjvScene:
+        """The abstract scene of the last ``update_scene``. Geoms that are added to it, or edited, appear in the image."""
+        return self._scene
+
+    @property
+    def point_lights(self) -> bool:
+        """Whether lights of type ``point`` shine from their position, as in the cameras of scenes, without attenuation. False, the default: as in MuJoCo's
+        OpenGL renderer, which draws point and image lights as lights at the camera before 3.12, and not at all from 3.12 on."""
+        return self._point_lights
+
+    @point_lights.setter
+    def point_lights(self, value: bool) -> None:
+        self._point_lights = bool(value)
+
+    @property
+    def height(self) -> int:
+        return self._height
+
+    @property
+    def width(self) -> int:
+        return self._width
+
+    @guarded
+    def enable_depth_rendering(self) -> None:
+        self._segmentation = False
+        self._depth = True
+
+    @guarded
+    def disable_depth_rendering(self) -> None:
+        self._depth = False
+
+    @guarded
+    def enable_segmentation_rendering(self) -> None:
+        self._segmentation = True
+        self._depth = False
+
+    @guarded
+    def disable_segmentation_rendering(self) -> None:
+        self._segmentation = False
+
+    @staticmethod
+    def _sizes_of(model: mujoco.MjModel) -> tuple[int, ...]:
+        return tuple(getattr(model, name) for name in _SIZES)
+
+    def _opened(self) -> Any:
+        native = self._native
+        if native is None:
+            raise RuntimeError("Renderer: used after close(); make a new one")
+        return native
+
+    def _warn(self, text: str) -> None:
+        """Warns once, at the line that calls the public method that calls this."""
+        if text not in self._warned:
+            self._warned.add(text)
+            warnings.warn(f"Renderer: {text}", stacklevel=4)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            gl = "; there is no OpenGL. Call reload() after a change of the model's textures, meshes or height fields (mjr_uploadTexture ...)"
+            raise AttributeError(f"Renderer has no attribute '{name}'{gl if name in ('_mjr_context', '_gl_context') else ''}")
+
+    def _check_sizes(self, model: mujoco.MjModel, what: str) -> None:
+        sizes = self._sizes_of(model)
+        if sizes == self._sizes:
+            return
+        name, found, expected = next(row for row in zip(_SIZES, sizes, self._sizes) if row[1] != row[2])
+        raise ValueError(f"Renderer: {what}: {name} is {found}, but the renderer's model had {expected}")
+
+    def _camera(self, camera: Any) -> mujoco.MjvCamera:
+        mujoco, model = self._mujoco, self._model
+        if isinstance(camera, mujoco.MjvCamera):
+            return camera
+        id = camera_of_name(model, camera) if isinstance(camera, str) else int(camera)
+        if not -1 <= id < model.ncam:
+            raise ValueError(f"The camera id {id} is out of range [-1, {model.ncam}).")
+        out = mujoco.MjvCamera()
+        out.fixedcamid = id
+        if id == -1:
+            out.type = mujoco.mjtCamera.mjCAMERA_FREE
+            mujoco.mjv_defaultFreeCamera(model, out)
+        else:
+            out.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        return out
+
+    def update_scene(
+        self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera = -1, scene_option: mujoco.MjvOption | None = None
+    ) -> None:
+        """Updates ``scene`` from `data`.
+
+        Args:
+            data: data of the renderer's model.
+            camera: id or name of a camera of the model, -1 for the default free camera, or an ``MjvCamera`` (free, fixed or tracking).
+            scene_option: visibility of groups and elements; None for MuJoCo's defaults.
+
+        MuJoCo draws no geoms of a `data` for which ``mj_forward`` was never called; the first such call warns.
+
+        Raises:
+            ValueError: if the camera does not exist, or `data` belongs to a model of another size.
+            RuntimeError: after ``close()``, or if another thread is using the renderer.
+        """
+        with self._guard:
+            self._update(data, camera, scene_option)
+        if not _has_poses(data):
+            self._warn(f"{_NO_POSES} before update_scene()")
+
+    def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
+        self._opened()
+        self._check_sizes(self._model, "the model has changed")
+        owner = getattr(data, "model", self._model)
+        if owner is not self._model:
+            self._check_sizes(owner, "`data` belongs to another model")
+        self._native.check_indices()
+        mujoco, view = self._mujoco, self._camera(camera)
+        self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
+        # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.
+        mujoco.mjv_updateCamera(self._model, data, view, self._scene)
+        if any(camera.frustum_near < 1e-15 for camera in self._scene.camera):  # for which mjv_updateScene ends the process
+            raise ValueError(
+                "Renderer: the near plane of the scene's camera is at 0: set model.vis.map.znear, or renderer.scene.camera for mjCAMERA_USER"
+            )
+        mujoco.mjv_updateScene(
+            self._model, data, scene_option or self._scene_option, None, view, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene
+        )
+
+    def render(self, *, out: OutputArray | None = None) -> np.ndarray:
+        """Renders the scene.
+
+        Args:
+            out: array for the image, of the shape below; its type is cast to if necessary.
+
+        Returns:
+            A new array, or `out`: rgb uint8 [H, W, 3]; with depth rendering float32 [H, W], distance to the camera plane in m, the far
+            plane's where nothing is seen; with segmentation rendering int32 [H, W, 2], object id and type, (-1, -1) where nothing is seen.
+
+        Before the first ``update_scene`` the image is black, as MuJoCo's, and the first call warns.
+
+        Raises:
+            RuntimeError: after ``close()``, or if another thread is using the renderer.
+            ValueError: if the shape of `out` is wrong, if a pose is not finite, or if the scene contains something that cannot be drawn.
+        """
+        with self._guard:
+            self._opened()
+            kind = "depth" if self._depth else "segmentation" if self._segmentation else "rgb"
+            dtype, channels = _KINDS[kind]
+            shape = (self._height, self._width, *channels)
+            if out is not None and out.shape != shape:
+                raise ValueError(f"Expected `out.shape == {shape}` for {kind} rendering. Got `out.shape={out.shape}` instead.")
+            direct = out is not None and out.dtype == dtype and out.flags.c_contiguous and out.flags.writeable
+            image = out if out is not None and direct else np.empty(shape, dtype)
+            drawn = self._draw(**{kind: image})
+            if out is not None and not direct:
+                np.copyto(out, image, casting="unsafe")
+        if not drawn:
+            self._warn(_NO_CAMERA)
+        return image if out is None else out
+
+    def render_images(
+        self, kinds: Sequence[str] = ("rgb", "depth", "segmentation"), *, height: int | None = None, width: int | None = None
+    ) -> dict[str, np.ndarray]:
+        """Renders several images of the scene at once: ``rgb``, ``depth`` and ``segmentation``, with the shapes and types of ``render()``.
+
+        Args:
+            kinds: the images.
+            height: height of these images in pixels; None for the renderer's.
+            width: width of these images in pixels; None for the renderer's.
+
+        Returns:
+            New arrays by kind.
+        """
+        with self._guard:
+            self._opened()
+            size = self._checked_size(self._height if height is None else height, self._width if width is None else width)
+            images = {kind: self._empty(kind, *size) for kind in kinds}
+            drawn = self._draw(**images)
+        if not drawn:
+            self._warn(_NO_CAMERA)
+        return images
+
+    def render_batch(
+        self,
+        datas: Sequence[mujoco.MjData],
+        cameras: Any = -1,
+        scene_option: mujoco.MjvOption | None = None,
+        *,
+        out: OutputArray | None = None,
+    ) -> np.ndarray:
+        """Renders one rgb image of each `data` on all CPU cores. ``scene`` does not change. Several threads may call this.
+
+        Args:
+            datas: data of the renderer's model.
+            cameras: a camera as for ``update_scene``, or a sequence with one for each data.
+            scene_option: as for ``update_scene``.
+            out: uint8 [B, H, W, 3] array for the images.
+
+        Returns:
+            uint8 [B, H, W, 3]: `out` or a new array.
+        """
+        self._opened()
+        datas = list(datas)
+        for index, data in enumerate(datas):
+            if not isinstance(data, self._mujoco.MjData):
+                raise TypeError(f"Renderer.render_batch(): datas[{index}] must be a mujoco.MjData, not {data!r:.100}")
+        each = list(cameras) if isinstance(cameras, (list, tuple, np.ndarray)) else [cameras] * len(datas)
+        if len(each) != len(datas):
+            raise ValueError(f"Renderer.render_batch: got {len(each)} cameras for {len(datas)} datas")
+        shape = (len(datas), self._height, self._width, 3)
+        images = np.empty(shape, np.uint8) if out is None else out
+        if images.shape != shape or images.dtype != np.uint8 or not images.flags.c_contiguous or not images.flags.writeable:
+            raise ValueError(f"Renderer.render_batch: out must be a contiguous, writable uint8 array of shape {shape}")
+        def draw(pool: _Pool, index: int) -> None:
+            renderer = pool.take()
+            try:
+                renderer._point_lights = self._point_lights
+                renderer._update(datas[index], each[index], scene_option)
+                renderer._draw(rgb=images[index])
+            except ValueError as error:
+                raise ValueError(f"{error} (datas[{index}])") from None
+            finally:
+                pool.free.put(renderer)
+
+        with self._batch_guard.lock:  # close() comes before all images or after them
+            self._opened()
+            pool = self._pool()
+            running = [pool.threads.submit(draw, pool, index) for index in range(len(datas))]
+        try:
+            wait(running)
+        finally:  # Ctrl-C
+            for one in running:
+                one.cancel()
+        for one in running:
+            one.result()
+        for index, data in enumerate(datas):
+            if not _has_poses(data):
+                self._warn(f"{_NO_POSES} before render_batch() (datas[{index}])")
+                break
+        return images
+
+    def _pool(self) -> _Pool:
+        if self._batch is None or self._batch.process != os.getpid():  # threads do not survive a fork
+            self._batch = _Pool(lambda: Renderer(self._model, self._height, self._width, self._scene.maxgeom))
+        return self._batch
+
+    @guarded
+    def reload(self) -> None:
+        """Makes the next image show the current textures, height fields and meshes of the model.
+
+        Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a large one
+        may be missed.
+        """
+        self._opened().reload()
+
+    def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
+        if kind not in _KINDS:
+            raise ValueError(f"Renderer: unknown kind of image '{kind}'; expected one of {', '.join(_KINDS)}")
+        dtype, channels = _KINDS[kind]
+        return np.empty((height, width, *channels), dtype)
+
+    def _draw(
+        self, rgb: np.ndarray | None = None, depth: np.ndarray | None = None, segmentation: np.ndarray | None = None
+    ) -> bool:
+        """Returns False if the scene has no camera, so that nothing can be seen."""
+        native, scene = self._opened(), self._scene
+        if not 0 <= scene.ngeom <= scene.maxgeom:
+            raise ValueError(f"Renderer: scene.ngeom is {scene.ngeom}: must be in [0, {scene.maxgeom}], which max_geom has set")
+        values = scene.flags.tolist()
+        flags = {name: values[index] for name, index in self._flags.items()}
+        if rgb is not None:
+            self._check_scene(flags)
+        shown = [bool(flags[name]) for name in _SHOWN]
+        shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
+        shown.append(self._point_lights)
+        images = [image for image in (rgb, depth, segmentation) if image is not None]
+        height, width = images[0].shape[:2] if images else (self._height, self._width)
+        memory = [0 if image is None else scene_layout.address(image) for image in (rgb, depth, segmentation)]
+        try:
+            native.render(scene.ngeom, scene.nlight, tuple(shown), width, height, *memory)
+        except ValueError as error:
+            if any(eye.forward.any() and eye.up.any() for eye in scene.camera):
+                raise ValueError(f"Renderer: {self._with_names(str(error))}") from None
+            for image, nothing in ((rgb, 0), (depth, self._model.vis.map.zfar * self._model.stat.extent), (segmentation, -1)):
+                if image is not None:
+                    image.fill(nothing)
+            return False
+        return True
+
+    def _with_names(self, message: str) -> str:
+        """The message with names instead of MuJoCo's object types and ids."""
+        mujoco, model, scene = self._mujoco, self._model, self._scene
+
+        def named(kind: int, id: int) -> str:
+            if id < 0 or not (text := mujoco.mju_type2Str(kind)):
+                return "(decoration)"
+            return f"({text} '{mujoco.mj_id2name(model, kind, id) or ''}', id {id})"
+
+        def light(found: re.Match[str]) -> str:
+            one = scene.lights[int(found[1])]
+            if not hasattr(one, "id") or one.headlight:  # MuJoCo 3.3 has no ids of lights
+                return found[0]
+            return f"{found[0]} {named(mujoco.mjtObj.mjOBJ_LIGHT.value, one.id)}"
+
+        message = re.sub(r"\(object type (\d+), id (-?\d+)\)", lambda found: named(int(found[1]), int(found[2])), message)
+        message = re.sub(r"light (\d+) of the scene", light, message)
+        if self._fixed_camera >= 0:
+            camera = named(mujoco.mjtObj.mjOBJ_CAMERA.value, self._fixed_camera)
+            message = message.replace("the scene's camera", f"the scene's camera {camera}")
+        return message
+
+    def _check_scene(self, flags: dict[str, int]) -> None:
+        """Raises ValueError for settings of the scene, with these flags, that change an image and are not supported."""
+        scene = self._scene
+        for names, refused in ((_REFUSED_IF_SET, 1), (_REFUSED_IF_CLEAR, 0)):
+            for name in names:
+                if name in flags and bool(flags[name]) == refused:
+                    raise ValueError(f"Renderer: scene.flags[{name}] = {refused} is not supported")
+        for name in ("stereo", "enabletransform", "framewidth"):
+            if getattr(scene, name):
+                raise ValueError(f"Renderer: scene.{name} = {getattr(scene, name)} is not supported")
+
+    def close(self) -> None:
+        """Frees the renderer's memory, after the calls of other threads. The renderer is also a context manager that does this at its end."""
+        with self._guard.lock:
+            self._native = None
+        with self._batch_guard.lock:
+            batch, self._batch = self._batch, None
+        if batch is not None and batch.process == os.getpid():
+            batch.threads.shutdown()
+
+    def __reduce__(self) -> Any:
+        raise TypeError("Renderer: cannot be copied or pickled; make one in each process, from the model")
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""Tasks as environments of RL libraries: :mod:`mjsense.rl.sb3` (Stable-Baselines3) and :mod:`mjsense.rl.rsl` (rsl-rl)."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes: what all worlds share, and which fields of the model may differ between worlds."""

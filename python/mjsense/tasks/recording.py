@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recording of episodes: on this machine, on Ray, or converted to another format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+from mjsense.core.arguments import Seed, checked
+from mjsense.core.progress_line import line_of, of_recording
+from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks
+from mjsense.tasks.record_job import RecordProgress, RecordSummary, record_here
+
+
+@checked
+def record(
+    task: Tasks = "pick",
+    robot: Robots | None = None,
+    policy: Policies = "planner",
+    *,
+    out: str | Path,
+    scene: Scenes = "",
+    # options of a recording
+    arm_controller: str = "",
+    split: Literal["", "train", "test"] = "",
+    worlds: int = 4,
+    threads: int = 0,
+    seed: Seed = 0,
+    camera_system: str = "",
+    cameras: Sequence[str] | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    depth: bool = False,
+    segmentation: bool = False,
+    samples: int = 1,
+    shadows: bool = True,
+    shadow_samples: int = 1,
+    meshes: Literal["auto", "shapes", "real"] = "auto",
+    horizon: int | None = None,
+    policy_dt_ms: int | None = None,
+    action_noise: bool = True,
+    perturb: float = 0.0,
+    instructions: Literal["varied", "canonical"] = "varied",
+    terminate_upon_success: bool = False,
+    max_penetration: float = 0.004,
+    episodes: int = 1,
+    max_attempts: int = 0,
+    num_attempts: int = 0,
+    first_attempt: int = 0,
+    shard: str = "",
+    keep_failures: bool = False,
+    resume: bool = False,
+    append: bool = False,
+    overwrite: bool = False,
+    replay: bool = True,
+    house: int = 0,
+    batches: int = 0,
+    gzip: int = 4,
+    ffmpeg: str = "",
+    crf: int = 25,
+    preset: str = "veryfast",
+    tune: str = "fastdecode",
+    keyint: int = 20,
+    molmospaces_depth: bool = False,
+    # end of options
+    sensors: Iterable[Any] = (),
+    format: Literal["mjsense", "lerobot"] = "mjsense",
+    map: Any = None,
+    trim_idle: bool | None = None,
+    keep_recording: bool = False,
+    ray: str | None = None,
+    progress: bool | Callable[[RecordProgress], None] | None = None,
+) -> RecordSummary:
+    """Records episodes of a task as HDF5 and MP4 files in ``out/house_<house>/``.
+
+    Which attempts are kept, and every byte of them except the videos' containers, depends only on the seed, not on the number of
+    worlds, threads or interruptions. Ctrl-C keeps the finished episodes and raises KeyboardInterrupt; call again with
+    ``resume=True`` to continue.
+
+    Args:
+        task: A :class:`Task`, its class, or a registered name (:func:`task_names`).
+        robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
+        policy: A :class:`Policy`, a function ``obs -> actions``, or a registered name (:func:`policy_names`).
+        out: Output directory.
+        scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
+            scene.
+
+        Options:
+        arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
+            ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
+        split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
+            or ``@test`` after the scene's name.
+        worlds: Number of worlds that run in parallel.
+        threads: Number of simulation threads; 0: one per available CPU.
+        seed: Random seed; the same seed gives the same episodes.
+        camera_system: Name or file of the camera system; by default the cameras of the robot's model.
+        cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
+        width: Width of the images; by default the robot's. [pixels]
+        height: Height of the images; by default the robot's. [pixels]
+        depth: Add a lossless depth image for every camera.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadows: Draw shadows.
+        shadow_samples: Points of each lamp at which shadows are computed; more than 1 gives soft shadows and takes
+            longer.
+        meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
+            if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
+        horizon: Maximum number of control steps of an episode; by default the task's.
+        policy_dt_ms: Duration of one action of the policy, a multiple of the controllers' period; by default the
+            robot's or the task's. 50 ms gives 20 observations per second. [ms]
+        action_noise: Add noise to the commands of the arm.
+        perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        instructions: Instruction of each episode. ``varied``: paraphrases that describe the objects by what
+            distinguishes them in that episode; ``canonical``: one sentence per task and object.
+        terminate_upon_success: End an episode at its first success.
+        max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
+            any depth. Pairs of geoms that are deeper at the start do not count. [m]
+        episodes: Number of episodes to keep.
+        max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
+        num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
+        first_attempt: Number of the first attempt.
+        shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
+            directory; requires ``num_attempts``, the number of attempts of all shards.
+        keep_failures: Keep failed episodes too.
+        resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        append: Add new episodes to a completed recording; all settings that affect the data must be unchanged.
+        overwrite: Replace an existing recording of this house.
+        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        house: Number of the ``house_N`` folder in the output directory. Each house has its own random numbers.
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
+        molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+        Others:
+        sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones
+            written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
+            rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
+            error.
+        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
+        trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
+        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
+            data set is complete.
+        ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does, which has more
+            options. ``out`` may then be an address such as ``s3://bucket/pick``.
+        progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
+            True where stderr is a terminal or a notebook.
+    """
+    options = dict(locals())
+    for name in ("sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"):
+        del options[name]
+    if ray is not None:
+        given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
+        if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording") if given[name]]:
+            raise ValueError(f"record: {refused[0]} cannot be combined with ray")
+        return _record_on_ray({**options, "format": format, "sensors": sensors}, ray, progress)
+    if format == "mjsense":
+        if map is not None or trim_idle is not None or keep_recording:
+            raise ValueError("record: map, trim_idle and keep_recording are options of format='lerobot'")
+        return record_here(options, sensors, progress)
+    if shard or append or overwrite:
+        raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
+    from mjsense.exporting.record_lerobot import converted
+
+    with converted(out, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
+        summary = record_here({**options, "out": folder}, sensors, progress)
+    return replace(summary, path=Path(out))
+
+
+def _record_on_ray(options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
+    from mjsense.cluster import ClusterProgress, Job, record_on_ray
+
+    own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
+    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
+        del options[name]
+    if not options["threads"]:
+        del options["threads"]  # one per worker
+
+    def counts(now: ClusterProgress) -> dict[str, Any]:
+        return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
+                "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
+
+    line = line_of(progress)
+
+    def show(now: ClusterProgress) -> None:
+        about = RecordProgress(**counts(now), seconds_left=math.nan)
+        if callable(progress):
+            progress(about)
+        elif line is not None:
+            line.show(of_recording(about))
+
+    made = record_on_ray(Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"], resume=own["resume"],
+                         address=address, progress=show)  # fmt: skip
+    return RecordSummary(**counts(made), seconds_left=0.0, interrupted=False, enough=made.enough, failures=made.failures, lengths=[], times={},
+                         published_bytes=0, path=Path(own["out"]))  # fmt: skip

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A policy whose commands come from a person, and the function that records with it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjsense.core.arguments import Seed, checked
+from mjsense.tasks.parts import Robots, Scenes, Tasks
+from mjsense.tasks.policy import Policy
+from mjsense.tasks.recording import RecordSummary, record
+from mjsense.tasks.teleoperation.devices import Device, device_of
+from mjsense.tasks.teleoperation.page import DrivePage
+from mjsense.tasks.teleoperation.pose import Pose
+
+_POLL = 0.005  # s between two looks for events while the worlds wait
+
+
+class Teleoperation(Policy):
+    """Drives one arm and its gripper as a person wants, in real time. The arm has the controller ``ee_pose``; other move groups hold.
+
+    An episode ends when the task ends it, or when the person does.
+    """
+
+    name = "teleoperation"
+    observation: Sequence[str] | None = ("actions/ee_pose", "actions/joint_pos", "robot_base_pose")
+
+    def __init__(
+        self, title: str, *, arm: str = "arm", gripper: str = "gripper", device: str = "keyboard", host: str = "127.0.0.1", port: int = 8080,
+        open_browser: bool = True,
+    ) -> None:  # fmt: skip
+        """
+        Args:
+            title: Title of the page.
+            arm: Move group that is driven.
+            gripper: Move group that is opened and closed.
+            device: ``keyboard``: the keys and the handle of the page; ``spacemouse``: also a SpaceMouse.
+            host: Address that the page's server is bound to.
+            port: Port of the server; if it is taken, the next free one.
+            open_browser: Open the page in the default browser.
+        """
+        self._title, self._arm, self._gripper = title, arm, gripper
+        self._device: Device | None = device_of(device)
+        self._place = host, port
+        self._open_browser = open_browser
+        self._page: DrivePage | None = None
+        self._new = True
+        self._due = 0.0
+        self._open = self._closed = np.zeros(1)
+
+    def fingerprint(self) -> str:
+        """A resumed recording continues with any device and page."""
+        return f"{self._arm} {self._gripper}"
+
+    def initialize(self) -> None:
+        for name in (self._arm, self._gripper):
+            if name not in self.action_groups:
+                raise ValueError(f"teleoperation: the robot has no move group '{name}'; there are {', '.join(self.action_groups)}")
+        columns = self.action_groups[self._arm]
+        if columns.stop - columns.start != 7:
+            raise ValueError(f"teleoperation: the controller of move group '{self._arm}' must be ee_pose (arm_controller='ee_pose')")
+        if self.num_worlds != 1:
+            raise ValueError(f"teleoperation drives 1 world, not {self.num_worlds}")
+        self._page = DrivePage(self.sim, self._title, *self._place)
+        print(f"Drive the robot at {self._page.url} (Ctrl-C ends the recording)", flush=True)
+        self._page.open(self._open_browser)
+
+    def reset(self, ids: np.ndarray) -> None:
+        self._new = True
+
+    def act(self, obs: dict[str, Any]) -> dict[str, Any]:
+        page = self._page
+        assert page is not None
+        if self._new:
+            self._new = False
+            row = np.asarray(obs["actions/ee_pose"][self._arm])[0]
+            page.begin_episode(Pose.of_row(obs["robot_base_pose"][0]), Pose.of_row(row), self.instructions[0])
+            # Grippers start open: the closed command is the bound that is farther away.
+            low, high = (bounds[self.action_groups[self._gripper]] for bounds in (self.action_low, self.action_high))
+            self._open = np.array(obs["actions/joint_pos"][self._gripper][0], np.float64)
+            self._closed = np.where(self._open - low > high - self._open, low, high)
+            self._due = time.perf_counter()
+        page.base = Pose.of_row(obs["robot_base_pose"][0])
+        page.update()
+        while page.paused and not page.finished:
+            time.sleep(_POLL)
+            page._handle_events()
+            self._due = time.perf_counter()
+        time.sleep(max(0.0, self._due - time.perf_counter()))
+        self._due = max(self._due, time.perf_counter() - self.sim.step_dt) + self.sim.step_dt
+        if self._device is not None:
+            motion = self._device.read(self.sim.step_dt)
+            page.move(motion.translation, motion.rotation)
+            if motion.toggle_gripper:
+                page.toggle_gripper()
+        page._handle_events()
+        grip = self._closed if page.gripper_closed else self._open
+        return {self._arm: self._possible(self._arm, page.target.row), self._gripper: self._possible(self._gripper, grip),
+                "done": np.array([page.finished])}  # fmt: skip
+
+    def _possible(self, group: str, command: np.ndarray) -> np.ndarray:
+        """Commands [1, n] within the bounds of the group's controller."""
+        if not np.isfinite(command).all():
+            raise ValueError(f"teleoperation: a command of move group '{group}' is not finite: {command}")
+        columns = self.action_groups[group]
+        return np.clip(command, self.action_low[columns], self.action_high[columns])[None]
+
+    def close(self) -> None:
+        """Stops the page's server."""
+        if self._page is not None:
+            self._page.close()
+            self._page = None
+
+
+@checked
+def play(
+    task: Tasks = "pick",
+    robot: Robots | None = None,
+    *,
+    out: str | Path = "demonstrations",
+    scene: Scenes = "",
+    device: str = "keyboard",
+    arm: str = "arm",
+    gripper: str = "gripper",
+    episodes: int = 1,
+    seed: Seed = 0,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    open_browser: bool = True,
+    **options: Any,
+) -> RecordSummary:
+    """Records demonstrations by a person who drives the robot in the browser, as any policy's episodes. The page shows the scene, the
+    images of the cameras and a handle at the tool, which is dragged or moved by keys. An episode ends when the task succeeds.
+
+    Args:
+        task, robot, scene: As in :func:`record`.
+        out: Output directory.
+        device: ``keyboard`` or ``spacemouse``.
+        arm: Move group that is driven.
+        gripper: Move group that is opened and closed.
+        episodes: Number of successful episodes to keep.
+        seed: Random seed of the starts.
+        host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with the printed
+            address, which contains a token.
+        port: Port of the server; if it is taken, the next free one; 0: any free one.
+        open_browser: Open the page in the default browser.
+        options: Further options of :func:`record`, such as ``append=True``.
+
+    Returns:
+        The summary of :func:`record`.
+
+    Raises:
+        ValueError: The robot has no such move groups, or the arm has no controller ``ee_pose``.
+        ModuleNotFoundError: viser, or the package of the device, is not installed.
+    """
+    title = task if isinstance(task, str) else getattr(task, "__name__", type(task).__name__)
+    policy = Teleoperation(
+        title, arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser
+    )
+    defaults = {"worlds": 1, "arm_controller": "ee_pose", "terminate_upon_success": True, "action_noise": False, "horizon": 6000, "max_attempts": 100 * episodes}
+    try:
+        return record(task, robot, policy, out=out, scene=scene, episodes=episodes, seed=seed, **{**defaults, **options})
+    finally:
+        policy.close()

@@ -1,6 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""Recording of demonstrations by a person who drives the robot in the viewer."""
-
-from mjsense.teleoperation.play import Teleoperation, play
-
-__all__ = ["Teleoperation", "play"]
