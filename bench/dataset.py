@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from mjsense.dataset import video
 
 import mjsense as mjs
+from mjsense.dataset import video
 
 ROWS = ["obs/agent/qpos", "actions/joint_pos", "success"]
 

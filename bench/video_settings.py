@@ -17,9 +17,9 @@ import time
 from fractions import Fraction
 
 import numpy as np
-from mjsense.dataset.video_decoder import Decoder, Packets, open_container
 
 import mjsense as mjs
+from mjsense.dataset.video_decoder import Decoder, Packets, open_container
 
 SETTINGS = {
     "crf 24, B-frames, key frame every 250 (an earlier default)": "-preset veryfast -crf 24",

@@ -19,9 +19,9 @@ from typing import Any
 import mujoco
 import numpy as np
 import warp as wp
-from mjsense.warp.arrays import on_host
 
 import mjsense as mjs
+from mjsense.warp.arrays import on_host
 
 ROUNDS = 7
 SIZE = 32  # pixels of the camera's sides

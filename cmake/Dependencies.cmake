@@ -31,6 +31,10 @@ pkg_check_modules(PCRE2 QUIET IMPORTED_TARGET libpcre2-8)
 if(NOT PCRE2_FOUND)
   mjsense_missing("libpcre2-8 not found: apt-get install libpcre2-dev")
 endif()
+pkg_check_modules(DEFLATE QUIET IMPORTED_TARGET libdeflate)
+if(NOT DEFLATE_FOUND)
+  mjsense_missing("libdeflate not found: apt-get install libdeflate-dev")
+endif()
 
 # MuJoCo is taken from the wheel of the configuring Python, so that the C++ code and `import mujoco` use the same library.
 mjsense_find(Python 3.11 COMPONENTS Interpreter)
@@ -115,7 +119,7 @@ if(NOT MJSENSE_LINKED STREQUAL MJSENSE_LOADED AND EXISTS "${MJSENSE_LOADED}" AND
 endif()
 
 # What each library links, and all of it.
-set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 embree mjsense_hdf5 Threads::Threads)
+set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 PkgConfig::DEFLATE embree mjsense_hdf5 Threads::Threads)
 set(MJSENSE_TASKS_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json ompl::ompl)
 if(MJSENSE_STATIC)
   include(StaticLibraries)

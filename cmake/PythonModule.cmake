@@ -58,6 +58,13 @@ set_target_properties(mjsense_python PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT
                                                 MJSENSE_MUJOCO_LATER ON INSTALL_RPATH "$ORIGIN/_lib" BUILD_WITH_INSTALL_RPATH ON)
 file(GLOB_RECURSE MJSENSE_PY_FILES CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/python/mjsense
      ${PROJECT_SOURCE_DIR}/python/mjsense/*.py ${PROJECT_SOURCE_DIR}/python/mjsense/py.typed)
+# Links and folders of files that have moved or gone since the last configuration would still be importable.
+file(GLOB MJSENSE_PY_OLD RELATIVE ${MJSENSE_PY_DIR} ${MJSENSE_PY_DIR}/*)
+foreach(old IN LISTS MJSENSE_PY_OLD)
+  if(NOT old MATCHES "^_(core|lib)" AND NOT EXISTS ${PROJECT_SOURCE_DIR}/python/mjsense/${old})
+    file(REMOVE_RECURSE ${MJSENSE_PY_DIR}/${old})
+  endif()
+endforeach()
 foreach(file IN LISTS MJSENSE_PY_FILES)
   get_filename_component(folder ${MJSENSE_PY_DIR}/${file} DIRECTORY)
   file(MAKE_DIRECTORY ${folder})

@@ -35,7 +35,7 @@ class Docstrings(griffe.Extension):
                     for name in base.members.keys() - cls.members.keys():
                         cls.set_member(name, copy.copy(base.members[name]))
                 cls.bases = [base for base in cls.bases if "._" not in getattr(base, "canonical_path", "")]  # private ones
-                if any("_dataclass.dataclass" in d.callable_path for d in cls.decorators):
+                if any("lazy_dataclass.dataclass" in d.callable_path for d in cls.decorators):
                     parameters = [griffe.Parameter(f.name, annotation=f.annotation, kind=griffe.ParameterKind.positional_or_keyword,
                                                    default=default(f)) for f in fields(cls)]  # fmt: skip
                     for name in [n for n, a in cls.attributes.items() if not a.is_alias and "ClassVar" in str(a.annotation)]:

@@ -30,6 +30,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
+    robot learning               mjsense.tasks: the names above that are about tasks, robots and policies
     trainers                     mjsense.tasks.rl.sb3, mjsense.tasks.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
 
@@ -48,6 +49,7 @@ _core.leave_no_log_file()
 
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
+from mjsense.core import old_names
 from mjsense.core.errors import UnknownNameError
 from mjsense.core.errors import did_you_mean as _did_you_mean
 from mjsense.dataset import (
@@ -126,6 +128,8 @@ from mjsense.viewer.viewer import Viewer
 assets.name_package_folders()
 
 gymnasium_registry.register_all()
+
+old_names.register()
 
 if not _typing.TYPE_CHECKING:
 

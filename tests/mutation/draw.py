@@ -68,10 +68,11 @@ class Site(NamedTuple):
 
 def sources(root: Path, room: str) -> list[Path]:
     """The files of a room that are the project's behaviour: no tests, no benchmarks, nothing generated."""
-    if room == "python":
-        files = [*(root / "python/bindings").rglob("*.cc"), *(root / "python/mjsense").rglob("*.py")]
+    if room.startswith("python/"):
+        files = (root / "python/mjsense" / room.removeprefix("python/")).rglob("*.py")
         return sorted(f for f in files if f.name not in GENERATED)
-    files = [f for f in (root / "src").glob(f"*/{room}/**/*") if f.suffix in (".h", ".cc")]
+    folders = [root / "python/bindings"] if room == "bindings" else (root / "src").glob(f"*/{room}")
+    files = [f for folder in folders for f in folder.rglob("*") if f.suffix in (".h", ".cc")]
     return sorted(f for f in files if not re.search(r"_(test|bench)\.cc$|/testing/", f.as_posix()))
 
 

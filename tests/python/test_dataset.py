@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 import pytest
 from edited_recordings import changed
-from mjsense.dataset import video
 
 import mjsense as mjs
+from mjsense.dataset import video
 
 SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
 

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No module of the package imports itself through other modules, neither at its top nor inside a function.
+"""The order of the package's rooms, and names of modules.
 
-An import inside a function hides a cycle, so it counts like one at the top of the file. Imports for type checkers only
-(``if TYPE_CHECKING``) do not count. No exceptions are needed at present.
+No module imports itself through other modules, neither at its top nor inside a function. An import inside a function hides a cycle, so
+it counts like one at the top of the file. Imports for type checkers only (``if TYPE_CHECKING``) do not count.
 """
 
 import ast
 import graphlib
+import importlib
 import importlib.util
+import inspect
 import re
+import warnings
 from pathlib import Path
 
 import pytest
+
+import mjsense
+from mjsense.core.old_names import OLD_NAMES
 
 PACKAGE = Path(__file__).resolve().parents[2] / "python" / "mjsense"
 COMPILED = {"mjsense._core"}  # modules without a file in PACKAGE; they import nothing from it when they are loaded
@@ -77,28 +83,69 @@ def test_the_package_has_no_import_cycle():
     assert cycle_in(graph) == ""
 
 
-def allowed_imports(page):
-    """Folder of the package -> folders that it may import, from the table in docs/architecture.md."""
+UPWARD = {
+    "mjsense.sim.simulation": {"compat"},
+    "mjsense.dataset.sensor_check": {"tasks"},
+    "mjsense.dataset.sensor_tables": {"tasks"},
+    "mjsense.exporting.robomimic": {"tasks"},
+    "mjsense.viewer.open": {"tasks"},
+    "mjsense.viewer.source": {"tasks"},
+    "mjsense.tasks.recording": {"cluster"},
+}
+"""Modules that import rooms below theirs in the table."""
+
+
+def rooms_of(page):
+    """The rooms of the Python package in the order of the table in docs/architecture.md."""
     table = page.split("## The Python package", 1)[1].split("\n## ", 1)[0]
-    cells = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*) \|$", table, re.MULTILINE))
-    named = {folder: set(re.findall(r"`(\w+)`", cell)) for folder, cell in cells.items()}
-    return {
-        folder: set(cells) - named[folder] if cell.startswith("all but") else named[folder] & set(cells)
-        for folder, cell in cells.items()
-    }
+    return re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
 
 
-def test_folders_import_what_the_architecture_page_allows():
-    allowed = allowed_imports((PACKAGE.parents[1] / "docs" / "architecture.md").read_text())
-    assert set(allowed) == {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
-    wrong = []
+def test_rooms_import_only_rooms_above_them():
+    rooms = rooms_of((PACKAGE.parents[1] / "docs" / "architecture.md").read_text())
+    assert sorted(rooms) == sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py"))
+    assert {path.stem for path in PACKAGE.glob("*.py")} == {"__init__", "__main__"}
+    found = {}
     for module, imported in import_graph(PACKAGE).items():
-        folder = module.split(".")[1] if "." in module else "__init__"
-        for other in {name.split(".")[1] for name in imported if "." in name} & set(allowed) - {folder}:
-            permitted = allowed.get(folder, {"plot": {"view", "dataset"}, "record": {"export", "cluster"}, "simulation": {"peer", "warp"}}.get(folder, {"peer"}))
-            if folder not in ("__init__", "__main__") and other not in permitted:
-                wrong.append(f"{module} imports {other}")
-    assert not wrong
+        room = module.split(".")[1] if "." in module else "__init__"
+        if room not in ("__init__", "__main__"):
+            others = {name.split(".")[1] for name in imported if "." in name} & set(rooms)
+            found[module] = {other for other in others if rooms.index(other) > rooms.index(room)}
+    assert {module: others for module, others in found.items() if others} == UPWARD
+
+
+def packages(root):
+    return [".".join(path.parent.relative_to(root.parent).parts) for path in sorted(root.rglob("__init__.py"))]
+
+
+@pytest.mark.parametrize("name", [name for name in packages(PACKAGE) if not name.startswith(("mjsense.compat.mjlab", "mjsense.warp"))])
+def test_no_function_hides_a_module(name):
+    package = importlib.import_module(name)
+    functions = [public for public in dir(package) if inspect.isfunction(getattr(package, public))]
+    folder = Path(package.__file__).parent
+    assert [public for public in functions if (folder / f"{public}.py").exists() or (folder / public).is_dir()] == []
+
+
+@pytest.mark.parametrize("old", OLD_NAMES)
+def test_old_names_of_modules_give_the_new_ones(old):
+    assert importlib.util.find_spec(OLD_NAMES[old])
+    found, new = importlib.import_module(old), pytest.importorskip(OLD_NAMES[old])  # some need packages of others
+    assert inspect.ismodule(found) and new.__name__ == OLD_NAMES[old]
+    public = next((name for name in vars(new) if name[0] != "_"), None)
+    if public is not None:  # a package without names of its own
+        with pytest.warns(DeprecationWarning, match=f"^{old} is now {OLD_NAMES[old]}$") as caught:
+            assert getattr(found, public) is getattr(new, public)
+        assert caught[0].filename == __file__
+    with pytest.warns(DeprecationWarning), pytest.raises(AttributeError, match="no_such_name"):
+        _ = found.no_such_name
+
+
+def test_public_names_of_modules_do_not_warn():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert mjsense.effects.Noise is mjsense.sensors.effects.Noise and mjsense.observations.height_scan
+        for name in mjsense.tasks.__all__:
+            assert getattr(mjsense.tasks, name) is getattr(mjsense, name)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ fsspec = pytest.importorskip("fsspec")
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
 
+import mjsense as mjs
+from mjsense import commands
 from mjsense.cluster import Job, tools
 from mjsense.cluster.driver import _Results
 from mjsense.cluster.index import write_index
@@ -21,9 +23,6 @@ from mjsense.cluster.job import Shard, run_shard
 from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.remote import resolved
-
-import mjsense as mjs
-from mjsense import commands
 
 ARGUMENTS = {"task": "pick", "horizon": 4, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5}
 

@@ -7,13 +7,14 @@ import mjlab_files
 import mujoco
 import numpy as np
 import pytest
+from wheels import wheel
+
 from mjsense.compat.mjlab import sensor as ml
 from mjsense.compat.mjlab._tensors import HAS_TORCH
 from mjsense.compat.mjlab.entity import EntityCfg
 from mjsense.compat.mjlab.scene import Scene, SceneCfg
 from mjsense.compat.mjlab.sim import Simulation, SimulationCfg
 from mjsense.compat.mjlab.terrains import TerrainEntityCfg
-from wheels import wheel
 
 WORLDS = 3
 TASKS = {

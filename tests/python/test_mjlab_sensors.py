@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 import pytest
+
+import mjsense as mjs
 from mjsense.compat.mjlab._tensors import HAS_TORCH, tensor
 from mjsense.compat.mjlab.entity import EntityCfg
 from mjsense.compat.mjlab.scene import Scene, SceneCfg
@@ -14,8 +16,6 @@ from mjsense.compat.mjlab.sensor.builtin_sensor import BuiltinSensorCfg
 from mjsense.compat.mjlab.sensor.contact_sensor import ContactSensor
 from mjsense.compat.mjlab.sim import MujocoCfg, Simulation, SimulationCfg
 from mjsense.compat.mjlab.terrains import TerrainEntityCfg
-
-import mjsense as mjs
 
 if HAS_TORCH:
     import torch

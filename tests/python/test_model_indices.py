@@ -8,10 +8,10 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
-from mjsense.dataset.episode_worlds import EpisodeWorlds
-from mjsense.dataset.playback import check_episode
 
 import mjsense as mjs
+from mjsense.dataset.episode_worlds import EpisodeWorlds
+from mjsense.dataset.playback import check_episode
 
 SCENE = """<mujoco><asset><texture name="t" type="2d" builtin="checker" width="64" height="64"/><texture name="c" type="cube" builtin="gradient" width="32" height="32"/>
 <material name="m" texture="t"/><material name="mc" texture="c"/><mesh name="tet" vertex="0 0 0 .3 0 0 0 .3 0 0 0 .3"/><hfield name="h" nrow="8" ncol="8" size="1 1 .2 .1"/></asset>

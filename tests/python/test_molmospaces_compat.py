@@ -6,14 +6,14 @@ import json
 import h5py
 import numpy as np
 import pytest
+
+import mjsense as mjs
 from mjsense.compat import molmospaces
 from mjsense.compat.molmospaces.env.abstract_sensors import SensorSuite
 from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStartPoseSensor, get_core_sensors
 from mjsense.compat.molmospaces.policy.base_policy import PlannerPolicy
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_dict, dict_to_byte_array, is_camera_sensor
-
-import mjsense as mjs
 
 
 class MyTask(BaseMujocoTask):

@@ -7,10 +7,10 @@ import sys
 
 import numpy as np
 import pytest
-from mjsense.commands import run as run_command
 from waiting import MOVES, WAITS, Waiting
 
 import mjsense as mjs
+from mjsense.commands import run as run_command
 
 
 @pytest.fixture(scope="module")

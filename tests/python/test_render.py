@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 import tasks
 from edited_recordings import changed, file_of
-from mjsense.dataset import render_cameras
 
 import mjsense as mjs
+from mjsense.dataset import render_cameras
 
 RECORDING = dict(worlds=2, episodes=3, keep_failures=True, horizon=8, seed=5, width=48, height=32, depth=True)
 TOP = {"pos": (0.5, 0, 1.6), "lookat": (0.5, 0, 0)}

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import mjsense as mjs
+from mjsense.tasks import code_checksums
 from mjsense.tasks.code_checksums import checksums
 
 MODELS = pathlib.Path(__file__).parents[2] / "models"
@@ -343,3 +344,12 @@ def test_attributes_that_differ_have_different_checksums():
     found = [checksum(value) for value in VALUES]
     assert len(set(found)) == len(VALUES)
     assert checksum({1, 2, 3}) == checksum({3, 2, 1})
+
+
+def test_classes_of_the_package_have_the_names_that_earlier_recordings_know(monkeypatch):
+    written = []
+    monkeypatch.setattr(code_checksums._Writer, "_text", lambda writer, text: written.append(text))
+    checksums(Height(), "sensor 'height'")
+    checksums(Still(), "policy")
+    named = {text.removesuffix(f" {mjs.__version__}") for text in written if text.startswith("mjsense.")}
+    assert named == {"mjsense.sensor.Sensor", "mjsense._show.HelpOfObject", "mjsense.policy.Policy"}

@@ -10,11 +10,11 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from mjsense.cluster import export_on_ray
-from mjsense.commands import run as run_command
 from waiting import MOVES, WAITS, Waiting
 
 import mjsense as mjs
+from mjsense.cluster import export_on_ray
+from mjsense.commands import run as run_command
 
 av = pytest.importorskip("av")
 parquet = pytest.importorskip("pyarrow.parquet")

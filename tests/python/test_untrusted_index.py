@@ -12,11 +12,11 @@ pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
 fsspec = pytest.importorskip("fsspec")
 from fsspec.implementations.memory import MemoryFile
+
+import mjsense as mjs
 from mjsense.cluster import tools
 from mjsense.cluster.job import ShardResult
 from mjsense.dataset import limits
-
-import mjsense as mjs
 
 H5 = "trajectories_batch_1_of_1.h5"
 ROW = {"episode": 0, "path": f"house_0/{H5}", "trajectory": "traj_0", "seed": 5, "length": 5, "success": False, "outcome": "x", "task": "t"}

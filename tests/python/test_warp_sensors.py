@@ -228,6 +228,7 @@ CHAINS = {
 def test_effects_are_equal_bit_for_bit():
     """All effects on the same input, with resets of some worlds and repeated measurements of a step."""
     import warp
+
     from mjsense.warp.effects import Chain
 
     noisy = [

@@ -24,7 +24,7 @@ from types import ModuleType
 SERIES = (4, 0)
 """Major and minor version of MuJoCo that this package is built for; struct layouts are equal within the series."""
 REQUIREMENT = "mujoco>=4.0,<4.1"
-_LIB = Path(__file__).parent / "_lib"
+_LIB = Path(__file__).parents[1] / "_lib"
 
 shared: ModuleType | None = None
 """The environment's ``mujoco`` if the extension uses its libmujoco; None if the extension uses its own copy."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Base class of the measurements of sensors with several fields (data.py)."""
+"""Base class of the measurements of sensors with several fields (sensors/data.py)."""
 
 from __future__ import annotations
 

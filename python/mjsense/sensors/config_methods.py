@@ -73,7 +73,7 @@ class SceneFileCfg(Config):
     name: str
     models: Callable[[], Any] | None
     _mjs_scene: Callable[[], tuple[Any, ...]]
-    """Called by C++ if there are ``models``. Set when the scene is used, see ``_parts.scene_of``."""
+    """Called by C++ if there are ``models``. Set when the scene is used, see ``tasks/parts.py``."""
 
     def __post_init__(self) -> None:
         if not (self.models is None or callable(self.models)):

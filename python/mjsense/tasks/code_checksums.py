@@ -12,6 +12,7 @@ import hashlib
 import inspect
 import logging
 import pathlib
+import re
 import sys
 import types
 from collections.abc import Iterator, Mapping
@@ -110,7 +111,7 @@ class _Writer:
         if isinstance(value, types.CodeType):
             self._code(value)
         elif isinstance(value, (types.ModuleType, logging.Logger)):
-            self._text(f"name {value.__name__ if isinstance(value, types.ModuleType) else value.name}")
+            self._text(f"name {_without_room(value.__name__ if isinstance(value, types.ModuleType) else value.name)}")
         elif isinstance(value, type):
             self._class(value)
         elif isinstance(value, types.FunctionType):
@@ -144,7 +145,7 @@ class _Writer:
     def _name(self, value: Any) -> None:
         module = value.__module__ or ""
         version = getattr(sys.modules.get(module.split(".")[0]), "__version__", "")
-        self._text(f"{module}.{value.__qualname__} {version}")
+        self._text(f"{_without_room(module)}.{value.__qualname__} {version}")
 
     def _class(self, cls: type) -> None:
         if _is_installed(cls.__module__):
@@ -195,6 +196,13 @@ class _Writer:
                 return self._text(reduced)
             return self.add([list(part) if isinstance(part, Iterator) else part for part in reduced[1:]])
         self._list("attributes", [part for name, item in sorted(state.items()) for part in (name, item)])
+
+
+def _without_room(module: str) -> str:
+    """The name that a module had before the package had rooms, so that recordings of that time can be resumed."""
+    if module == "mjsense.core.representations":  # a part of every class of sensors
+        return "mjsense._show"
+    return re.sub(r"^mjsense\.(core|scene|sensors|sim|tasks)\.", "mjsense.", module)
 
 
 def _numbers(tensor: Any) -> Any:

@@ -2,13 +2,13 @@
 #include "mjsense/hdf5/chunk_checks.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/deflate.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/hdf5/lzf.h"
 #include "mjsense/hdf5/untrusted_file.h"
@@ -25,16 +25,6 @@ using Bytes = std::vector<std::uint8_t>;
 
 [[noreturn]] void refuse(const std::string& name, std::string_view why) {
   throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
-}
-
-// Returns at most `maximum` bytes. Returns none if there would be more, or if `packed` is not a
-// complete zlib stream.
-Bytes inflated(const Bytes& packed, std::size_t maximum) {
-  Bytes out(maximum);
-  uLongf size = maximum;
-  const int status = uncompress(out.data(), &size, packed.data(), packed.size());
-  out.resize(status == Z_OK ? size : 0);
-  return out;
 }
 
 Bytes lzf_unpacked(const Bytes& packed, std::size_t maximum) {

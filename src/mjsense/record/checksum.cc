@@ -13,10 +13,10 @@
 #include <span>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/deflate.h"
 #include "mjsense/core/files/file_descriptor.h"
 #include "mjsense/core/files/file_size_limit.h"
 #include "mjsense/core/files/regular_file.h"
-#include "mjsense/record/crc32.h"
 #include "mjsense/record/folder.h"
 #include "mjsense/record/sha256.h"
 

@@ -2,13 +2,13 @@
 #include "mjsense/record/episode_file.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cstring>
 #include <fstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/deflate.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/system/os.h"
 #include "mjsense/hdf5/chunk_checks.h"
@@ -172,15 +172,7 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
     chunk = texts_of(plan_.arrays[index], rows, chunk);
   std::span<const std::uint8_t> bytes = chunk;
   // Without the lock of the HDF5 library, because compression takes most of the time.
-  if (gzip_ > 0 && !chunk.empty()) {
-    packed_.resize(compressBound(chunk.size()));
-    uLongf size = packed_.size();
-    if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
-      throw RuntimeError(fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(),
-                                     folder_->display_path(name_)));
-    }
-    bytes = {packed_.data(), size};
-  }
+  if (gzip_ > 0 && !chunk.empty()) bytes = deflated(chunk, gzip_, DeflateFormat::kZlib);
   // Computed here because the compressor has just loaded the chunk into this core's cache.
   if (!chunk.empty())
     datasets_[index].sum.add(chunk.data(),

@@ -74,7 +74,7 @@ class EpisodeFile {
   const RecordingPlan& plan_;
   hdf5::Id file_, trajectory_;
   std::vector<Dataset> datasets_;
-  std::vector<std::uint8_t> texts_, packed_;
+  std::vector<std::uint8_t> texts_;
 };
 
 }  // namespace mjsense::record

@@ -20,6 +20,7 @@ import matplotlib
 matplotlib.use("Agg")
 import h5py
 import numpy as np
+
 from mjsense.compat import dm_control
 
 # Its module of helpers also has the training's data set, which the recorder does not use.

@@ -8,6 +8,7 @@ require_opengl()
 import gym_aloha  # noqa: F401
 import gymnasium
 import numpy as np
+
 from mjsense.compat import dm_control as adapter
 
 

@@ -12,6 +12,7 @@ import gymnasium
 import mujoco
 import numpy as np
 import robosuite
+
 from mjsense.compat import dm_control as control
 from mjsense.compat import gymnasium as gym
 from mjsense.compat import robosuite as suite

@@ -10,6 +10,7 @@ import numpy as np
 from dm_control import manipulation, suite
 from dm_control.mujoco import Camera, engine
 from dm_control.suite.wrappers import pixels
+
 from mjsense.compat.dm_control import Context, use
 
 

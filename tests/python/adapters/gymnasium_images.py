@@ -8,6 +8,7 @@ require_opengl()
 import gymnasium
 import gymnasium_robotics
 import metaworld  # noqa: F401
+
 from mjsense.compat import gymnasium as adapter
 
 gymnasium.register_envs(gymnasium_robotics)

@@ -12,10 +12,10 @@ import gymnasium
 import gymnasium_robotics
 import numpy as np
 import robosuite
-from mjsense.compat import dm_control
 from robosuite.wrappers import GymWrapper
 
 import mjsense as mjs
+from mjsense.compat import dm_control
 
 warnings.simplefilter("ignore")
 gymnasium.register_envs(gymnasium_robotics)

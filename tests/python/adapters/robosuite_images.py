@@ -7,9 +7,10 @@ from images import compare, compare_depth, end, require_opengl
 require_opengl()
 
 import robosuite
-from mjsense.compat import robosuite as adapter
 from robosuite.environments import base
 from robosuite.utils.camera_utils import get_real_depth_map
+
+from mjsense.compat import robosuite as adapter
 
 CAMERAS = ["agentview", "robot0_eye_in_hand"]
 own_context = base.MjRenderContextOffscreen

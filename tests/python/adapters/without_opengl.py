@@ -9,10 +9,11 @@ import dm_control.suite  # before robosuite, which sets MUJOCO_GL to egl
 import gym_aloha  # noqa: F401
 import gymnasium
 import metaworld  # noqa: F401
+import robosuite
+
 import mjsense.compat.dm_control
 import mjsense.compat.gymnasium
 import mjsense.compat.robosuite
-import robosuite
 
 mjsense.compat.dm_control.use()
 mjsense.compat.robosuite.use()

@@ -6,9 +6,9 @@ import sys
 
 sys.path.insert(0, "code")
 import lab
-from mjsense.cluster import Job, record_on_ray
 
 import mjsense as mjs
+from mjsense.cluster import Job, record_on_ray
 
 out, environment = sys.argv[1], json.loads(sys.argv[2])
 arguments = {"task": lab.Look, "policy": lab.Still, "sensors": [lab.Length()], "keep_failures": True, "cameras": [], "worlds": 1}

@@ -2,11 +2,11 @@
 #include "mjsense/core/files/png.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/deflate.h"
 #include "mjsense/core/files/regular_file.h"
 
 namespace mjsense {
@@ -22,8 +22,7 @@ void put_chunk(std::vector<std::uint8_t>& out, const char (&type)[5],
   const std::size_t start = out.size();
   out.insert(out.end(), type, type + 4);
   out.insert(out.end(), body.begin(), body.end());
-  put_u32(out, static_cast<std::uint32_t>(
-                   crc32(0, out.data() + start, static_cast<uInt>(out.size() - start))));
+  put_u32(out, crc32_of(0, out.data() + start, out.size() - start));
 }
 
 }  // namespace
@@ -53,12 +52,6 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
     const std::uint8_t* above = from - stride;
     for (std::size_t i = 0; i < stride; ++i) to[i] = static_cast<std::uint8_t>(from[i] - above[i]);
   }
-  uLongf packed_size = compressBound(rows.size());
-  std::vector<std::uint8_t> packed(packed_size);
-  if (compress2(packed.data(), &packed_size, rows.data(), rows.size(), level) != Z_OK) {
-    throw RuntimeError("PNG: zlib failed to compress the image");
-  }
-  packed.resize(packed_size);
 
   std::vector<std::uint8_t> header;
   put_u32(header, width);
@@ -70,7 +63,7 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
 
   std::vector<std::uint8_t> out = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   put_chunk(out, "IHDR", header);
-  put_chunk(out, "IDAT", packed);
+  put_chunk(out, "IDAT", deflated(rows, level, DeflateFormat::kZlib));
   put_chunk(out, "IEND", {});
   return out;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// PNG encoder (8 bits per channel, zlib) for contact sheets, depth previews and failing tests.
+// PNG encoder (8 bits per channel) for contact sheets, depth previews and failing tests.
 // Equal pixels give equal bytes.
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 namespace mjsense {
 
 // `pixels` [height, width, channels], dense, row 0 at the top; 1 (grey), 3 (RGB) or 4 (RGBA)
-// channels. `level` is zlib's, 1 (fastest) to 9 (smallest). Throws ValueError if the sizes do not
+// channels. `level` is 1 (fastest) to 9 (smallest). Throws ValueError if the sizes do not
 // agree.
 std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int width, int height,
                                      int channels, int level = 6);

@@ -2,11 +2,12 @@
 #include "mjsense/core/files/zip.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <limits>
+#include <span>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/deflate.h"
 
 namespace mjsense {
 namespace {
@@ -16,6 +17,7 @@ constexpr std::uint32_t kLocalHeader = 0x04034b50, kDirectoryHeader = 0x02014b50
 constexpr std::uint16_t kVersion = 20;               // 2.0: deflate
 constexpr std::uint16_t kUtf8 = 1 << 11;             // flag: names are UTF-8
 constexpr std::uint16_t kDeflate = 8;                // method
+constexpr int kLevel = 6;                            // of compression
 constexpr std::uint16_t kDate = 1 << 5 | 1;          // 1 January 1980, the format's first day
 constexpr std::uint32_t kReadable = 0100644u << 16;  // a regular file, rw-r--r--
 
@@ -27,24 +29,6 @@ void put16(std::string& out, std::uint32_t x) {
 void put32(std::string& out, std::uint32_t x) {
   put16(out, x & 0xffff);
   put16(out, x >> 16);
-}
-
-// Deflate without the header of zlib.
-std::string deflated(std::string_view bytes) {
-  z_stream z{};
-  if (deflateInit2(&z, Z_DEFAULT_COMPRESSION, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) !=
-      Z_OK)
-    throw RuntimeError("zlib cannot compress an archive: no memory");
-  std::string out(deflateBound(&z, bytes.size()), '\0');
-  z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  z.avail_in = static_cast<uInt>(bytes.size());
-  z.next_out = reinterpret_cast<Bytef*>(out.data());
-  z.avail_out = static_cast<uInt>(out.size());
-  const int status = deflate(&z, Z_FINISH);
-  out.resize(z.total_out);
-  deflateEnd(&z);
-  if (status != Z_STREAM_END) throw RuntimeError("zlib failed to compress an archive");
-  return out;
 }
 
 }  // namespace
@@ -60,11 +44,11 @@ void ZipWriter::add(std::string_view name, std::string_view bytes) {
     throw ValueError(
         fmt::format("zip archive: a name of {} bytes, expected 1 to 65535", name.size()));
   require_room(bytes.size());
-  const std::string packed = deflated(bytes);
+  const std::span plain(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  const auto packed = deflated(plain, kLevel, DeflateFormat::kRaw);
   require_room(packed.size() + 2 * name.size() + 128);
   const auto offset = static_cast<std::uint32_t>(files_.size());
-  const auto crc = static_cast<std::uint32_t>(
-      crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
+  const std::uint32_t crc = crc32_of(0, bytes.data(), bytes.size());
   const auto put_common = [&](std::string& out) {
     put16(out, kVersion);
     put16(out, kUtf8);
@@ -80,7 +64,7 @@ void ZipWriter::add(std::string_view name, std::string_view bytes) {
   put32(files_, kLocalHeader);
   put_common(files_);
   files_ += name;
-  files_ += packed;
+  files_.append(packed.begin(), packed.end());
 
   put32(directory_, kDirectoryHeader);
   put16(directory_, 3 << 8 | kVersion);  // made by: Unix

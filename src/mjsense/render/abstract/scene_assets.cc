@@ -2,10 +2,12 @@
 #include "mjsense/render/abstract/scene_assets.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cstring>
+#include <span>
 #include <utility>
 
+#include "mjsense/core/content_cache.h"
 #include "mjsense/core/model_indices.h"
 
 namespace mjsense::render {
@@ -34,13 +36,16 @@ bool SceneAssets::Stamp::changed(const void* data, std::size_t bytes) {
   const auto* at = static_cast<const unsigned char*>(data);
   const std::size_t words = bytes / sizeof(std::uint64_t);
   const std::size_t step = std::max<std::size_t>(1, words / kPlaces);
-  std::uint64_t hash = bytes;
-  for (std::size_t i = 0; i < words; i += step) {
-    std::uint64_t word;
-    std::memcpy(&word, at + i * sizeof word, sizeof word);
-    hash = std::rotl((hash ^ word) * 0x9E3779B97F4A7C15u, 29);
-  }
-  for (std::size_t i = words * sizeof(std::uint64_t); i < bytes; ++i) hash = hash * 31 + at[i];
+  std::array<std::uint64_t, 2 * kPlaces + 1> compared;
+  std::size_t count = 0;
+  const auto compare = [&](const void* from, std::size_t size) {
+    compared[count] = 0;
+    std::memcpy(&compared[count++], from, size);
+  };
+  for (std::size_t i = 0; i < words; i += step)
+    compare(at + i * sizeof(std::uint64_t), sizeof(std::uint64_t));
+  if (const std::size_t rest = bytes % sizeof(std::uint64_t)) compare(at + bytes - rest, rest);
+  const std::uint64_t hash = hash_of(std::as_bytes(std::span(compared.data(), count)), bytes);
   return std::exchange(value, hash) != hash;
 }
 

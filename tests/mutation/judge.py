@@ -17,6 +17,7 @@ SLOW_S = 2  # a test that takes longer is slow
 # Seconds of tests, as measured without a mutant, that judge one mutant: slow ones of its own room, fast ones of other rooms.
 SLOW_OWN_S, OTHERS_S = 20, 30
 PYTHON_S = 120  # seconds of the clock after which no further pytest file judges a mutant of python/
+MODULE = "python/mjsense/_core.abi3.so"
 OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
 
 
@@ -33,15 +34,15 @@ def within(limit: float, tests: list[str], seconds: dict[str, float]) -> list[st
 class Judge:
     def __init__(self, runner, root: Path, build: Path, rooms: list[str], pytests: dict[str, list[str]]) -> None:
         self.runner, self.root, self.build, self.pytests = runner, root, build, pytests
-        self.rooms = [room for room in rooms if any((root / "src").glob(f"*/{room}/**/*_test.cc"))]
+        folders = {room: folder for room in rooms for folder in (root / "src").glob(f"*/{room}")}
+        self.rooms = [room for room in folders if any(folders[room].rglob("*_test.cc"))]
         self.original: dict[str, str] = {}  # hash of each program without a mutant
         self.seconds: dict[str, dict[str, float]] = {}  # program: test: seconds
         self.tests: dict[str, dict[str, str]] = {}  # room: suite: text of the file with its tests
         self.uses: dict[str, set[str]] = {}  # room: what its files include, code and tests
         self.version: dict[str, str] = {}  # room: hash of its tests
         for room in self.rooms:
-            files = [f for f in (root / "src").glob(f"*/{room}/**/*") if f.suffix in (".cc", ".h")]
-            texts = {f: f.read_text() for f in files}
+            texts = {f: f.read_text() for f in folders[room].rglob("*") if f.suffix in (".h", ".cc")}
             self.uses[room] = {name for text in texts.values() for name in re.findall(r'^#include "mjsense\w*/([^"]+)"', text, re.M)}
             self.tests[room] = {suite: f"{f.parent.relative_to(root)}\n{text}" for f, text in texts.items() if f.name.endswith("_test.cc")
                                 for suite in re.findall(r"^(?:TYPED_)?TEST(?:_[FP])?\((\w+),", text, re.M)}
@@ -54,8 +55,8 @@ class Judge:
     def baseline(self, cache: Path) -> None:
         """The time of each test without a mutant. Tests that fail so are left out."""
         known = json.loads(cache.read_text()) if cache.exists() else {}
-        self.runner.build([*(f"{room}_test" for room in self.rooms), "golden_test", "mjsense_program", "record_fake", "mjsense_python"])
-        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", "mjsense"]:
+        self.runner.build([*(f"{room}_test" for room in self.rooms), "golden_test", "record_fake", "mjsense_python"])
+        for program in [*(f"{room}_test" for room in self.rooms), "golden_test", MODULE]:
             self.original[program] = self.digest(program)
         for room in self.rooms:
             program = f"{room}_test"
@@ -129,14 +130,14 @@ class Judge:
                     same = False
                     if failed := self.runner.golden():
                         return "noticed", failed
-            self.runner.build(["mjsense_program"])
-            same = same and self.digest("mjsense") == self.original["mjsense"]
+            self.runner.build(["mjsense_python"])
+            same = same and self.digest(MODULE) == self.original[MODULE]
             if not same and (paths := self.pytests.get(file.split("/")[2])):
                 self.runner.build(["record_fake"])
                 if failed := self.runner.pytest(paths):
                     return "noticed", failed
         elif not built:
-            self.runner.build(["mjsense"])  # a room without fast tests
+            self.runner.build(["mjsense_python"])  # a room without fast tests
         return "same program" if others and same else "survived", ""
 
     def ask_python(self, file: str) -> tuple[str, str]:
@@ -163,7 +164,7 @@ def judge_all(judge: Judge, mutants: list, results_file: Path, tree: Path, failu
         known = results.get(mutant.id)
         if not known or known["digest"] != mutant.digest:
             return True
-        if known["outcome"] != "survived" or mutant.room == "python":
+        if known["outcome"] != "survived" or mutant.room.startswith(("python/", "bindings")):
             return False
         return not known["others"] if others else known["tests"] != judge.version.get(mutant.room)
 

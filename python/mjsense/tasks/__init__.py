@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robot learning: tasks, robots and policies, environments of them, and recordings of their episodes. Modules are imported when one of
+their names is used."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from mjsense._core import robot_names
+
+if TYPE_CHECKING:
+    from mjsense.tasks.env import TaskEnv, make
+    from mjsense.tasks.policy import Policy, policy_names, register_policy
+    from mjsense.tasks.record_job import RecordProgress, RecordSummary
+    from mjsense.tasks.recording import record
+    from mjsense.tasks.robot import MoveGroup, Robot, RobotCamera
+    from mjsense.tasks.task import Task, WorldState, register_task, task_names
+    from mjsense.tasks.teleoperation import Teleoperation, play
+    from mjsense.tasks.vector import TaskVectorEnv, make_vec
+
+_NAMES = {
+    "env": ("TaskEnv", "make"),
+    "policy": ("Policy", "policy_names", "register_policy"),
+    "record_job": ("RecordProgress", "RecordSummary"),
+    "recording": ("record",),
+    "robot": ("MoveGroup", "Robot", "RobotCamera"),
+    "task": ("Task", "WorldState", "register_task", "task_names"),
+    "teleoperation": ("Teleoperation", "play"),
+    "vector": ("TaskVectorEnv", "make_vec"),
+}
+_MODULES = {name: module for module, names in _NAMES.items() for name in names}
+
+__all__ = [
+    "MoveGroup", "Policy", "RecordProgress", "RecordSummary", "Robot", "RobotCamera", "Task", "TaskEnv", "TaskVectorEnv",
+    "Teleoperation", "WorldState", "make", "make_vec", "play", "policy_names", "record", "register_policy", "register_task",
+    "robot_names", "task_names",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
