@@ -416,7 +416,7 @@ def make_vec(
     perturb: float = 0.0,
     instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
-    max_penetration: float = 0.004,
+    max_penetration: float | None = None,
     # end of options
     use_sensors: bool = True,
     autoreset_mode: str | AutoresetMode = "next_step",
@@ -469,7 +469,8 @@ def make_vec(
             distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
         max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
-            any depth. Pairs of geoms that are deeper at the start do not count. [m]
+            any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
+            deeper at the start do not count. [m]
         Others:
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.

@@ -9,6 +9,7 @@ frames are a tenth of the notebook's. Lines for the shell and for IPython are le
 does not fail with the packages' own images, or if an image differs.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -43,7 +44,10 @@ def prepare():
     import pygments.lexers  # noqa: F401
 
     matplotlib.use("Agg")
-    stub("google")
+    with contextlib.suppress(ImportError):
+        import google.protobuf  # noqa: F401  # dm_control's soccer uses it
+    if "google" not in sys.modules:
+        stub("google")
     colab = stub("google.colab", files=None, output=stub("google.colab.output"))
     sys.modules["google"].colab = colab
     stub("mediapy")
