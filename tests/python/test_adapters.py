@@ -49,11 +49,15 @@ PACKAGES = {
         "gymnasium==1.4.0",
         "h5py",
         "ipython",
+        "loop-rate-limiters",
         "matplotlib",
+        "mink==0.0.5",
         "nanobind-backend>=1.0",
+        "osqp",
         "pygments",
         "PyOpenGL",
         "pyquaternion",
+        "qpsolvers[quadprog]",
         "scipy",
     ),
 }
@@ -163,6 +167,11 @@ def test_notebooks_of_mujoco(environment, name):
 def test_notebook_of_dm_control(environment):
     notebook = checkout("dm_control/tutorial.ipynb")
     run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", "dm_control", notebook, "24")
+
+
+def test_examples_of_mink(environment):
+    folder = checkout("mink/examples/arm_iiwa.py").parents[1]
+    run(environment("programs"), Path(__file__).parent / "adapters/mink_examples.py", folder)
 
 
 def test_every_page_is_tested():

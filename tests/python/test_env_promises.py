@@ -11,6 +11,7 @@ import pytest
 from tasks import Cart
 
 import mjsense as mjs
+from mjsense.core import mujoco_names
 
 SMALL = dict(cameras=[], width=64, height=40, render_mode="rgb_array")
 
@@ -49,7 +50,7 @@ def test_the_default_view_shows_the_robot_and_its_target(task, robot, role):
         target = json.loads(env._rollout.obs_scene(world))["objects"][role]["body"]
         shown = []
         for root in (model.body("robot_0/base" if robot != "franka" else "robot_0/fr3_link0").id, model.body(target).id):
-            below = mjs._mujoco.bodies_below(model, root)
+            below = mujoco_names.bodies_below(model, root)
             geoms = np.flatnonzero(below[model.geom_bodyid])
             shown.append((np.isin(pixels[world, ..., 0], geoms) & (pixels[world, ..., 1] == 5)).mean())
         seen += shown[0] > 0.02 and shown[1] > 0.0003
@@ -98,7 +99,7 @@ def test_the_expert_of_a_single_environment():
 
 
 def test_names_of_gymnasium(monkeypatch):
-    monkeypatch.setattr(mjs.task, "_TASKS", {})
+    monkeypatch.setattr("mjsense.tasks.task._TASKS", {})
     monkeypatch.setattr(gymnasium.envs.registration, "registry", dict(gymnasium.registry))
     for name, env_id in (("my-cart.v2", "mjsense/My-cart.v2-v0"), ("_cart", "mjsense/Cart-v0")):
         mjs.register_task(name, Cart)
