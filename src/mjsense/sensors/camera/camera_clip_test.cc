@@ -108,7 +108,8 @@ TEST(CameraClip, ErrorsNameTheLimits) {
 
 // The far plane is at 2 m: it cuts the plates at 3 m, and a plate across it.
 TEST(CameraClip, ClipsAtTheModelsFarPlaneLikeOpenGL) {
-  const TestModel m(R"(<mujoco><visual><map znear=".01" zfar=".5"/></visual><statistic extent="4" center="0 0 0"/>
+  const TestModel m(
+      R"(<mujoco><visual><map znear=".01" zfar=".5"/></visual><statistic extent="4" center="0 0 0"/>
     <worldbody><light pos="0 0 3" diffuse=".6 .6 .6"/>
     <geom type="box" size=".5 .5 .1" pos="0 .6 -3" rgba="1 0 0 1"/>
     <geom type="box" size=".4 .4 .1" pos="0 -.4 -1.5" rgba="0 1 0 1"/>
