@@ -283,7 +283,7 @@ CASES = {
     "source of a replay": (lambda u: mjs.check_replay(u.tmp / "nothing"), ["nothing", "no such file or directory"]),
     "source of a rendering": (lambda u: mjs.render(u.tmp / "nothing", out=u.tmp / "e"), ["nothing", "no such file or directory"]),
     "camera of a rendering": (lambda u: mjs.render(u.data.root, out=u.tmp / "e", cameras=["tpo"]), ["no camera named 'tpo'"]),
-    "a folder that is no LeRobot data set": (lambda u: mjs.import_lerobot(u.tmp, out=u.tmp / "e"), ["not a LeRobot data set", "meta/info.json"]),
+    "a folder without a LeRobot data set": (lambda u: mjs.import_lerobot(u.tmp, out=u.tmp / "e"), ["not a LeRobot data set", "meta/info.json"]),
     "robot of its own": (lambda u: mjs.Robot("fanka"), ["no robot named 'fanka'", "did you mean 'franka'?"]),
     "file of a robot": (lambda u: mjs.Robot("x/robot.toml"), ["x/robot.toml", "no such file"]),
     "port": (lambda u: mjs.view("pick", port=65536), ["port is 65536", "[0, 65535]"]),
