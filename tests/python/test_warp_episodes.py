@@ -4,6 +4,7 @@
 import re
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -30,7 +31,7 @@ class Position(mjs.Sensor):
     """Position of the cart, with noise."""
 
     uuid = "noisy"
-    observation_space = mjs.native_sensor.gymnasium.spaces.Box(-9, 9, (1,), np.float32)
+    observation_space = gymnasium.spaces.Box(-9, 9, (1,), np.float32)
 
     def compute(self, sim):
         return sim.scene["noise"].data[:, :1] * 1.0
@@ -199,7 +200,7 @@ class Mark(mjs.Sensor):
     """Position of the mark."""
 
     uuid = "mark"
-    observation_space = mjs.native_sensor.gymnasium.spaces.Box(-9, 9, (1,), np.float32)
+    observation_space = gymnasium.spaces.Box(-9, 9, (1,), np.float32)
 
     def compute(self, sim):
         return sim.mocap_pos[:, 0, :1]

@@ -6,6 +6,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from mjsense.core.arrays import on_host
@@ -26,6 +27,13 @@ def share(array: wp.array) -> Any:
     return array if torch() is None else wp.to_torch(array, requires_grad=False)
 
 
+def tensor(values: Any, dtype: Any, device: Any) -> Any:
+    """Values as a tensor. Arrays that must not be written, such as those of a model, are copied: tensors cannot be read-only."""
+    if isinstance(values, np.ndarray):
+        values = np.require(values, requirements="W")
+    return torch().as_tensor(values, dtype=dtype, device=device)
+
+
 def write(array: wp.array, values: Any, rows: Any = slice(None)) -> None:
     """Writes values, which may broadcast, to these rows. The values of a tensor on the device stay there."""
     if torch() is None:
@@ -36,8 +44,8 @@ def write(array: wp.array, values: Any, rows: Any = slice(None)) -> None:
     target = wp.to_torch(array, requires_grad=False)
     if isinstance(values, wp.array):
         values = wp.to_torch(values, requires_grad=False)
-    index = rows if isinstance(rows, slice) else torch().as_tensor(rows, device=target.device)
-    target[index] = torch().as_tensor(values, dtype=target.dtype, device=target.device)
+    index = rows if isinstance(rows, slice) else tensor(rows, None, target.device)
+    target[index] = tensor(values, target.dtype, target.device)
 
 
 def device_of(name: str | None) -> Any:

@@ -18,6 +18,7 @@ from mjsense.sensors.configs import SceneCfg
 from mjsense.sim.simulation import Simulation
 from mjsense.tasks.task import Task, WorldState
 from mjsense.tasks.vector import TaskVectorEnv
+from mjsense.warp import arrays
 from mjsense.warp.arrays import torch
 from mjsense.warp.host_rows import stream_of
 from mjsense.warp.scene_robot import SceneRobot
@@ -41,7 +42,7 @@ class WarpTaskVectorEnv(TaskVectorEnv):
     def _numbers(self, actions: Any) -> Any:
         if not torch().is_tensor(actions):
             actions = numbers("actions", actions)
-        return torch().as_tensor(actions, dtype=torch().float32, device=self._device)
+        return arrays.tensor(actions, torch().float32, self._device)
 
     def _copy(self, rows: Any) -> Any:
         return rows.clone()
@@ -180,7 +181,7 @@ class WarpRollout:
             self._faults.setdefault(world, f"task '{self._name}': the reward is {float(self._reward[world])}")
 
     def _tensor(self, what: str, value: Any, like: Any) -> Any:
-        tensor = torch().as_tensor(value, dtype=like.dtype, device=like.device)
+        tensor = arrays.tensor(value, like.dtype, like.device)
         if tensor.shape != like.shape:
             raise ValueError(
                 f"task '{self._name}': {what} has shape {tuple(tensor.shape)}, expected {tuple(like.shape)}: one value a world"
