@@ -99,8 +99,6 @@ class TaskVectorEnv(VectorEnv):
         """Columns of an action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
         low[low <= -mujoco_names.MAXVAL], high[high >= mujoco_names.MAXVAL] = -np.inf, np.inf  # no limit
-        if action_space not in ("commands", "normalised"):
-            raise ValueError(f"action_space must be 'commands' or 'normalised', not {action_space!r}")
         self._command_range = _command_range(self.action_groups, low, high) if action_space == "normalised" else None
         if self._command_range is not None:
             low, high = np.full_like(low, -1), np.full_like(high, 1)
