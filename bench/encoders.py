@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-from harness import Row, program, report
+from harness import MJSENSE, Row, report
 from video_settings import decoded, ffmpeg
 
 RUNS = 5
@@ -33,7 +33,7 @@ OTHERS = {
 
 
 def raw_videos(folder: pathlib.Path) -> list[pathlib.Path]:
-    record = [program("mjsense"), "record", "pick", "--worlds", "2", "--episodes", "2", "--crf", "0", "--out", folder / "out", "-q", "--no-sheet"]
+    record = [*MJSENSE, "record", "pick", "--worlds", "2", "--episodes", "2", "--crf", "0", "--out", folder / "out", "-q", "--no-sheet"]
     subprocess.run(record, check=True, stdout=subprocess.DEVNULL)
     return decoded(folder)
 

@@ -15,7 +15,7 @@ import sys
 import tempfile
 
 from fetch import Unavailable, wheel
-from harness import Row, program, report
+from harness import MJSENSE, Row, report
 
 RUNS = 3
 MESHES = "gymnasium_robotics/envs/assets/kitchen_franka/franka_assets/meshes/visual"
@@ -30,7 +30,7 @@ CASES = {
 
 def run(options: list[str]) -> dict:
     with tempfile.TemporaryDirectory() as folder:
-        command = [program("mjsense"), "record", "pick", "--robot", "franka", "--worlds", "4", "--out", folder, "--json", "-q",
+        command = [*MJSENSE, "record", "pick", "--robot", "franka", "--worlds", "4", "--out", folder, "--json", "-q",
                    "--no-sheet", *([] if "--meshes" in options else ["--meshes", "shapes"]), *options]
         before = os.times()
         summary = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

@@ -44,8 +44,8 @@ set_target_properties(mjsense_shared_mujoco PROPERTIES OUTPUT_NAME mj_mjsense LI
 add_custom_target(mjsense_private_mujoco DEPENDS ${MJSENSE_PY_LIB}/libmj_mjsense.so)
 add_dependencies(mjsense_private_mujoco mjsense_shared_mujoco)
 add_dependencies(mjsense_python mjsense_private_mujoco)
-# The three libraries are named, so that CMake puts these HDF5 libraries behind them and before the ones that they link otherwise.
-target_link_libraries(mjsense_python PRIVATE mjsense_app mjsense_tasks mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_ALL_LIBS}
+# The two libraries are named, so that CMake puts these HDF5 libraries behind them and before the ones that they link otherwise.
+target_link_libraries(mjsense_python PRIVATE mjsense_tasks mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_ALL_LIBS}
                                              ${MJSENSE_PY_LIB}/libmj_mjsense.so)
 target_link_options(mjsense_python PRIVATE -Wl,--exclude-libs,ALL -Wl,-Bsymbolic)
 if(MJSENSE_STATIC)

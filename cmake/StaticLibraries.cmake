@@ -35,7 +35,7 @@ set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpa
                         -Wl,--version-script=${PROJECT_SOURCE_DIR}/packaging/exports.map -Wl,--gc-sections -pthread)
 
 # The licenses of these libraries are added to the wheel.
-foreach(package fmt nlohmann-json3 cli11 tomlplusplus pcre2 embree ompl eigen3 boost hdf5 aec deflate xxhash zlib1g)
+foreach(package fmt nlohmann-json3 tomlplusplus pcre2 embree ompl eigen3 boost hdf5 aec deflate xxhash zlib1g)
   find_file(MJSENSE_LICENCE_${package} copyright PATHS /usr/share/doc/lib${package}-dev /usr/share/doc/${package}-dev
             NO_DEFAULT_PATH REQUIRED)
   if(SKBUILD)

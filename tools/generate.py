@@ -47,11 +47,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from mjsense.core.field_docs import show_field_docs
 from mjsense.core.lazy_dataclass import dataclass
 from mjsense.sensors import config_methods
+from mjsense.sensors.effects import Effect
 
 if TYPE_CHECKING:
     import mujoco
-
-    from mjsense.sensors.effects import Effect
 ''',
     "effects": '''# SPDX-License-Identifier: Apache-2.0
 """Effects: errors of real sensors. An effect sensor applies them in this order to the rows of a sensor of the scene, in the unit
@@ -76,7 +75,6 @@ from typing import ClassVar, Literal
 from mjsense.core.field_docs import show_field_docs
 from mjsense.core.lazy_dataclass import dataclass
 from mjsense.sensors import config_methods
-from mjsense.sensors.configs import SensorCfg
 ''',
 }
 
@@ -105,6 +103,28 @@ SIGNATURES = {
         {"seed": " None: a random seed, so that every environment has other episodes."},
     ),
 }  # fmt: skip
+
+# Options of the program: its structs, with the parameters that have another name in Python. Names that options accept are listed too.
+OPTIONS = {"RecordJobCfg": {"num_worlds": "worlds"}, "RolloutCfg": {"num_worlds": "worlds"}, "LidarSensorCfg": {}, "SpinningScanCfg": {}, "TableScanCfg": {}}
+TABLE = '''# SPDX-License-Identifier: Apache-2.0
+"""Options of the program that are fields of configurations, and the names that they accept. The program shows its help and checks its
+arguments before it loads the library.
+
+%s
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mjsense.commands.fields import Field
+
+FIELDS = {
+%s}
+
+NAMES: dict[str, Any] = {
+%s}
+'''
 
 # The public C++ interface of both libraries: these headers, every sensor's `<name>_sensor_cfg.h` (or `<name>_sensor.h` if it has none), and the
 # headers that they include, directly or indirectly.
@@ -194,6 +214,7 @@ class Generator:
         self.structs: dict[str, Any] = schema["structs"]
         self.data: dict[str, Any] = schema["data"]
         self.data_of_kind: dict[str, str] = schema["data_of_kind"]
+        self.names: dict[str, list[str]] = schema["names"]
         self.methods = methods()
         # Bases that the schema does not list as structs, such as SensorCfg.
         for struct in list(self.structs.values()):
@@ -298,8 +319,9 @@ class Generator:
         return found
 
     def python(self, module: str) -> str:
-        wanted = [n for n, s in self.structs.items() if (s["module"] or "configs") == module and "." not in n
-                  and n not in ("RecordJobCfg", "RolloutCfg", "VideoCfg")]  # fmt: skip
+        # EffectSensorCfg too is derived from SensorCfg, in configs, which imports effects.
+        own = {n: "configs" if s.get("bases") else s["module"] or "configs" for n, s in self.structs.items()}
+        wanted = [n for n in own if own[n] == module and "." not in n and n not in ("RecordJobCfg", "RolloutCfg", "VideoCfg")]
         done: set[str] = set()
         parts: list[str] = []
 
@@ -406,9 +428,39 @@ class Generator:
             rows.append(f"| `{shown}` | {default} | {text} |\n")
         return "| option | default | |\n| --- | --- | --- |\n" + "".join(rows)
 
+    # ------------------------------------------------------------------------------------------------------ program
+
+    def program_table(self) -> str:
+        structs = ""
+        for struct, renamed in OPTIONS.items():
+            rows = [self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.structs[struct]["fields"] if "type" in f]
+            structs += f"    {quoted(struct)}: [\n" + "".join(row for row in rows if row) + "    ],\n"
+        names = {**self.names, "formats": export_formats()}
+        return TABLE % (NOTE, structs, "".join(f"    {quoted(kind)}: {json.dumps(known)},\n" for kind, known in names.items()))
+
+    def program_option(self, f: dict[str, Any], parameter: str) -> str:
+        """A line of the table; empty for a field that cannot be written as one text."""
+        t, is_list = f["type"], False
+        while t["kind"] in ("optional", "list"):
+            is_list |= t["kind"] == "list"
+            t = t["element"]
+        kind = "text" if t["kind"] == "word" else t["kind"]
+        if kind not in ("bool", "int", "unsigned", "number", "text", "path"):
+            return ""
+        text = field_text(f).replace("`", "")
+        if kind == "bool" and f["default"] and not f["hidden"]:
+            text = f"Do not {text[0].lower()}{text[1:]}"
+        default = f["default"]
+        shown = "" if default is None or kind == "bool" else ",".join(map(short, default)) or "none" if is_list else short(default)
+        more = {"words": f["words"] or t.get("words") or [], "default": shown, "is_list": is_list, "is_on": default is True, "hidden": f["hidden"],
+                "low": f.get("low"), "high": f.get("high"), "above_low": f["above_low"]}  # fmt: skip
+        given = "".join(f", {name}={value!r}" for name, value in more.items() if not (value is None or value is False or value in ("", [])))
+        return f"        Field({parameter!r}, {f['option']!r}, {f['flag']!r}, {kind!r}, {text!r}{given}),\n"
+
     def files(self) -> dict[Path, str]:
         out = {SENSORS / f"{module}.py": self.python(module) for module in MODULES}
         out[SENSORS / "data.py"] = self.data_classes()
+        out[PACKAGE / "commands" / "table.py"] = self.program_table()
         for name in SIGNATURES:
             path = PACKAGE / name
             out[path] = self.signature(path.read_text(), name)
@@ -425,6 +477,16 @@ class Generator:
             out[ROOT / f"src/{library}/{library}.h"] = UMBRELLA % (purpose, includes, names, namespace, using, namespace)
         out[ROOT / "cmake/PublicHeaders.cmake"] = PUBLIC_HEADERS % "\n".join(f"  {header}" for header in headers)
         return out
+
+
+def export_formats() -> dict[str, str]:
+    """``FORMATS`` of mjsense.exporting."""
+    tree = ast.parse((PACKAGE / "exporting" / "__init__.py").read_text())
+    return next(ast.literal_eval(node.value) for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FORMATS")
+
+
+def short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def quoted(text: str) -> str:

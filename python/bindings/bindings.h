@@ -21,6 +21,8 @@ void bind_recorder(nanobind::module_& m);
 void bind_robot(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);
 void bind_program(nanobind::module_& m);
+void bind_listing(nanobind::module_& m);
+void bind_measured_scenes(nanobind::module_& m);
 void bind_core_sensors(nanobind::module_& m);
 void bind_task_view(nanobind::module_& m);
 

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "python/bindings/fields.h"
 
+#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/string.h>
 
 #include <filesystem>
 
-#include "mjsense/app/schema.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/sensors/all_sensors.h"
+#include "python/bindings/schema.h"
 
 namespace mjsense::python {
 namespace {
@@ -67,11 +68,9 @@ struct Reader {
       case Kind::kText:
         if (value.is_none() && field.is_or_none) return static_cast<std::string*>(out)->clear();
         return scalar(value, type, *static_cast<std::string*>(out));
-      case Kind::kPath: {
-        nb::object text = nb::module_::import_("os").attr("fspath")(value);
-        *static_cast<std::filesystem::path*>(out) = nb::cast<std::string>(text);
+      case Kind::kPath:  // names of files need not be UTF-8
+        if (!nb::try_cast(value, *static_cast<std::filesystem::path*>(out))) fail(value, type);
         return;
-      }
       case Kind::kEnum: {
         std::string text;
         scalar(value, type, text);
@@ -197,7 +196,7 @@ void check_cfg(nb::handle config) {
     }
   }
   for (nb::handle base : config.type().attr("__mro__")) {
-    const StructDecl* decl = app::find_struct(nb::cast<std::string>(base.attr("__qualname__")));
+    const StructDecl* decl = find_struct(nb::cast<std::string>(base.attr("__qualname__")));
     if (!decl) continue;
     const std::shared_ptr<void> object = decl->make();
     read_struct(config, *decl, object.get());

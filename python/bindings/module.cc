@@ -27,4 +27,6 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_task_view(m);
   mjsense::python::bind_rollout(m);
   mjsense::python::bind_program(m);
+  mjsense::python::bind_listing(m);
+  mjsense::python::bind_measured_scenes(m);
 }

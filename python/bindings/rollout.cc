@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -27,6 +28,7 @@
 #include "python/bindings/python_task.h"
 #include "python/bindings/rollout_host.h"
 #include "python/bindings/sensor_handle.h"
+#include "python/bindings/stop_on_signal.h"
 
 namespace mjsense::python {
 
@@ -136,20 +138,28 @@ nb::dict progress_dict(const tasks::rollout::RecordProgress& p) {
   return d;
 }
 
+// With `stop_on_signals`, Ctrl-C and SIGTERM end the recording as in StopOnSignal, and `progress`
+// gets the number of signals too.
 nb::dict record(nb::dict options, nb::object progress, nb::object objects,
-                nb::object make_simulation) {
+                nb::object make_simulation, bool stop_on_signals) {
   tasks::rollout::RecordJobCfg cfg;
   read_options(options, struct_of<tasks::rollout::RecordJobCfg>(), &cfg);
   const Parts parts(objects, make_simulation);
   parts.join(cfg.rollout);
-  tasks::rollout::StopFlag stop{0};
+  const StopOnSignal signals(stop_on_signals);
+  tasks::rollout::StopFlag own_stop{0};
+  tasks::rollout::StopFlag& stop = stop_on_signals ? StopOnSignal::flag : own_stop;
   nb::object error;  // raised by `progress`, or KeyboardInterrupt
   const auto report = [&](const tasks::rollout::RecordProgress& p) {
     nb::gil_scoped_acquire lock;
     if (error) return;
     try {
       if (PyErr_CheckSignals() != 0) throw nb::python_error();
-      if (!progress.is_none()) progress(progress_dict(p));
+      if (!progress.is_none() && stop_on_signals) {
+        progress(progress_dict(p), stop.load());
+      } else if (!progress.is_none()) {
+        progress(progress_dict(p));
+      }
     } catch (nb::python_error& e) {
       error = nb::borrow(e.value());
       stop = 2;
@@ -187,7 +197,13 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
   times["recording"] = s.recording_s;
   d["times"] = times;
   d["published_bytes"] = s.record.published_bytes;
-  d["path"] = s.house_dir.string();
+  d["path"] = nb::cast(s.house_dir);
+  nb::dict work;  // in addition to the simulation, for the program
+  work["encode_cpu_s"] = s.record.encode_cpu_s;
+  work["write_s"] = s.record.write_s + s.record.commit_s;
+  work["raw_bytes"] = s.record.raw_bytes;
+  work["damage"] = s.damage;
+  d["work"] = work;
   return d;
 }
 
@@ -380,7 +396,20 @@ nb::tuple outcomes(PyRollout& self) {
 
 void bind_rollout(nb::module_& m) {
   m.def("record", &record, nb::arg("options"), nb::arg("progress").none(), nb::arg("objects"),
-        nb::arg("make_simulation"));
+        nb::arg("make_simulation"), nb::arg("stop_on_signals"));
+  m.def(
+      "resolved_job",
+      [](nb::dict options) {
+        tasks::rollout::RecordJobCfg cfg;
+        read_options(options, struct_of<tasks::rollout::RecordJobCfg>(), &cfg);
+        const tasks::rollout::RecordJobCfg job = tasks::rollout::without_shard(cfg);
+        const tasks::rollout::RolloutCfg resolved = tasks::rollout::resolved(job.rollout);
+        return nb::make_tuple(resolved.task, resolved.robot, resolved.scene, job.num_attempts,
+                              job.out);
+      },
+      nb::arg("options"),
+      "Task, robot and scene of a recording, its number of attempts, and the directory of its "
+      "shard.");
   m.def(
       "rollout_options",
       [] {

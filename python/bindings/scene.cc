@@ -10,7 +10,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "mjsense/app/schema.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/embedded_files.h"
 #include "mjsense/core/files/regular_file.h"
@@ -22,6 +21,7 @@
 #include "python/bindings/mujoco_callbacks.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
+#include "python/bindings/schema.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
@@ -167,7 +167,7 @@ void bind_scene(nb::module_& m) {
   m.def(
       "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },
       "Key in a scene's registry.");
-  m.def("schema", &app::schema_json, "All configurations and data classes, as JSON.");
+  m.def("schema", &schema_json, "All configurations and data classes, as JSON.");
   m.def(
       "embedded_models",
       [] {

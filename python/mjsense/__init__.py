@@ -39,6 +39,10 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
 import typing as _typing
 
+from mjsense.commands import start
+
+start.answer_early()  # if this process is the program
+
 from mjsense.core import libmujoco
 
 libmujoco.load()  # loads the extension, too: before it, the libmujoco that it uses
@@ -49,7 +53,7 @@ _core.leave_no_log_file()
 
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
-from mjsense.core import old_names
+from mjsense.core import installed_files, later_rooms, old_names
 from mjsense.core.errors import UnknownNameError
 from mjsense.core.errors import did_you_mean as _did_you_mean
 from mjsense.dataset import (
@@ -102,7 +106,6 @@ from mjsense.sensors.core_sensors import (
 )
 from mjsense.sensors.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.sensors.drawing import DebugShapes
-from mjsense.sensors.effects import EffectSensorCfg
 from mjsense.sensors.imu import ImuSensor
 from mjsense.sensors.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.sensors.pipeline import ObservationPipeline
@@ -112,7 +115,7 @@ from mjsense.sensors.suite import SensorSuite
 from mjsense.sensors.user_code import SensorError
 from mjsense.sim.attached import Attached, attach
 from mjsense.sim.simulation import Simulation
-from mjsense.tasks import assets, gymnasium_registry
+from mjsense.tasks import gymnasium_registry
 from mjsense.tasks.env import TaskEnv, make
 from mjsense.tasks.policy import Policy, policy_names, register_policy
 from mjsense.tasks.record_job import RecordProgress, RecordSummary
@@ -125,7 +128,18 @@ from mjsense.viewer import view
 from mjsense.viewer.plots import plot
 from mjsense.viewer.viewer import Viewer
 
-assets.name_package_folders()
+later_rooms.provide({
+    "env": "mjsense.compat.peer.env:PeerEnv",
+    "foreign_sensor": "mjsense.compat.peer.per_world:foreign_sensor",
+    "record_on_ray": "mjsense.cluster.recording:record_from_options",
+    "sensor_adapters": "mjsense.compat.sensor_adapters:ADAPTERS",
+    "task_names": "mjsense.tasks.task:task_names",
+    "task_source": "mjsense.tasks.viewer_source:task_source",
+    "warp_environment": "mjsense.warp.start:environment",
+    "warp_simulation": "mjsense.warp.start:simulation",
+})
+
+installed_files.name_package_folders()
 
 gymnasium_registry.register_all()
 
@@ -140,7 +154,7 @@ if not _typing.TYPE_CHECKING:
 __all__ = [
     *configs.__all__,
     "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
-    "ContactSensor", "Dataset", "DebugShapes", "Deviation", "EffectSensorCfg", "Entity", "EnvStatesSensor", "Episode",
+    "ContactSensor", "Dataset", "DebugShapes", "Deviation", "Entity", "EnvStatesSensor", "Episode",
     "EpisodeCheck", "EpisodeQuality", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
     "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
     "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",

@@ -38,7 +38,7 @@ def json_seeds():
     return [json.dumps(value).encode() for value in (row, recording, {**recording, "episodes": 5}, [1, 2.5, float("inf")], "x", 0)]
 
 
-def experiment_seeds():
+def toml_seeds():
     """The experiment files in the documentation, and one with every type of value."""
     for page in sorted((ROOT / "docs").glob("*.md")):
         yield from (block.encode() for block in re.findall(r"```toml[^\n]*\n(.*?)```", page.read_text(), re.DOTALL))
@@ -62,7 +62,7 @@ def recording_seeds():
 
 
 SEEDS = {
-    "experiment": experiment_seeds,
+    "toml": toml_seeds,
     "json": json_seeds,
     "npy": npy_seeds,
     "recording": recording_seeds,
@@ -71,8 +71,8 @@ SEEDS = {
 
 
 def words(name: str) -> list[str]:
-    """The dictionary of a target: keys of experiment files, names of MP4 boxes and similar."""
-    if name == "experiment":
+    """The dictionary of a target: keys of TOML files, names of MP4 boxes and similar."""
+    if name == "toml":
         fields = (ROOT / "python/mjsense/sensors/configs.py").read_text()
         return sorted(set(re.findall(r"^    (\w+):", fields, re.MULTILINE))) + ["true", "false", "inf", "nan", "0x", "'''", '"""', "[[", "no_"]
     if name == "npy":

@@ -40,7 +40,6 @@ QUICK_PYTESTS = {
     "record": ["tests/record/test_files.py"],
     "rollout": ["tests/program/test_record.py"],
     "replay": ["tests/record/test_files.py", "tests/program/test_usage.py"],
-    "app": ["tests/program/test_usage.py", "tests/program/test_streams.py", "tests/program/test_scan.py"],
 }
 
 

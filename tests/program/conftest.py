@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixture that runs the mjsense program: build/dev/mjsense, or $MJSENSE_PROGRAM."""
+"""Fixture that runs the mjsense program: `python -m mjsense`, or the words of $MJSENSE_PROGRAM."""
 
 import os
-import pathlib
+import shlex
 import subprocess
+import sys
 
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("MJSENSE_PROGRAM", str(ROOT / "build/dev/mjsense"))
+PROGRAM = shlex.split(os.environ.get("MJSENSE_PROGRAM", "")) or [sys.executable, "-m", "mjsense"]
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def mjsense(tmp_path):
 
     def run(*args, rc=0, env=None, **kwargs):
         done = subprocess.run(
-            [PROGRAM, *map(str, args)],
+            [*PROGRAM, *map(str, args)],
             cwd=tmp_path, env={**os.environ, **(env or {})}, capture_output=True, text=True, timeout=300, **kwargs)
         assert done.returncode == rc, f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
         return done

@@ -324,7 +324,7 @@ def test_config_file_and_command_line(mjsense):
 
 def interrupt(mjsense, args, signals):
     """Starts the program and sends it the signals as soon as episodes run."""
-    process = subprocess.Popen([mjsense.program, *map(str, args)], cwd=mjsense.folder, stdout=subprocess.PIPE,
+    process = subprocess.Popen([*mjsense.program, *map(str, args)], cwd=mjsense.folder, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     running = mjsense.folder / "data/house_0/.recording"
     deadline = time.time() + 60

@@ -68,7 +68,7 @@ def test_limit_on_the_size_of_files(mjsense, room):
     assert done.stderr == "mjsense: cannot write 'cloud.ply': File too large\n"
     assert [p.name for p in mjsense.folder.iterdir()] == ["room.xml"]
     with open(mjsense.folder / "schema.json", "w") as out:
-        done = subprocess.run([mjsense.program, "schema"], stdout=out, stderr=subprocess.PIPE, text=True, preexec_fn=few_bytes)
+        done = subprocess.run([*mjsense.program, "schema"], stdout=out, stderr=subprocess.PIPE, text=True, preexec_fn=few_bytes)
     assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: File too large\n")
 
 

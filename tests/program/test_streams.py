@@ -15,7 +15,7 @@ def closing(*streams):
 
 
 def run(mjsense, *args, **kwargs):
-    return subprocess.run([mjsense.program, *map(str, args)], cwd=mjsense.folder, timeout=300, **kwargs).returncode
+    return subprocess.run([*mjsense.program, *map(str, args)], cwd=mjsense.folder, timeout=300, **kwargs).returncode
 
 
 @pytest.mark.parametrize("streams", [(2,), (0, 2), (1, 2), (0, 1, 2)])

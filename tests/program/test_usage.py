@@ -155,7 +155,7 @@ def test_unwritable_stdout_is_an_error_of_every_command(mjsense):
     mjsense("record", "pick", "--cameras", "none", "--horizon", 2, "--keep-failures", "-q", "--out", "data")
     for word in WORDS:
         with open("/dev/full", "w") as full:
-            done = subprocess.run([mjsense.program, *word.split()], cwd=mjsense.folder, stdout=full, stderr=subprocess.PIPE, text=True)
+            done = subprocess.run([*mjsense.program, *word.split()], cwd=mjsense.folder, stdout=full, stderr=subprocess.PIPE, text=True)
         assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: No space left on device\n"), word
 
 
@@ -278,7 +278,7 @@ def test_help_describes_flags(mjsense):
 
 
 @pytest.mark.parametrize("words, expected", (
-    (["re"], ["record", "repair"]),
+    (["re"], ["record", "repair", "replay", "render"]),
     (["record", "door"], ["door_opening"]),
     (["record", "--robot", "fra"], ["franka", "franka_hand"]),
     (["record", "--meshes", ""], ["auto", "shapes", "real"]),
@@ -302,9 +302,13 @@ def test_lists_are_text_or_json(mjsense, command):
 
 def test_completion_in_bash(mjsense):
     """Completes like bash: sources the script, calls the function with COMP_WORDS, and reads the candidates from COMPREPLY."""
-    script = '''source <("$1" completion bash); PATH="$2:$PATH"; COMP_WORDS=(mjsense record --policy p); COMP_CWORD=3; _mjsense
+    installed = mjsense.folder / "bin/mjsense"
+    installed.parent.mkdir()
+    installed.write_text(f'#!/bin/sh\nexec {shlex.join(mjsense.program)} "$@"\n')
+    installed.chmod(0o755)
+    script = '''source <("$1/mjsense" completion bash); PATH="$1:$PATH"; COMP_WORDS=(mjsense record --policy p); COMP_CWORD=3; _mjsense
     printf '%s\n' "${COMPREPLY[@]}"'''
-    done = subprocess.run(["bash", "-c", script, "bash", mjsense.program, os.path.dirname(mjsense.program)], capture_output=True, text=True)
+    done = subprocess.run(["bash", "-c", script, "bash", installed.parent], capture_output=True, text=True)
     assert done.stdout.split() == ["planner"], done.stderr
 
 

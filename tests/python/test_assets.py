@@ -5,7 +5,7 @@ import os
 import pytest
 
 from mjsense import _core
-from mjsense.tasks import assets
+from mjsense.core import installed_files
 
 
 @pytest.fixture
@@ -23,16 +23,16 @@ def package(tmp_path, monkeypatch):
 
 def test_meshes_are_found_without_import(package):
     texts = map(_core.robot_text, _core.robot_names())
-    assert assets.installed_meshes(texts) == {"MJSENSE_FRANKA_MESHES": package}
-    assert assets.installed_meshes(["model = 'x.xml'"]) == {}
+    assert installed_files.installed_meshes(texts) == {"MJSENSE_FRANKA_MESHES": package}
+    assert installed_files.installed_meshes(["model = 'x.xml'"]) == {}
 
 
 def test_environment_variable_of_the_user_has_priority(package, monkeypatch):
     monkeypatch.setenv("MJSENSE_FRANKA_MESHES", "")
-    assets.use_installed_meshes()
+    installed_files.use_installed_meshes()
     assert os.environ["MJSENSE_FRANKA_MESHES"] == ""
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES")
-    assets.use_installed_meshes()
+    installed_files.use_installed_meshes()
     assert os.environ["MJSENSE_FRANKA_MESHES"] == str(package)
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES")
 
@@ -41,8 +41,8 @@ def test_package_folders_are_exported(monkeypatch, tmp_path):
     folder = tmp_path / "site-packages"
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delenv("MJSENSE_PACKAGES", raising=False)
-    assets.name_package_folders()
+    installed_files.name_package_folders()
     assert os.environ["MJSENSE_PACKAGES"].split(os.pathsep)[0] == str(folder)
     monkeypatch.setenv("MJSENSE_PACKAGES", "")
-    assets.name_package_folders()
+    installed_files.name_package_folders()
     assert os.environ["MJSENSE_PACKAGES"] == ""

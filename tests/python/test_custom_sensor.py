@@ -207,7 +207,7 @@ def test_bounds_are_checked_for_each_world():
     sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
     assert np.isnan(sensor.data[:, 1]).all()
     for value, text in [((2.0, 0.0), "2.0 at [0] is outside the observation_space's [0.0, 1.0]"), ((np.nan, 0), "nan at [0]")]:
-        sensor._mjs_instances[1].value = value
+        sensor._mjs_calls.instances[1].value = value
         sim.invalidate()
         with pytest.raises(mjs.SensorError) as error:
             sensor.data
@@ -340,7 +340,7 @@ class Reset(Height):
 
 def test_suite():
     suite = mjs.SensorSuite([Reset()])
-    with pytest.raises(AssertionError, match="'height' is a duplicated sensor uuid"):
+    with pytest.raises(ValueError, match="'height' is a duplicated sensor uuid"):
         suite.add(Height())
     scene = ball_scene(feet_cfg(fields=("found",)))
     suite.extend([scene["touch"], scene["ball/acc"]])
@@ -433,7 +433,7 @@ def test_random_numbers_of_update_do_not_depend_on_reads():
             sim.step()
             if read:
                 walk.data
-        walks.append([instance.steps for instance in walk._mjs_instances])
+        walks.append([instance.steps for instance in walk._mjs_calls.instances])
     assert walks[0] == walks[1]
     assert len(set(walks[0][0] + walks[0][1])) == 8, "every step and world its own"
 

@@ -103,11 +103,11 @@ def test_samples_do_not_share_memory_with_the_cache(dataset):
 
 def test_segmentation_is_read_by_row(root, monkeypatch):
     from mjsense.dataset import dataset as module
-    from mjsense.dataset import episode
+    from mjsense.dataset import episode_rows
 
     small = mjs.Dataset(root, streams=["obs/extra/wrist_camera_segmentation"])[2]
     monkeypatch.setattr(module, "LARGE_ROW", 1)
-    monkeypatch.setattr(episode, "LARGE_ROW", 1)
+    monkeypatch.setattr(episode_rows, "LARGE_ROW", 1)
     large = mjs.Dataset(root, streams=["obs/extra/wrist_camera_segmentation"], delta_timestamps={"obs/extra/tcp_pose": [0]})
     name = "obs/extra/wrist_camera_segmentation"
     assert name in large._large

@@ -18,7 +18,6 @@ import mjsense as mjs
 from mjsense import commands
 
 ROOT = Path(__file__).parents[2]
-PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/**/page.md")),
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -112,20 +111,18 @@ def test_cpp_blocks_are_in_compiled_files(page):
 
 
 def run(arguments, cwd):
-    program = [PROGRAM]
-    if arguments[0] in commands.COMMANDS:
-        module = {"view": "viser", "plot": "matplotlib"}.get(arguments[0])
-        if arguments[0] == "dataset":  # these recordings have one episode; test_edit.py runs the command
-            commands.parser_of("dataset").parse_args(arguments[1:])
-            return
-        if ("view" in arguments and "--export" not in arguments) or (module and importlib.util.find_spec(module) is None) or "rrd" in arguments[-1]:
-            commands.parser_of(arguments[0]).parse_args(arguments[1:])  # a viewer would wait for a browser
-            return
-        program = [sys.executable, "-m", "mjsense"]
-    elif "--format" in arguments:
-        program = [sys.executable, "-m", "mjsense"]
+    module = {"view": "viser", "plot": "matplotlib"}.get(arguments[0])
+    is_only_parsed = (
+        arguments[0] == "dataset"  # these recordings have one episode; test_edit.py runs the command
+        or ("view" in arguments and "--export" not in arguments)  # a viewer would wait for a browser
+        or (module and importlib.util.find_spec(module) is None)
+        or "rrd" in arguments[-1]
+    )
+    if is_only_parsed:
+        commands.parser_of(arguments[0]).parse_args(arguments[1:])
+        return
     path = os.pathsep.join([str(Path(mjs.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run([*program, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    done = subprocess.run([sys.executable, "-m", "mjsense", *arguments], cwd=cwd, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
 
 

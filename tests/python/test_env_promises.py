@@ -99,7 +99,7 @@ def test_the_expert_of_a_single_environment():
 
 
 def test_names_of_gymnasium(monkeypatch):
-    monkeypatch.setattr("mjsense.tasks.task._TASKS", {})
+    monkeypatch.setattr(mjs.tasks.task, "_TASKS", {})
     monkeypatch.setattr(gymnasium.envs.registration, "registry", dict(gymnasium.registry))
     for name, env_id in (("my-cart.v2", "mjsense/My-cart.v2-v0"), ("_cart", "mjsense/Cart-v0")):
         mjs.register_task(name, Cart)

@@ -119,12 +119,12 @@ def test_a_recording_without_an_index_or_without_a_shard(recording, tmp_path, ca
 
 
 def test_options_of_the_program(recording, capfd):
-    assert tools.run(["verify", str(recording), "-q"]) == 0 and not capfd.readouterr().out
+    assert commands.run(["verify", str(recording), "-q"]) == 0 and not capfd.readouterr().out
     for command in ("verify", "repair"):
-        assert tools.run([command, str(recording), "--decod"]) == 2
+        assert commands.run([command, str(recording), "--decod"]) == 2
         assert f"{command}: no option named '--decod'" in capfd.readouterr().err
     shutil.rmtree(recording / "shard_2")
-    assert tools.run(["verify", str(recording), "-q"]) == 1 and "shard_2" in capfd.readouterr().out
+    assert commands.run(["verify", str(recording), "-q"]) == 1 and "shard_2" in capfd.readouterr().out
 
 
 @pytest.mark.parametrize("command, code, text", (("verify", 0, "5 episodes in index.parquet"), ("inspect", 0, "5 episodes, 0 successes"), ("repair", 0, "nothing to repair")))

@@ -50,4 +50,4 @@ def test_the_program_prints_one_line(tmp_path, capsys):
     (tmp_path / "recorded").mkdir()
     assert commands.run(["replay", str(tmp_path / "recordd")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("mjsense replay: ") and line.endswith("no such file or directory; did you mean 'recorded'?")
+    assert line.startswith("mjsense: ") and line.endswith("no such file or directory; did you mean 'recorded'?")

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of scenes with LIBERO's unchanged files: its table and graspable objects, in the folder of its package."""
 
-import os
 import subprocess
-from pathlib import Path
+import sys
 
 import pytest
 from wheels import wheel
 
 import mjsense as mjs
 
-PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
+PROGRAM = [sys.executable, "-m", "mjsense"]
 THINGS = ("stable_hope_objects/butter", "stable_hope_objects/orange_juice", "stable_hope_objects/popcorn",
           "stable_hope_objects/red_alphabet_soup", "stable_scanned_objects/red_bowl", "turbosquid_objects/wine_bottle")  # fmt: skip
 SCENE = """
@@ -61,7 +60,7 @@ def test_a_table_of_libero_is_recorded(assets, tmp_path):
     made = mjs.record("pick", scene=str(tmp_path / "scene.toml"), out=tmp_path / "data", episodes=2, worlds=2, seed=1,
                       width=96, height=64)  # fmt: skip
     assert made.kept == 2, made.failures
-    subprocess.run([PROGRAM, "verify", "--decode", tmp_path / "data"], check=True)
+    subprocess.run([*PROGRAM, "verify", "--decode", tmp_path / "data"], check=True)
 
 
 @pytest.fixture

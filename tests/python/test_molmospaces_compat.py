@@ -84,6 +84,13 @@ def test_start_pose_and_grasp_are_those_of_the_core_suite(tmp_path):
                     assert byte_array_to_dict(x) == byte_array_to_dict(y)
 
 
+def test_a_name_in_use_is_an_assertion_error_as_in_molmospaces():
+    suite = SensorSuite([mjs.PoseSensor("a", body="x")])
+    with pytest.raises(AssertionError, match="'a' is a duplicated sensor uuid"):
+        suite.add(mjs.PoseSensor("a", body="y"))
+    assert isinstance(suite, mjs.SensorSuite) and len(suite) == 1
+
+
 def test_cameras_of_the_suite():
     task = MyTask(width=64, threads=2)
     suite = task.sensor_suite

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The program in the Python package is the executable, as a function; and the ffmpeg that it finds."""
+"""The program as a process: its exit codes and errors, the lists, recordings, and the ffmpeg that it finds."""
 
 import json
 import os
@@ -29,8 +29,8 @@ def test_entry_point_runs_the_program():
 @pytest.mark.parametrize("words, message", [
     (("record", "pick", "--episode", "3"), "mjsense: record: no option named '--episode'; did you mean '--episodes'?"),
     (("record", "pick", "3"), "mjsense: The following argument was not expected: 3; see mjsense record --help"),
-    (("replay", "data", "--form=states"), "mjsense replay: no option named '--form'; did you mean '--from'?"),
-    (("replay", "data", "--xyz"), "mjsense replay: no option named '--xyz'; see mjsense replay --help"),
+    (("replay", "data", "--form=states"), "mjsense: replay: no option named '--form'; did you mean '--from'?"),
+    (("replay", "data", "--xyz"), "mjsense: replay: no option named '--xyz'; see mjsense replay --help"),
 ])  # fmt: skip
 def test_unknown_options_are_named_with_the_nearest(words, message):
     wrong = run(*words)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-import os
 import subprocess
-from pathlib import Path
+import sys
 
 import gymnasium
 import h5py
@@ -10,7 +9,7 @@ import pytest
 
 import mjsense as mjs
 
-PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
+PROGRAM = [sys.executable, "-m", "mjsense"]
 SMALL = dict(worlds=2, width=48, height=32, shadows=False, seed=1)
 
 
@@ -91,7 +90,7 @@ def test_interrupt(tmp_path):
 
 def test_the_program_writes_the_same_bytes(tmp_path):
     options = ["--episodes", "1", "--horizon", "3", "--keep-failures", "--size", "48x32", "--no-shadows", "--seed", "1"]
-    subprocess.run([PROGRAM, "record", "pick", "--out", tmp_path / "a", "-q", "--no-sheet", *options], check=True, capture_output=True)
+    subprocess.run([*PROGRAM, "record", "pick", "--out", tmp_path / "a", "-q", "--no-sheet", *options], check=True, capture_output=True)
     mjs.record("pick", out=tmp_path / "b", episodes=1, horizon=3, keep_failures=True, width=48, height=32, shadows=False, seed=1)
     names = sorted(path.name for path in (tmp_path / "a/house_0").iterdir())
     assert names == sorted(path.name for path in (tmp_path / "b/house_0").iterdir()) and len(names) == 4
@@ -101,7 +100,7 @@ def test_the_program_writes_the_same_bytes(tmp_path):
 
 def test_meshes_option(tmp_path, monkeypatch):
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES", raising=False)
-    monkeypatch.setattr("mjsense.tasks.assets.installed_meshes", lambda texts: {})
+    monkeypatch.setattr("mjsense.core.installed_files.installed_meshes", lambda texts: {})
     with pytest.raises(ValueError, match="robot 'franka': its real meshes were not found"):
         mjs.record(out=tmp_path, meshes="real", **SMALL)
     with pytest.raises(ValueError, match=r"meshes.*must be one of auto, shapes, real"):
@@ -130,7 +129,7 @@ def test_nan_in_a_stream_is_reported_unless_its_description_names_it(tmp_path):
     for sensor in (Lost(), Known()):
         out = tmp_path / sensor.uuid
         mjs.record(out=out, episodes=1, sensors=[sensor], cameras=[], horizon=5, keep_failures=True, seed=1)
-        done = subprocess.run([PROGRAM, "verify", out], capture_output=True, text=True, check=False)
+        done = subprocess.run([*PROGRAM, "verify", out], capture_output=True, text=True, check=False)
         result[sensor.uuid] = done.returncode, done.stdout
     assert result["known"][0] == 0, result["known"][1]
     assert result["lost"][0] != 0

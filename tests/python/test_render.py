@@ -380,7 +380,7 @@ def test_program(recorded, tmp_path):
     assert done.returncode == 0 and done.stdout.startswith("1 episodes with 18 images in "), done.stdout + done.stderr
     assert mjs.Dataset(tmp_path / "out").episodes[0].video("top_depth").shape == (9, 24, 32)
     wrong = run("render", recorded, tmp_path / "out2", "--add-camera", "top=pos=0.5,0")
-    assert wrong.returncode == 2 and wrong.stderr.startswith("mjsense render: ") and wrong.stderr.count("\n") == 1
+    assert wrong.returncode == 2 and wrong.stderr.startswith("mjsense: ") and wrong.stderr.count("\n") == 1
     (tmp_path / "s.toml").write_text('[[sensors]]\nkind = "contct"\nname = "x"\n')
     wrong = run("render", recorded, tmp_path / "out2", "--sensors", tmp_path / "s.toml")
     assert wrong.returncode == 2 and "unknown kind 'contct'; did you mean 'contact'?" in wrong.stderr

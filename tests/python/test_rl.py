@@ -44,7 +44,7 @@ def test_own_tasks_are_registered(monkeypatch):
     pytest.importorskip("mujoco")  # the example edits a spec with it
     from walk import Walk
 
-    monkeypatch.setattr(mjs.task, "_TASKS", {})
+    monkeypatch.setattr(mjs.tasks.task, "_TASKS", {})
     monkeypatch.setattr(gymnasium.envs.registration, "registry", dict(gymnasium.registry))
     mjs.register_task("walk_rough", Walk)
     mjs.register_task("a name of words", Walk)  # no name for gymnasium

@@ -177,6 +177,6 @@ def test_program(recordings, tmp_path, capsys):
     assert code == 0 and NOTE not in printed and "15.1515 rows per second are written as 15" in printed
     code, printed = export("lerobot", "--no-trim-idle", "--exact-rate")
     assert code == 0 and "15.1515 rows per second are not a whole number" in printed
-    assert export("zarr", "--exact-rate") == (2, "mjsense export: --exact-rate is an option of the formats lerobot and lerobot21\n")
+    assert export("zarr", "--exact-rate") == (2, "mjsense: --exact-rate is an option of the formats lerobot and lerobot21\n")
     code, printed = export("mcap", "--trim-idle")
     assert code == 2 and "mcap shows episodes with their times" in printed

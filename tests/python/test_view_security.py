@@ -108,7 +108,7 @@ def test_the_program_says_in_one_line_that_a_port_does_not_exist(tmp_path):
     (tmp_path / "arm.xml").write_text(ARM.format("b"))
     command = [sys.executable, "-m", "mjsense", "view", str(tmp_path / "arm.xml"), "--no-open", "--port", "65536"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (2, "") and re.fullmatch(r"mjsense view: port is 65536: [^\n]+\n", done.stderr), done.stderr
+    assert (done.returncode, done.stdout) == (2, "") and re.fullmatch(r"mjsense: port is 65536: [^\n]+\n", done.stderr), done.stderr
 
 
 def test_the_last_port_is_taken(tmp_path):

@@ -5,11 +5,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import sys
-import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,10 +15,9 @@ from mjsense import _core
 from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.storage import Storage
 from mjsense.dataset import Episode, bounded_json, index
-from mjsense.dataset.episode import Store
+from mjsense.dataset.episode_rows import Store
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.limits import SCENE_BYTES
-from mjsense.tasks.assets import use_installed_files
 from mjsense.tasks.parts import parts_of
 from mjsense.tasks.record_job import PARTS, check_names, record_here
 
@@ -91,15 +87,11 @@ class Job:
 
     out: str
     """Output directory: a path, or a URL of a file system that fsspec knows, such as ``s3://bucket/data``."""
-    arguments: dict[str, Any] | None = None
+    arguments: dict[str, Any]
     """Keyword arguments of :func:`mjsense.record`."""
-    words: tuple[str, ...] = ()
-    """Arguments of the command ``mjsense record``, if there are no keyword arguments."""
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides which episodes the job contains, as JSON values."""
-        if self.arguments is None:
-            return {"version": _core.__version__, "words": list(_without(self.words, ("--worlds", "--threads", "--ffmpeg")))}  # pyright: ignore[reportAttributeAccessIssue]
         sensors = self.arguments.get("sensors", ())
         options = {**PARTS, **self.arguments, "resume": True}  # the code of all parts must be comparable
         check_names(options.keys() - _OF_RECORD)
@@ -117,52 +109,10 @@ class Job:
 
     def record(self, folder: Path, shard: Shard) -> dict[str, Any]:
         """Records the shard's attempts into an empty local folder. Returns the summary as ``mjsense record --json`` prints it."""
-        if self.arguments is not None:
-            options = {name: value for name, value in self.arguments.items() if name not in _OF_RECORD}
-            options = {"threads": 1, **options, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count}
-            summary = record_here(options, self.arguments.get("sensors", ()), progress=False)
-            return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
-        words = ["record", *self.words, "--out", str(folder), "--no-sheet", "--json", "--quiet"]
-        words += ["--first-attempt", str(shard.first), "--num-attempts", str(shard.count)]
-        words += [] if any(word.split("=")[0] == "--threads" for word in self.words) else ["--threads", "1"]
-        code, text, error = _run_program(words)
-        if code not in (0, 1):
-            raise RuntimeError(error.strip().removeprefix("mjsense: "))
-        return json.loads(text)
-
-
-def _run_program(words: list[str]) -> tuple[int, str, str]:
-    """Exit code and output of the program, which runs in this process: a new one would need 0.6 s to start."""
-    use_installed_files(words)
-    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
-        before = [os.dup(1), os.dup(2)]
-        sys.stdout.flush()
-        sys.stderr.flush()
-        try:
-            os.dup2(output.fileno(), 1)
-            os.dup2(errors.fileno(), 2)
-            code = _core.run_program([b"mjsense", *map(os.fsencode, words)], [])
-        finally:
-            for descriptor, saved in enumerate(before, 1):
-                os.dup2(saved, descriptor)
-                os.close(saved)
-        texts = []
-        for file in (output, errors):
-            file.seek(0)
-            texts.append(file.read().decode(errors="replace"))
-    return code, *texts
-
-
-def _without(words: Iterable[str], options: Sequence[str]) -> Iterator[str]:
-    """The words without these options and their values."""
-    skip = False
-    for word in words:
-        if skip:
-            skip = False
-        elif word in options:
-            skip = True
-        elif word.split("=")[0] not in options:
-            yield word
+        options = {name: value for name, value in self.arguments.items() if name not in _OF_RECORD}
+        options = {"threads": 1, **options, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count}
+        summary = record_here(options, self.arguments.get("sensors", ()), progress=False)
+        return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
 
 
 def _kept_episodes(folder: Path) -> Iterable[dict[str, Any]]:

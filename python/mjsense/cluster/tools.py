@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjsense verify``, and ``inspect`` and ``repair`` of a recording with an index, or at an address.
+"""``mjsense inspect``, ``verify`` and ``repair``: of a folder or a file, of a recording with an index, or at an address.
 
-The C++ program checks and shows the files. This module adds what the readers in Python refuse, and the comparison of the index with the
+The C++ library checks and shows the files. This module adds what the readers in Python refuse, and the comparison of the index with the
 files of the shards.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import shutil
-import subprocess
-import sys
-import tempfile
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,70 +23,14 @@ from mjsense.dataset import check
 from mjsense.dataset.files import INDEX, EpisodeEntry, entries_of, read_index
 from mjsense.dataset.remote import is_address, resolved
 
-TOOLS = ("inspect", "verify", "repair")
 _ATTRIBUTES = ("length", "number", "seed", "outcome")
-
-
-def path_of(words: list[str]) -> str | None:
-    """The path of a command with these words if it is to be verified, or is a recording with an index or at an address."""
-    if words[:1] and words[0] in TOOLS and not {"-h", "--help"} & {*words}:
-        path = _parse(words[1:])[0].path or ""
-        if (path and words[0] == "verify") or is_address(path) or Path(path).name == INDEX or any((Path(path) / name).exists() for name in (INDEX, "job.json")):
-            return path
-    return None
-
-
-def _parse(words: list[str]) -> tuple[argparse.Namespace, list[str]]:
-    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
-    parser.add_argument("path", nargs="?")
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--sheet")
-    parser.add_argument("--ffmpeg")
-    return parser.parse_known_args(words)
-
-
-def run(words: list[str]) -> int:
-    """Runs the command. Returns its exit code: 0: done, 1: something is damaged, 2: wrong input."""
-    given, others = _parse(words[1:])
-    options = [*others, *(["--ffmpeg", given.ffmpeg] if given.ffmpeg else [])]
-    try:
-        if words[0] == "verify":
-            found = verify(given.path, *options)
-            if found is None:
-                return 2
-            if given.json or not found["ok"] or not {"-q", "--quiet"} & {*others}:
-                text = {key: value for key, value in found.items() if key != "of_job"}
-                print(json.dumps(text, indent=2) if given.json else _verify_text(found))
-            return 0 if found["ok"] else 1
-        if words[0] == "repair":
-            if options:
-                raise ValueError(f"no option named '{options[0]}'; available: --help, --json")
-            made = repair(given.path)
-            lines = [*made["actions"], *(f"cannot repair {failure}" for failure in made["failures"])]
-            print(json.dumps(made, indent=2) if given.json else "\n".join(lines) or "nothing to repair")
-            return 1 if made["failures"] else 0
-        sheet = ["--sheet", given.sheet] if given.sheet else []
-        local, about = _summary(given.path)
-        done = _program("inspect", local, *options, *sheet, *(["--json"] if given.json else []))
-        print(json.dumps({"index": about, **json.loads(done)}, indent=2) if given.json else f"{_summary_text(about)}{done}", end="")
-        return 0
-    except (ValueError, LookupError, OSError, RuntimeError, ImportError) as error:
-        print(f"mjsense {words[0]}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-
-
-def _program(command: str, path: Path, *options: str) -> str:
-    """Output of the C++ program, which knows no index."""
-    code = "import os, sys; from mjsense import _core; sys.exit(_core.run_program([b'mjsense', *map(os.fsencode, sys.argv[1:])], []))"
-    done = subprocess.run([sys.executable, "-c", code, command, str(path), *options], capture_output=True, text=True)
-    if done.returncode not in (0, 1):
-        raise RuntimeError(done.stderr.strip().removeprefix("mjsense: ").removeprefix(f"{command}: "))
-    return done.stdout
 
 
 def _fetched(path: str) -> tuple[Path, list[dict[str, Any]] | None]:
     """The local folder of a recording with all files that its index names, and the rows of the index; None: it has none."""
     local, remote = resolved(path)
+    if not os.path.exists(local if path else path):
+        raise ValueError(f"{path or repr(path)}: no such file or directory")
     if not (local / INDEX).exists():
         return local, None
     rows = read_index(local)
@@ -99,14 +40,18 @@ def _fetched(path: str) -> tuple[Path, list[dict[str, Any]] | None]:
     return local, rows
 
 
-def _summary(path: str) -> tuple[Path, dict[str, Any] | None]:
-    """The local folder of a recording, and the counts of its index, if it has one."""
+def inspect(path: str) -> tuple[Path, str, str]:
+    """The local folder of a recording, its contents and statistics as text, and as JSON."""
     local, rows = _fetched(path)
-    if rows is None:
-        return local, None
-    tasks = Counter(row["task"] for row in rows)
-    return local, {"episodes": len(rows), "successes": sum(row["success"] for row in rows), "observations": sum(row["length"] for row in rows),
-                   "files": len({row["path"] for row in rows}), "instructions": len(tasks)}  # fmt: skip
+    found, as_json = _core.inspect(local)
+    text = found.decode(errors="surrogateescape").rstrip("\n")
+    if rows is None and not (local / "job.json").exists() and not is_address(path):
+        return local, text, as_json
+    about = None
+    if rows is not None:
+        about = {"episodes": len(rows), "successes": sum(row["success"] for row in rows), "observations": sum(row["length"] for row in rows),
+                 "files": len({row["path"] for row in rows}), "instructions": len({row["task"] for row in rows})}  # fmt: skip
+    return local, _summary_text(about) + text, json.dumps({"index": about, **json.loads(as_json)}, indent=2)
 
 
 def _summary_text(about: dict[str, Any] | None) -> str:
@@ -116,33 +61,18 @@ def _summary_text(about: dict[str, Any] | None) -> str:
             f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n")  # fmt: skip
 
 
-def _verified(path: Path, *options: str) -> dict[str, Any] | None:
-    """Findings of the C++ program, which runs in this process and shows its progress; None: it has printed an error."""
-    saved = os.dup(1)
-    sys.stdout.flush()
-    with tempfile.TemporaryFile() as output:
-        try:
-            os.dup2(output.fileno(), 1)
-            code = _core.run_program([b"mjsense", b"verify", *map(os.fsencode, [str(path), "--json", *options])], [])
-        finally:
-            os.dup2(saved, 1)
-            os.close(saved)
-        output.seek(0)
-        return json.loads(output.read()) if code in (0, 1) else None
-
-
-def verify(path: str, *options: str) -> dict[str, Any] | None:
-    """The result of ``mjsense verify --json``, with what readers refuse, and the comparison of an index with its files. None: the program has
-    printed an error.
+def verify(path: str, *, decode: bool = False, ffmpeg: str = "", progress: Callable[[str], None] | None = None) -> dict[str, Any]:
+    """The result of ``mjsense verify --json``: whether a recording is complete and undamaged, with what readers refuse, and the comparison
+    of an index with its files.
 
     Args:
-        path: Folder, index or address of a recording.
-        options: Further options of ``mjsense verify``.
+        path: Folder, file, index or address of a recording.
+        decode: Decode every frame of the videos.
+        ffmpeg: Path of the ffmpeg program; by default the one in ``PATH``.
+        progress: Called with a text after each file.
     """
     local, rows = _fetched(path)
-    found = _verified(local, *options)
-    if found is None:
-        return None
+    found = json.loads(_core.verify(local, decode, ffmpeg, progress))
     damaged = {f["place"].split(" ")[0] for f in found["findings"] if f["error"]}
     found["findings"] += [{"error": True, "place": place, "text": text} for place, text in check.findings(local, damaged)]
     if rows is None:
@@ -154,8 +84,8 @@ def verify(path: str, *options: str) -> dict[str, Any] | None:
     return found | {"ok": not any(f["error"] for f in findings), "findings": findings, "indexed": len(rows)}
 
 
-def _verify_text(found: dict[str, Any]) -> str:
-    """The text of the C++ program: a note about many episodes is one line."""
+def verify_text(found: dict[str, Any]) -> str:
+    """The result of ``verify`` for people: a note about many episodes is one line."""
     notes = Counter(f["text"] for f in found["findings"] if not f["error"])
     lines: list[str] = []
     for f in found["findings"]:
@@ -197,23 +127,25 @@ def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str
 
 
 def repair(path: str) -> dict[str, list[str]]:
-    """Makes the index agree with the shards: a shard that is damaged is no longer marked as done, so that ``record --resume`` records it
+    """Publishes the finished episodes of an interrupted recording. Of a recording with an index: makes the index agree with the shards: a shard that is damaged is no longer marked as done, so that ``record --resume`` records it
     again, and the index is written anew from the complete shards without a gap. Nothing is deleted but marks.
 
     Returns:
         ``actions`` and ``failures``: sentences.
     """
+    if not is_address(path) and not (_fetched(path)[0] / "job.json").exists():
+        return json.loads(_core.repair(_fetched(path)[0]))
     address = path if is_address(path) else str(resolved(path)[0])
     address = address.rstrip("/").removesuffix(f"/{INDEX}")
     storage = Storage(address)
     made: dict[str, list[str]] = {"actions": [], "failures": []}
     if storage.read("job.json") is None:
-        return json.loads(_program("repair", _fetched(path)[0], "--json"))
+        return json.loads(_core.repair(_fetched(path)[0]))
     local, rows = _fetched(path)
     remote = resolved(path)[1]
     damaged: dict[str, str] = {}
     if any(local.glob("shard_*/*/*.h5")):
-        for finding in json.loads(_program("verify", local, "--json"))["findings"]:
+        for finding in json.loads(_core.verify(local, False, "", None))["findings"]:
             if finding["error"]:
                 damaged.setdefault(finding["place"].split("/")[0], f"{finding['place']} {finding['text']}")
     done: dict[int, ShardResult] = {}

@@ -7,7 +7,7 @@ import argparse
 from typing import Any
 
 from mjsense.commands._ray import add_ray, ray_options
-from mjsense.exporting import FORMATS
+from mjsense.commands.table import NAMES
 
 EXAMPLES = [
     ("mjsense export lerobot data out", "Write the recording in data as a LeRobot v3.0 data set."),
@@ -18,8 +18,8 @@ EXAMPLES = [
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    formats = "; ".join(f"{name}: {about}" for name, about in FORMATS.items())
-    parser.add_argument("format", choices=FORMATS, metavar="FORMAT", help=f"{formats}.")
+    formats = "; ".join(f"{name}: {about}" for name, about in NAMES["formats"].items())
+    parser.add_argument("format", choices=NAMES["formats"], metavar="FORMAT", help=f"{formats}.")
     parser.add_argument("path", metavar="IN", help="A recording.")
     parser.add_argument("out", metavar="OUT", help="Output, which must not exist.")
     parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")

@@ -135,13 +135,13 @@ def checked(target: T, owner: str = "", context: str = "") -> T:
     """Decorates a function, or a class with public methods, to check arguments against their annotations.
 
     Args:
-        owner: Name of the class of a method.
+        owner: Name of the class in messages; by default its own.
         context: What messages begin with; by default the name of the function, and that of its class.
     """
     if isinstance(target, type):
         for name, value in list(vars(target).items()):
             if isinstance(value, FunctionType) and (name in ("__init__", "__call__", "__getitem__") or name[0] != "_"):
-                setattr(target, name, checked(value, target.__name__))
+                setattr(target, name, checked(value, owner or target.__name__))
         return target
     function: Any = target
     if not context:

@@ -6,7 +6,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable
 
-from mjsense.core.representations import printable
+
+def printable(text: str) -> str:
+    """Replaces control characters and bidirectional marks by '?', because names come from untrusted files."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
 class UnknownNameError(KeyError):

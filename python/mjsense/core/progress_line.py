@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, TypeVar
-
-if TYPE_CHECKING:
-    from mjsense.tasks.record_job import RecordProgress
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 _PERIOD = 0.1  # s between two updates of a line that is overwritten
 _LOG_PERIOD = 10.0  # s between two lines of a file
+_MARK_PERIOD = 1.0  # s between two lines of a file that say something new
 
 
 def interactive() -> bool:
@@ -22,19 +22,44 @@ def interactive() -> bool:
 
 
 class ProgressLine:
-    """A line that is overwritten; where that is impossible, a new line every ten seconds."""
+    """A line that is overwritten; where that is impossible, a new line every ten seconds, or when the work has reached a mark."""
 
     def __init__(self) -> None:
         self._overwrite = interactive()
-        self._shown, self._due = "", 0.0
+        self._shown, self._latest, self._at, self._mark = "", "", -math.inf, None
 
-    def show(self, text: str, *, last: bool = False) -> None:
-        """Shows the text, unless the one before is very recent. ``last``: shows it in any case, and ends the line."""
+    def show(self, text: str, mark: Any = None, *, last: bool = False) -> None:
+        """Shows the text, unless the one before is very recent.
+
+        Args:
+            mark: The state of the work, such as the number of ended episodes. Where lines are not overwritten, another value shows the text
+                after one second instead of ten.
+            last: Show the text in any case, and end the line.
+        """
         now = time.monotonic()
-        if not last and now < self._due:
-            return
-        self._due = now + (_PERIOD if self._overwrite else _LOG_PERIOD)
+        self._latest = text
+        period = _PERIOD if self._overwrite else _LOG_PERIOD if mark == self._mark else _MARK_PERIOD
+        if last or now - self._at >= period:
+            self._at, self._mark = now, mark
+            self._write(text, last)
+
+    def end(self) -> None:
+        """Shows the latest text, if it is not shown yet, and ends the line."""
+        if self._latest:
+            self._write(self._latest, True)
+
+    def clear(self) -> None:
+        """Removes the line, if it can be overwritten."""
+        if self._overwrite and self._shown:
+            self._write("", False)
+            sys.stderr.write("\r")
+            sys.stderr.flush()
+
+    def _write(self, text: str, last: bool) -> None:
         if self._overwrite:
+            if sys.stderr.isatty():  # a longer line would wrap, and "\r" would not return to its beginning
+                columns = os.get_terminal_size(sys.stderr.fileno()).columns  # 0: unknown
+                text = text[: columns - 1 if columns > 1 else 79]
             sys.stderr.write("\r" + text.ljust(len(self._shown)) + ("\n" if last else ""))
         elif text != self._shown:
             sys.stderr.write(text + "\n")
@@ -90,12 +115,3 @@ def clock(seconds: float) -> str:
     minutes, s = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{s:02}" if hours else f"{minutes}:{s:02}"
-
-
-def of_recording(p: RecordProgress) -> str:
-    """``3/10 episodes  75 % success  412 steps/s  0:41 left``, as the program shows it."""
-    ended, seconds = p.succeeded + p.failed, max(p.seconds, 1e-9)
-    parts = [f"{p.kept}/{p.wanted} episodes", f"{100 * p.succeeded / ended:.0f} % success" if ended else "", f"{p.steps / seconds:.0f} steps/s"]
-    parts.append(f"{p.frames / seconds:.0f} frames/s" if p.frames else "")
-    parts.append(f"{clock(p.seconds_left)} left" if p.seconds_left == p.seconds_left and p.kept < p.wanted else "")
-    return "  ".join(filter(None, parts))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mjsense.core.errors import printable
 from mjsense.core.png import png_of
 
 _THUMBNAIL = 160
@@ -38,11 +39,6 @@ def rows_of(specs: Mapping[str, Any], num_worlds: int | None) -> list[Row]:
     """Creates the rows from the specs of a sensor's fields."""
     worlds = () if num_worlds is None else (num_worlds,)
     return [Row(name, s.dtype, (*worlds, *s.shape), s.unit, s.frame, s.description) for name, s in specs.items()]
-
-
-def printable(text: str) -> str:
-    """Replaces control characters and bidirectional marks by '?', because names come from untrusted files."""
-    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
 def plain(text: object, limit: int = 300) -> str:

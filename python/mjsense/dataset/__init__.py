@@ -3,7 +3,8 @@
 
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.deviation import Deviation
-from mjsense.dataset.episode import Episode, Stream
+from mjsense.dataset.episode import Episode
+from mjsense.dataset.episode_rows import Stream
 from mjsense.dataset.quality import EpisodeQuality
 from mjsense.dataset.rendering import RenderProgress, RenderSummary, render
 from mjsense.dataset.replay_check import EpisodeCheck, ReplayReport, check_replay, replay

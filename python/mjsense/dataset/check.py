@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the readers of recordings refuse, for ``mjsense verify``: a recording without findings is read by every command.
 
-The C++ program compares checksums and examines the structure of the files. This module opens each episode with the readers that all Python
+The C++ library compares checksums and examines the structure of the files. This module opens each episode with the readers that all Python
 commands use, so that neither accepts what the other refuses.
 """
 
@@ -13,7 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from mjsense.dataset import playback
-from mjsense.dataset.episode import NUMBERS, REPLAY, VIDEOS, Episode, Store, is_json
+from mjsense.dataset.episode import Episode
+from mjsense.dataset.episode_rows import NUMBERS, REPLAY, VIDEOS, Store, is_json
 from mjsense.dataset.files import batches, entries_of
 from mjsense.dataset.hdf5 import Group, open_h5
 from mjsense.dataset.json_rows import decode

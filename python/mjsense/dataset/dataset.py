@@ -19,7 +19,8 @@ from mjsense.core import representations
 from mjsense.core.arguments import checked
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import statistics
-from mjsense.dataset.episode import LARGE_ROW, REPLAY, Episode, Store, Stream, given_name, is_mask
+from mjsense.dataset.episode import Episode
+from mjsense.dataset.episode_rows import LARGE_ROW, REPLAY, Store, Stream, given_name, is_mask
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.places import printable
 from mjsense.dataset.remote import resolved

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +21,6 @@ from mjsense.scene.randomizable import field_of, is_randomizable, valid_values
 
 if TYPE_CHECKING:
     import mujoco
-
-    from mjsense.dataset.playback import ReplayInputs
 
 MAX_VALUE = 1e10
 """mjMAXVAL; larger limits mean none."""
@@ -38,6 +37,17 @@ _PARTS = ("qpos0", "qpos_spring", "body_", "jnt_", "dof_", "geom_", "site_", "ca
 """Beginnings of the names of fields that may differ between worlds."""
 _BOXES = "bvh_aabb"
 """The boxes of bodies contain objects that are larger in an episode. Of the others, which fields name as structure, this is the only one."""
+
+
+@dataclass(frozen=True)
+class ReplayInputs:
+    """What an episode stores for replay. docs/formats.md describes the arrays."""
+
+    state: np.ndarray
+    written: np.ndarray
+    ctrl: np.ndarray | None
+    mocap: np.ndarray | None
+    held: np.ndarray
 
 
 def check_model_fields(fields: Mapping[str, Any], model: mujoco.MjModel, about: str) -> dict[str, np.ndarray]:

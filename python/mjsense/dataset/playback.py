@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,33 +14,22 @@ from mjsense.core import libmujoco
 from mjsense.dataset.archive import read_archive
 from mjsense.dataset.closed_model import check_archive, compile_closed
 from mjsense.dataset.hdf5 import open_h5, text_of
-from mjsense.dataset.model_fields import INPUTS, check_inputs, check_model_fields, read_input
+from mjsense.dataset.model_fields import INPUTS, ReplayInputs, check_inputs, check_model_fields, read_input
 
 if TYPE_CHECKING:
     import mujoco
 
-    from mjsense.dataset.episode import Episode
+    from mjsense.dataset.episode_rows import EpisodeRows
 else:
     mujoco = libmujoco.shared
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if libmujoco.shared else 0
 
-@dataclass(frozen=True)
-class ReplayInputs:
-    """What an episode stores for replay. docs/formats.md describes the arrays."""
-
-    state: np.ndarray
-    written: np.ndarray
-    ctrl: np.ndarray | None
-    mocap: np.ndarray | None
-    held: np.ndarray
-
-
-def where(episode: Episode) -> str:
+def where(episode: EpisodeRows) -> str:
     return f"episode {episode.index} ({episode.path.name}, {episode.trajectory})"
 
 
-def inputs_of(episode: Episode) -> ReplayInputs:
+def inputs_of(episode: EpisodeRows) -> ReplayInputs:
     """Raises ValueError if the recording has none."""
     cached = episode._store.rows.find((episode.index, "replay"))
     if cached is not None:
@@ -66,12 +54,18 @@ def inputs_of(episode: Episode) -> ReplayInputs:
     return result
 
 
+def states_of(episode: EpisodeRows) -> np.ndarray:
+    """A copy of the states of an episode, of those rows that a trimmed one has."""
+    states = inputs_of(episode).state
+    return states.copy() if episode._kept is None else states[episode._kept]
+
+
 def _require_mujoco() -> None:
     if libmujoco.shared is None:
         raise RuntimeError(f"replay needs the series of MuJoCo that mjsense records with: {libmujoco.explain()}")
 
 
-def archive_of(episode: Episode) -> Path:
+def archive_of(episode: EpisodeRows) -> Path:
     """The file with the model and its assets."""
     name = episode._recording.model_archive  # a plain file name
     if not name:
@@ -83,13 +77,13 @@ def archive_of(episode: Episode) -> Path:
     return path
 
 
-def archived_model(episode: Episode) -> mujoco.MjModel:
+def archived_model(episode: EpisodeRows) -> mujoco.MjModel:
     path = archive_of(episode)
 
     return episode._store.models.get(path, lambda: (compile_closed(read_archive(path), str(path)), 1))
 
 
-def changed_fields(episode: Episode) -> list[str]:
+def changed_fields(episode: EpisodeRows) -> list[str]:
     """Fields of mjModel in which the episode differs from the archived model."""
     with open_h5(episode.path) as file:
         return list(file[episode.trajectory].get("replay/model", ()))
@@ -103,7 +97,7 @@ def set_option(model: Any, name: str, values: np.ndarray) -> None:
     setattr(model.opt, name, values if np.ndim(getattr(model.opt, name)) else values[0].item())
 
 
-def check_unchanged(episode: Episode) -> None:
+def check_unchanged(episode: EpisodeRows) -> None:
     """Raises ValueError if the model was written during the episode, which therefore cannot be simulated again."""
     with open_h5(episode.path) as file:
         dataset = file[episode.trajectory].get("replay/changed")
@@ -115,7 +109,7 @@ def check_unchanged(episode: Episode) -> None:
         )
 
 
-def model_of(episode: Episode) -> mujoco.MjModel:
+def model_of(episode: EpisodeRows) -> mujoco.MjModel:
     _require_mujoco()
     model = copy.deepcopy(archived_model(episode))
     for name, values in fields_of(episode, model).items():
@@ -128,7 +122,7 @@ def model_of(episode: Episode) -> mujoco.MjModel:
     return model
 
 
-def fields_of(episode: Episode, model: mujoco.MjModel, prefix: str = "") -> dict[str, np.ndarray]:
+def fields_of(episode: EpisodeRows, model: mujoco.MjModel, prefix: str = "") -> dict[str, np.ndarray]:
     """The checked fields in which the episode differs from the archived model; NaN in floats: the archive's value.
 
     Args:
@@ -141,7 +135,7 @@ def fields_of(episode: Episode, model: mujoco.MjModel, prefix: str = "") -> dict
         return check_model_fields({name: data for name, data in group.items() if name.startswith(prefix)}, model, where(episode))
 
 
-def check_episode(episode: Episode) -> None:
+def check_episode(episode: EpisodeRows) -> None:
     """Raises ValueError, with one line, for an episode whose archive or data for replay would be refused by replay, render or the viewer.
 
     Without the package ``mujoco`` the archive and the arrays are checked, but not the values of the model's fields.
@@ -156,7 +150,7 @@ def check_episode(episode: Episode) -> None:
     check_inputs(inputs_of(episode), model, mujoco.mj_stateSize(model, STATE), substeps_of(episode, model), where(episode))
 
 
-def substeps_of(episode: Episode, model: mujoco.MjModel) -> float:
+def substeps_of(episode: EpisodeRows, model: mujoco.MjModel) -> float:
     """Physics steps of one row."""
     period = episode.settings.get("policy_dt_ms") or float(1000 / episode.fps)
     if isinstance(period, bool) or not isinstance(period, (int, float)) or not 0 < period < 1e9:
@@ -173,7 +167,7 @@ def set_state(model: mujoco.MjModel, data: mujoco.MjData, state: np.ndarray) -> 
 class Stepper:
     """Simulates one step of the policy as it was recorded, in plain MuJoCo."""
 
-    def __init__(self, episode: Episode, model: mujoco.MjModel, data: Any) -> None:
+    def __init__(self, episode: EpisodeRows, model: mujoco.MjModel, data: Any) -> None:
         self.model, self._data, self._inputs = model, data, inputs_of(episode)
         self._substeps = round(substeps_of(episode, model))
         ctrl = self._inputs.ctrl
@@ -221,7 +215,7 @@ class Stepper:
 
 
 def replay_episode(
-    episode: Episode, from_: str, model: mujoco.MjModel | None, data: mujoco.MjData | None
+    episode: EpisodeRows, from_: str, model: mujoco.MjModel | None, data: mujoco.MjData | None
 ) -> Iterator[tuple[int, mujoco.MjData]]:
     if from_ not in ("states", "actions"):
         raise ValueError(f"from_ is {from_!r}; it must be 'states' or 'actions'")
@@ -229,7 +223,7 @@ def replay_episode(
         raise ValueError(f"{where(episode)} is trimmed; only the complete episode can be simulated from its actions")
     if from_ == "actions":
         check_unchanged(episode)
-    states = episode.states
+    states = states_of(episode)
     model = model_of(episode) if model is None else model
     data = mujoco.MjData(model) if data is None else data
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from mjsense.dataset.episode import Episode
+    from mjsense.dataset.episode_rows import EpisodeRows
 
 _SLOW = 0.03  # rad/s or m/s; slower joints do not move
 _SMALL = 0.01  # smaller changes of a command, as a share of its largest value in the episode, are none
@@ -33,7 +33,7 @@ class EpisodeQuality:
     """Share of the observations in which a camera shows an object, by camera and by the object's role in the task."""
 
 
-def idle_steps(episode: Episode) -> np.ndarray:
+def idle_steps(episode: EpisodeRows) -> np.ndarray:
     """Whether nothing moves in the step that led to an observation: bool ``[T]``; False for the first one."""
     still = np.ones(episode.length - 1, bool)
     moving = [name for name in episode.streams if name.startswith("obs/agent/qpos/")]
@@ -49,7 +49,7 @@ def idle_steps(episode: Episode) -> np.ndarray:
     return np.concatenate([[False], still])
 
 
-def kept_rows(episode: Episode) -> list[int]:
+def kept_rows(episode: EpisodeRows) -> list[int]:
     """Rows of the observations that :meth:`Episode.trimmed` leaves."""
     actors = [name for name in episode.streams if name.startswith("env_states/actors/")]
     joints = [name for name in episode.streams if name.startswith("obs/agent/qpos/")]
@@ -67,7 +67,7 @@ def kept_rows(episode: Episode) -> list[int]:
     return kept
 
 
-def quality_of(episode: Episode) -> EpisodeQuality:
+def quality_of(episode: EpisodeRows) -> EpisodeQuality:
     idle = idle_steps(episode)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(int), [0]])))
     waits = edges[1::2] - edges[::2]
@@ -87,7 +87,7 @@ def quality_of(episode: Episode) -> EpisodeQuality:
     )
 
 
-def _approach(episode: Episode) -> float:
+def _approach(episode: EpisodeRows) -> float:
     if "obs/extra/grasp_pose" not in episode.streams:
         return float("nan")
     _, x, y, _ = episode["obs/extra/grasp_pose"][-1, 3:].astype(float)

@@ -16,8 +16,8 @@ from mjsense.dataset.places import is_plain_name, printable
 
 
 def is_address(root: str | Path) -> bool:
-    """Whether this is an address instead of a path."""
-    return "://" in str(root)
+    """Whether this is an address instead of a path; a folder may have any name."""
+    return "://" in str(root) and not os.path.exists(root)
 
 
 def absolute(root: str | Path) -> str:

@@ -13,22 +13,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense.core.installed_files import use_installed_meshes
 from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
 from mjsense.dataset.description import named_file
 from mjsense.dataset.deviation import Deviation
-from mjsense.dataset.episode import VIDEOS
+from mjsense.dataset.episode_rows import VIDEOS
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.hdf5 import Rows, open_h5, text_of
 from mjsense.dataset.limits import TEXT_BYTES
+from mjsense.dataset.model_fields import ReplayInputs
 from mjsense.dataset.places import open_plain
-from mjsense.dataset.playback import ReplayInputs, fields_of, inputs_of
+from mjsense.dataset.playback import fields_of, inputs_of
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
 from mjsense.recording.recorder import FILE_OPTIONS, recorded_sensors
 from mjsense.scene.physics_options import PREFIX
 from mjsense.scene.randomizable import field_of
 from mjsense.sim.simulation import Simulation
-from mjsense.tasks.assets import use_installed_meshes
 
 if TYPE_CHECKING:
     from mjsense.dataset.episode import Episode

@@ -13,7 +13,7 @@ from typing import Any
 from mjsense.core.errors import did_you_mean
 from mjsense.core.input_files import read_toml
 from mjsense.sensors import configs
-from mjsense.tasks.robot import sensor_of_class
+from mjsense.sensors.named_class import sensor_of_class
 
 _PYTHON = "python"
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import checked
+from mjsense.core.env_ids import env_id
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.model_xml import model_xml
 from mjsense.exporting.images import FLAGS, depth_videos
 from mjsense.exporting.mapping import Mapping, Source, check_names, named_streams
 from mjsense.exporting.output import needs, new_output
-from mjsense.tasks.gymnasium_registry import env_id
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _VALID_EVERY = 10

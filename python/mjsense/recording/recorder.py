@@ -6,14 +6,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds
-from mjsense.sensors.foreign_sensor import as_sensor
+from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.sensor import Sensor
 from mjsense.sensors.suite import SensorSuite, add_missing
 from mjsense.sim.simulation import Simulation
@@ -21,13 +21,23 @@ from mjsense.sim.simulation import Simulation
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from mjsense.warp.simulation import WarpSimulation
-
 
 FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "append": False, "overwrite": False, "house": 0, "batches": 0, "gzip": 4}
 """Options of the C++ recorder for the files, with their defaults."""
 VIDEO_OPTIONS: dict[str, Any] = {"ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
 """Its options for the videos that it encodes."""
+
+
+class WarpSimulation(Protocol):
+    """The part of :class:`mjsense.warp.simulation.WarpSimulation` that a recorder reads."""
+
+    scene: Any
+    num_worlds: int
+    step_dt: float
+    _core: Any
+
+    def refresh(self, sensors: Sequence[Any]) -> None: ...
+    def _host_rows(self, sensors: Sequence[Any]) -> Any: ...
 
 
 @checked

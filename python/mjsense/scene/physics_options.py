@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 import numpy as np
 
@@ -12,8 +12,6 @@ from mjsense.core.errors import did_you_mean
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from mjsense.sim.simulation import Simulation
 
 PREFIX = "opt."
 """Fields of mjOption have names such as ``opt.gravity`` among the fields of the model."""
@@ -67,6 +65,16 @@ def check_option_values(name: str, values: np.ndarray, before: np.ndarray) -> No
             if ((values ^ before) & (1 << words.index(flag))).any():
                 raise ValueError(f"opt.enableflags: '{flag}' cannot change in a simulation; set it before the scene is compiled: "
                                  f"SceneCfg(options=MujocoCfg(enableflags=(\"{flag}\",)))")  # fmt: skip
+
+
+class Owner(Protocol):
+    """The part of a simulation that options read and write."""
+
+    physics_dt: float
+
+    def model_field(self, name: str) -> np.ndarray: ...
+    def randomize(self, field: str, values: Any) -> None: ...
+    def _set_timestep(self, seconds: float) -> None: ...
 
 
 class _Option:
@@ -134,10 +142,10 @@ class Options:
     enableflags = _Option("Enabled features [B]: bits of mjtEnableBit; assign their lower-case MJCF names or the bits.")
     disableactuator = _Option("Bits of the groups whose actuators are disabled [B].")
 
-    def __init__(self, sim: Simulation) -> None:
+    def __init__(self, sim: Owner) -> None:
         object.__setattr__(self, "_sim", sim)
 
-    _sim: Simulation
+    _sim: Owner
 
     @property
     def timestep(self) -> float:

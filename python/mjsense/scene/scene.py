@@ -19,7 +19,7 @@ from mjsense.core.errors import UnknownNameError
 from mjsense.scene.read_only_model import read_only
 from mjsense.sensors.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.sensors.contact import ContactSensor
-from mjsense.sensors.foreign_sensor import as_sensor
+from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.imu import ImuSensor
 from mjsense.sensors.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.sensors.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor

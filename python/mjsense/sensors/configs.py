@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from mjsense.core.field_docs import show_field_docs
 from mjsense.core.lazy_dataclass import dataclass
 from mjsense.sensors import config_methods
+from mjsense.sensors.effects import Effect
 
 if TYPE_CHECKING:
     import mujoco
-
-    from mjsense.sensors.effects import Effect
 
 
 @dataclass
@@ -456,6 +455,23 @@ class ContactSensorCfg(SensorCfg):
     """Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors."""
     viz: ContactVizCfg = field(default_factory=ContactVizCfg)
     """Appearance of the debug drawing."""
+
+
+@dataclass
+class EffectSensorCfg(SensorCfg):
+    """A sensor of the scene with effects (noise, delay and so on) applied; it has the same fields."""
+
+    kind: ClassVar[str] = "effect"
+    sensor: str = ""
+    """Name of the clean sensor, such as ``robot/imu_acc``."""
+    effects: Sequence[Effect] = ()
+    """The effects, applied in this order; each may be limited to some fields."""
+    fields: Sequence[str] = ()
+    """Fields of the clean sensor that are reported; empty: all."""
+    history_length: int = 0
+    """Number of rows kept of every field, oldest first; the first row of an episode fills all of them. 0: no history."""
+    flatten_history: bool = True
+    """Return the history as [h d] instead of [h, *shape]."""
 
 
 @dataclass(frozen=True)
@@ -914,11 +930,12 @@ def replace(cfg: Any, **changes: Any) -> Any:
 
 __all__ = [
     "BuiltinSensorCfg", "CameraIntrinsics", "CameraSensorCfg", "CameraVizCfg", "ContactMatch", "ContactSensorCfg",
-    "ContactVizCfg", "EntityCfg", "GridPatternCfg", "ImuAxis", "ImuModel", "ImuSensorCfg", "LensDistortion",
-    "LidarSensorCfg", "MujocoCfg", "ObjRef", "PinholeCameraPatternCfg", "RayCastSensorCfg", "RayCastVizCfg",
-    "RingPatternCfg", "SceneCfg", "SceneEntityCfg", "SceneFileCfg", "SceneHeadlightCfg", "SceneMoodCfg",
-    "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg", "SceneVaryCfg", "SensorCfg", "SpinningScanCfg",
-    "SubTerrainCfg", "TableScanCfg", "TerrainCfg", "TerrainHeightSensorCfg", "UserPatternCfg", "replace",
+    "ContactVizCfg", "EffectSensorCfg", "EntityCfg", "GridPatternCfg", "ImuAxis", "ImuModel", "ImuSensorCfg",
+    "LensDistortion", "LidarSensorCfg", "MujocoCfg", "ObjRef", "PinholeCameraPatternCfg", "RayCastSensorCfg",
+    "RayCastVizCfg", "RingPatternCfg", "SceneCfg", "SceneEntityCfg", "SceneFileCfg", "SceneHeadlightCfg",
+    "SceneMoodCfg", "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg", "SceneVaryCfg", "SensorCfg",
+    "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TerrainCfg", "TerrainHeightSensorCfg", "UserPatternCfg",
+    "replace",
 ]  # fmt: skip
 
 show_field_docs(__name__)

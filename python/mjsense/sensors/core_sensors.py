@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mjsense import _core
 from mjsense.core import mujoco_names
@@ -14,9 +14,6 @@ from mjsense.core.errors import UnknownNameError
 from mjsense.sensors.native_sensor import NativeSensor
 from mjsense.sensors.nested_streams import nest
 from mjsense.sensors.sensor import Sensor
-
-if TYPE_CHECKING:
-    from mjsense.sim.simulation import Simulation
 
 
 class CoreSensor(NativeSensor):
@@ -33,12 +30,12 @@ class CoreSensor(NativeSensor):
         self.kind: str = kind
         self.cfg: Any = None
 
-    def _make(self, sim: Simulation) -> _core.SensorHandle:
+    def _make(self, sim: Any) -> _core.SensorHandle:
         """Creates the C++ sensor for this simulation; the caller adds it."""
         self._handle, self._core, self._fields = self._build(sim), sim._core, {}
         return self._handle
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         raise NotImplementedError
 
     def _bind(self, core: _core.Simulation) -> None:
@@ -72,7 +69,7 @@ def _nested(fields: Any) -> Any:
     return fields[""] if "" in fields else nest({name: tuple(name.split("/")) for name in fields}, dict(fields))
 
 
-def _sim_groups(sim: Simulation, context: str, groups: Mapping[str, Sequence[str]] | None) -> list[tuple[str, list[int], list[int]]]:
+def _sim_groups(sim: Any, context: str, groups: Mapping[str, Sequence[str]] | None) -> list[tuple[str, list[int], list[int]]]:
     """Addresses of the joints of each group. Default groups: those of the robot, or all joints as one group."""
     model = sim.model
     if groups is None and sim._view is not None:
@@ -109,7 +106,7 @@ class JointPositionSensor(CoreSensor):
         self._groups = None if groups is None else {name: list(joints) for name, joints in groups.items()}
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         return _core.make_joint_state(self.name, self._velocity, _sim_groups(sim, f"sensor '{self.name}'", self._groups))
 
 
@@ -160,7 +157,7 @@ class PoseSensor(CoreSensor):
         self._description = description
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         return _core.make_pose(self.name, self._frames[0], self._frames[1], self._description)
 
 
@@ -179,7 +176,7 @@ class TcpPoseSensor(CoreSensor):
         self._gripper = gripper
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         grippers = {g["name"]: g for g in _robot(sim, self).groups() if g["kind"] == "gripper"}
         name = self._gripper or next(iter(grippers), "")
         if name not in grippers:
@@ -200,7 +197,7 @@ class RobotBasePoseSensor(CoreSensor):
         super().__init__(uuid, "pose")
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         body = sim.model.body(_robot(sim, self).base_body).name
         return _core.make_pose(self.name, ("body", body), ("", ""), "Pose of the robot's base, on the floor.")
 
@@ -238,7 +235,7 @@ class EnvStatesSensor(CoreSensor):
         self._rest = articulation, length, robot_body, robot
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         articulation, length, body, robot = self._rest
         groups = self._groups if self._groups is not None or sim._view is not None else {}
         if not body and sim._view is not None and sim._view.base_body > 0:
@@ -263,7 +260,7 @@ class CameraParameterSensor(CoreSensor):
         self._camera, self._size = camera, (width, height)
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         streams = {} if sim._view is None else {c["name"]: c["mjcf_camera"] for c in sim._view.cameras()}
         camera = streams.get(self._camera, self._camera)
         mujoco_names.known_id(sim.model, mujoco_names.Obj.CAMERA, camera, f"sensor '{self.name}'")
@@ -286,7 +283,7 @@ class CameraImageSensor(CoreSensor):
         self._camera, self._field = camera, field
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         return _core.make_shared_field(self.name, _camera(sim, self, self._camera)._handle, self._field)
 
 
@@ -307,7 +304,7 @@ class ImagePointsSensor(CoreSensor):
         self._objects, self._cameras, self._thin = dict(objects), list(cameras), set(thin)
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         cameras = [(name, _camera(sim, self, name)._handle, False) for name in self._cameras]
         return _core.make_image_points(self.name, [(k, b, k not in self._thin) for k, b in self._objects.items()], cameras)
 
@@ -328,7 +325,7 @@ class GraspStateSensor(CoreSensor):
         self._object, self._grippers = object, grippers
         self._complete = True
 
-    def _build(self, sim: Simulation) -> _core.SensorHandle:
+    def _build(self, sim: Any) -> _core.SensorHandle:
         grippers = self._grippers
         if grippers is None:
             found = [g for g in _robot(sim, self).groups() if g["kind"] == "gripper"]
@@ -336,13 +333,13 @@ class GraspStateSensor(CoreSensor):
         return _core.make_grasp_state(self.name, self._object, list(grippers.items()))
 
 
-def _robot(sim: Simulation, sensor: CoreSensor) -> _core.TaskView:
+def _robot(sim: Any, sensor: CoreSensor) -> _core.TaskView:
     if sim._view is None:
         raise ValueError(f"sensor '{sensor.name}' needs a robot, which simulations of recordings and make_vec have: name it yourself")
     return sim._view
 
 
-def _camera(sim: Simulation, sensor: CoreSensor, name: str) -> NativeSensor:
+def _camera(sim: Any, sensor: CoreSensor, name: str) -> NativeSensor:
     cameras = {key: s for key, s in sim.scene.sensors.items() if getattr(s, "kind", "") == "camera"} if sim.scene.sensors else {}
     if name not in cameras:
         raise UnknownNameError(_core.unknown_name(f"sensor '{sensor.name}'", "camera sensor", name, list(cameras)))
@@ -351,6 +348,8 @@ def _camera(sim: Simulation, sensor: CoreSensor, name: str) -> NativeSensor:
 
 class FunctionSensor(Sensor):
     """A function as a sensor: ``function(env, world)`` returns the value of one world."""
+
+    _mjs_stateless = True
 
     def __init__(
         self,
@@ -377,6 +376,3 @@ class FunctionSensor(Sensor):
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
         return self._function(env, batch_index)
-
-    def _mjs_is_shared(self) -> bool:
-        return True

@@ -21,24 +21,6 @@ from typing import ClassVar, Literal
 from mjsense.core.field_docs import show_field_docs
 from mjsense.core.lazy_dataclass import dataclass
 from mjsense.sensors import config_methods
-from mjsense.sensors.configs import SensorCfg
-
-
-@dataclass
-class EffectSensorCfg(SensorCfg):
-    """A sensor of the scene with effects (noise, delay and so on) applied; it has the same fields."""
-
-    kind: ClassVar[str] = "effect"
-    sensor: str = ""
-    """Name of the clean sensor, such as ``robot/imu_acc``."""
-    effects: Sequence[Effect] = ()
-    """The effects, applied in this order; each may be limited to some fields."""
-    fields: Sequence[str] = ()
-    """Fields of the clean sensor that are reported; empty: all."""
-    history_length: int = 0
-    """Number of rows kept of every field, oldest first; the first row of an episode fills all of them. 0: no history."""
-    flatten_history: bool = True
-    """Return the history as [h d] instead of [h, *shape]."""
 
 
 @dataclass(frozen=True)

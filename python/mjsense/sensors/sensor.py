@@ -6,7 +6,8 @@ from __future__ import annotations
 import copy
 import json
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import closing
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import gymnasium
@@ -15,14 +16,13 @@ import numpy as np
 from mjsense import _core
 from mjsense.core import representations
 from mjsense.core.arrays import fresh
+from mjsense.sensors.calls import Calls, EachWorld, Values, calls_of
 from mjsense.sensors.drawing import DebugShapes
 from mjsense.sensors.row_declarations import Row, leaves, nested, rows_of_space, rows_of_value
-from mjsense.sensors.user_code import RandomStreams, SensorError, named, observe, required, takes
+from mjsense.sensors.user_code import SensorError, named
 
 if TYPE_CHECKING:
     import mujoco
-
-    from mjsense.sim.simulation import Simulation
 
 
 T = TypeVar("T")
@@ -40,18 +40,18 @@ def _plain(value: Any) -> Any:
 
 
 class Sensor(Generic[T]):
-    """Base class of sensors written in Python; ``T`` in ``Sensor[T]`` is the type of ``data``. Implement one of these methods:
+    """Base class of sensors written in Python; ``T`` in ``Sensor[T]`` is the type of ``data``.
 
-    - ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` returns those of the given
-      worlds, in order;
+    ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` returns those of the given worlds, in
+    order. One instance serves all worlds and stores its state per world.
+
+    Classes with the methods of other libraries work too, if they have no ``compute``:
+
     - ``_compute_data()`` equals ``compute(sim)`` without an argument (as in mjlab);
     - ``get_observation(env, task, batch_index=0)`` returns the value of one world (as in MolmoSpaces). `env` is
-      :attr:`mjsense.Simulation.env`; `task` is None except in recordings and environments.
-
-    With the first two methods, one instance serves all worlds and stores its state per world. With the third, there is one
-    instance per world: the given object belongs to world 0, and the others are deep copies that are created when the sensor is
-    added to its simulation. Its ``reset()`` has no arguments. (A ``reset(world_ids)`` makes one instance serve all worlds here
-    too.)
+      :attr:`mjsense.Simulation.env`; `task` is None except in recordings and environments. There is one instance per world: the given
+      object belongs to world 0, and the others are deep copies that are created when the sensor is added to its simulation. Its
+      ``reset()`` has no arguments. (A ``reset(world_ids)`` makes one instance serve all worlds here too.)
 
     The value is computed once per state, when it is read. With an ``observation_space``, rows are stored in arrays of its dtype
     and shape, from which suites and recordings read. A value with another dtype or shape, or outside the bounds, is an error;
@@ -78,8 +78,8 @@ class Sensor(Generic[T]):
     _mjs_fields: list[Row] | None = None  # None until declared; [] if the value is a Python object without rows
     _mjs_rows: Any = None  # a list with the array of each field; None without fields
     _mjs_shown: Any = None
-    _mjs_instances: Any = None  # a list by world; None: one instance computes all worlds at once
-    _mjs_faults: Any = None  # dict[int, SensorError]: errors of reset() by world, raised when the value is computed
+    _mjs_adapter: Calls | None = None  # see _mjs_calls
+    _mjs_stateless: bool = False  # True: one instance serves all worlds whatever its methods are
     _mjs_worked: bool = False  # True after the first valid row
 
     def __init__(self, uuid: str | None = None, observation_space: Any = None, **kwargs: Any) -> None:
@@ -116,25 +116,13 @@ class Sensor(Generic[T]):
     def edit_spec(self, spec: mujoco.MjSpec) -> None:
         """Adds MuJoCo elements to the model before compilation."""
 
-    def initialize(self, sim: Simulation) -> None:
-        """Called once after compilation: resolve names and allocate memory here."""
+    def initialize(self, sim: Any) -> None:
+        """Called once after compilation, with the :class:`mjsense.Simulation`: resolve names and allocate memory here."""
 
-    def compute(self, sim: Simulation) -> Any:
+    def compute(self, sim: Any) -> Any:
         """Returns the values of all worlds, ``[B, ...]``. May be called several times per step (if a world was reset): change
         state only in update()."""
-        if _overrides(self, "_compute_data"):
-            value = self._compute_data()
-            if value is None:
-                raise ValueError("_compute_data() returned None")
-            return value
         raise NotImplementedError("write compute(sim), _compute_data() or get_observation(env, task, batch_index)")
-
-    def _compute_data(self) -> Any:
-        raise NotImplementedError
-
-    def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
-        """Returns the value of one world; called once per state."""
-        return self._mjs_row(batch_index)
 
     def update(self, dt: float) -> None:
         """Called after every control step of ``dt`` seconds, before the value of that step is computed."""
@@ -157,8 +145,8 @@ class Sensor(Generic[T]):
         self.uuid = name
 
     @property
-    def simulation(self) -> Simulation:
-        """The simulation that it belongs to; raises RuntimeError if there is none."""
+    def simulation(self) -> Any:
+        """The :class:`mjsense.Simulation` that it belongs to; raises RuntimeError if there is none."""
         sim = self._mjs_sim_ref() if self._mjs_sim_ref else None
         if sim is None:
             raise RuntimeError(f"sensor '{self.uuid}' belongs to no simulation yet")
@@ -181,6 +169,10 @@ class Sensor(Generic[T]):
         self._mjs_core.refresh(self._mjs_handle)
         return fresh(self._mjs_shown)
 
+    def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
+        """The current value of one world, as sensors of MolmoSpaces give it."""
+        return self._mjs_row(batch_index)
+
     def debug_shapes(self, world: int = 0) -> DebugShapes:
         """The shapes that ``debug_vis`` adds for this world."""
         return self.simulation.debug_shapes(world, self)
@@ -191,137 +183,52 @@ class Sensor(Generic[T]):
         """The object whose methods are called."""
         return self
 
-    def _mjs_by_world(self) -> bool:
-        """Whether the implemented method is get_observation()."""
-        return _overrides(self, "get_observation") and not (_overrides(self, "compute") or _overrides(self, "_compute_data"))
+    @property
+    def _mjs_calls(self) -> Calls:
+        """Calls its methods."""
+        if self._mjs_adapter is None or self._mjs_adapter.sensor is not self:  # a copy makes its own
+            self._mjs_adapter = self._mjs_make_calls()
+        return self._mjs_adapter
 
-    def _mjs_is_shared(self) -> bool:
-        """Whether one instance serves all worlds."""
-        return not self._mjs_by_world() or (_overrides(self, "reset") and takes(self.reset, 1))
+    def _mjs_make_calls(self) -> Calls:
+        return calls_of(self)
 
     def _mjs_edit_spec(self) -> None:
         scene = self._mjs_scene_ref() if self._mjs_scene_ref else None
         if scene is not None:
-            self._mjs_call(self, "edit_spec", scene.spec, scene)
+            self._mjs_calls.edit_spec(scene)
 
-    def _mjs_bind(self, sim: Simulation, handle: _core.SensorHandle) -> None:
-        self._mjs_make_instances(sim)
+    def _mjs_bind(self, sim: Any, handle: _core.SensorHandle) -> None:
+        self._mjs_calls.prepare(sim)
         self._mjs_sim_ref, self._mjs_handle, self._mjs_core = weakref.ref(sim), handle, sim._core
-        self._mjs_faults, self._mjs_worked = {}, False
+        self._mjs_worked = False
         if self._mjs_fields:
             written, shown = handle.arrays(writable=True), handle.arrays()
             self._mjs_rows = [written[row.name] for row in self._mjs_fields]
             self._mjs_shown = nested(self._mjs_fields, [shown[row.name] for row in self._mjs_fields])
         self._mjs_value = self._mjs_shown
-        if self.is_dict or (self._mjs_by_world() and not self._mjs_fields):
+        if self.is_dict or (self._mjs_calls.by_world and not self._mjs_fields):
             self._mjs_value = [None] * sim.num_worlds
-        for instance in self._mjs_originals():
-            self._mjs_call(instance, "initialize", sim, sim)
-
-    def _mjs_make_instances(self, sim: Simulation) -> None:
-        if not self._mjs_by_world():
-            if sim.num_worlds > 1 and _overrides(self, "reset") and not takes(self.reset, 1):
-                raise TypeError(f"sensor '{self.uuid}': one instance computes all worlds, so its reset() must take world_ids")
-            return
-        first = self._mjs_original()
-        if self._mjs_is_shared():
-            self._mjs_instances = [first] * sim.num_worlds
-        elif self._mjs_instances is None or len(self._mjs_instances) != sim.num_worlds:
-            self._mjs_instances = [first] + [self._mjs_copy(sim, first) for _ in range(1, sim.num_worlds)]
-
-    def _mjs_copy(self, sim: Simulation, first: Any) -> Any:
-        """A copy of the sensor for another world. References to the simulation and its parts are not copied."""
-        kept = [sim, sim.scene, *sim.scene.sensors.values(), *sim._python]
-        kept += [value for name, value in vars(self).items() if name.startswith("_mjs_")]
-        kept.append(getattr(first, "observation_space", None))
-        if "model" in vars(sim.scene):
-            kept.append(sim.scene.model)
-        kept += sim._models.copies()
-        memo = {id(thing): thing for thing in kept if thing is not first}
-        try:
-            return copy.deepcopy(first, memo)
-        except Exception as error:
-            raise SensorError(
-                f"sensor '{self.uuid}': one instance a world is needed, and it cannot be copied "
-                f"({type(error).__name__}: {error}); give it a __deepcopy__, or a reset(world_ids) that keeps its state by world"
-            ) from error
-
-    def _mjs_originals(self) -> list[Any]:
-        """All distinct instances."""
-        if self._mjs_instances is None or self._mjs_is_shared():
-            return [self._mjs_original()]
-        return self._mjs_instances
-
-    def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
-        """Calls edit_spec or initialize with mjsense's arguments or, if it requires more, with mjlab's."""
-        function = getattr(instance, method, None)
-        if function is None:
-            return
-        wanted = len(required(function))
-        with named(self.uuid, method):
-            if method == "edit_spec" and wanted == 2:
-                function(first, owner._entities_of_spec())
-            elif method == "initialize" and wanted == 4:
-                function(owner.model, owner.model, owner.data, "cpu")
-            else:
-                function(first)
+        self._mjs_calls.initialize(sim)
 
     def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
-        if self._mjs_instances is not None and not self._mjs_is_shared():
-            with RandomStreams(seeds, world_ids, 1) as streams:
-                for world in world_ids:
-                    reset = getattr(self._mjs_instances[world], "reset", None)
-                    self._mjs_faults.pop(world, None)
-                    streams.seed(world)
-                    try:
-                        with named(self.uuid, "reset", world):
-                            if reset is not None:
-                                reset()
-                    except SensorError as error:
-                        self._mjs_faults[world] = error
-            return
-        with named(self.uuid, "reset"):
-            if not takes(self.reset, 1):
-                self.reset()
-            else:
-                self.reset(None if len(world_ids) == self.simulation.num_worlds else world_ids)
+        self._mjs_calls.reset(world_ids, self.simulation.num_worlds, seeds)
 
     def _mjs_draw(self, shapes: DebugShapes) -> None:
-        if not _overrides(self, "debug_vis"):
+        if not self._mjs_overrides("debug_vis"):
             raise ValueError(f"sensor '{self.uuid}' has nothing to draw: write debug_vis(visualizer)")
-        with named(self.uuid, "debug_vis"):
-            (self._mjs_instances[shapes.env_idx] if self._mjs_instances else self).debug_vis(shapes)
+        self._mjs_calls.draw(shapes)
 
     def _mjs_updates(self) -> bool:
         """Whether it must be called after every control step."""
-        return _overrides(self, "update")
+        return self._mjs_overrides("update")
 
     def _mjs_control_step(self, world_ids: list[int], dt: float, seeds: Sequence[int] = ()) -> list[tuple[int, SensorError]]:
-        if self._mjs_sim_ref is None:
-            return []
-        if self._mjs_instances is None or self._mjs_is_shared():
-            with named(self.uuid, "update"):
-                self._mjs_original().update(*((dt, world_ids) if takes(self._mjs_original().update, 2) else (dt,)))
-            return []
+        return [] if self._mjs_sim_ref is None else self._mjs_calls.update(self.simulation, world_ids, dt, seeds)
 
-        def update(env: Any, world: int) -> None:
-            with named(self.uuid, "update", world):
-                self._mjs_instances[world].update(dt)
-
-        return self._mjs_each_world(update, world_ids, seeds, 2)
-
-    def _mjs_each_world(self, call: Callable[[Any, int], None], world_ids: list[int], seeds: Sequence[int], occasion: int) -> list[tuple[int, SensorError]]:
-        """Calls ``call(env, world)`` for these worlds, each with its own random numbers, and returns (world, error) of those that failed."""
-        faults = []
-        with self.simulation.env._computing_sensors() as env, RandomStreams(seeds, world_ids, occasion) as streams:
-            for world in world_ids:
-                env.current_batch_index = world
-                streams.seed(world)
-                try:
-                    call(env, world)
-                except SensorError as error:
-                    faults.append((world, error))
-        return faults
+    def _mjs_overrides(self, method: str) -> bool:
+        """Whether its class has its own method of this name."""
+        return getattr(type(self), method) is not getattr(Sensor, method)
 
     # ---------------------------------------------------------------------------------------- called by mjsense: its values
 
@@ -330,23 +237,26 @@ class Sensor(Generic[T]):
         succeeded."""
         if self._mjs_sim_ref is None:
             return []  # the simulation is under construction and initialize() has not been called
-        by_world = self._mjs_instances is not None
-        faults = self._mjs_each_world(self._mjs_compute_world, world_ids, seeds, 0) if by_world else self._mjs_compute_batch(world_ids)
+        computed = self._mjs_calls.compute(self.simulation, world_ids, seeds)
+        faults = self._mjs_put_each(computed) if isinstance(computed, EachWorld) else self._mjs_put_all(world_ids, computed)
         if len(faults) < len(world_ids):
             self._mjs_worked = True
         elif not self._mjs_worked and faults:
             raise faults[0][1]  # it has never worked, so the fault is not limited to single episodes
         return faults
 
-    def _mjs_compute_world(self, env: Any, world: int) -> None:
-        if world in self._mjs_faults:
-            raise self._mjs_faults.pop(world)
-        with named(self.uuid, "get_observation", world):
-            self._mjs_put(world, observe(self._mjs_instances[world], env, env.task, world))
-
-    def _mjs_observe(self, env: Any, task: Any, world: int) -> Any:
-        """Computes the current value of this world with its instance."""
-        return observe(self._mjs_instances[world] if self._mjs_instances else self._mjs_original(), env, task, world)
+    def _mjs_put_each(self, computed: EachWorld) -> list[tuple[int, SensorError]]:
+        faults = []
+        with closing(computed.values) as values:
+            for world, value in values:
+                try:
+                    if isinstance(value, SensorError):
+                        raise value
+                    with named(self.uuid, computed.method, world):
+                        self._mjs_put(world, value)
+                except SensorError as error:
+                    faults.append((world, error))
+        return faults
 
     def _mjs_put(self, world: int, value: Any) -> None:
         """Stores the value of one world."""
@@ -362,13 +272,9 @@ class Sensor(Generic[T]):
             for rows, array in zip(self._mjs_rows, arrays):
                 rows[world] = array
 
-    def _mjs_compute_batch(self, world_ids: list[int]) -> list[tuple[int, SensorError]]:
-        sim = self.simulation
+    def _mjs_put_all(self, world_ids: list[int], computed: Values) -> list[tuple[int, SensorError]]:
+        value, of = computed
         with named(self.uuid, "compute"):
-            some = takes(self.compute, 2)
-            compute: Any = self.compute
-            value = compute(sim, list(world_ids)) if some else compute(sim)
-            of = world_ids if some else list(range(sim.num_worlds))
             if self.is_dict:
                 return self._mjs_put_dicts(world_ids, of, list(value))
             if not self._mjs_fields:
@@ -412,22 +318,22 @@ class Sensor(Generic[T]):
             return nested(self._mjs_fields, [np.array(array[world]) for array in leaves(value, self._mjs_fields)])
         return copy.copy(value[world])
 
-    def _mjs_probe(self, sim: Simulation) -> None:
+    def _mjs_probe(self, sim: Any) -> None:
         """Determines the arrays that the space leaves open from the value of a copied sensor in world 0."""
         space = self.observation_space
-        if self.is_dict or not isinstance(space, gymnasium.spaces.Dict) or space.spaces or not self._mjs_by_world():
+        if self.is_dict or not isinstance(space, gymnasium.spaces.Dict) or space.spaces:
             return
-        probe = self._mjs_copy(sim, self._mjs_original())
         try:
-            with sim.env._computing_sensors() as env:
-                env.current_batch_index = 0
-                value = observe(probe, env, env.task, 0)
+            value = self._mjs_calls.probe(sim)
+        except SensorError:
+            raise
         except Exception as error:
             raise SensorError(
                 f"sensor '{self.uuid}': its observation_space names no arrays, and it has no value yet to find them in "
                 f"({type(error).__name__}: {error}): declare a Dict of Boxes"
             ) from error
-        self._mjs_fields = rows_of_value(value)
+        if value is not None:
+            self._mjs_fields = rows_of_value(value)
 
     def _mjs_declared(self) -> list[Row]:
         if self.is_dict:
@@ -460,7 +366,3 @@ class Sensor(Generic[T]):
                 "unit": self.unit, "frame": self.frame, "description": description,
             })  # fmt: skip
         return specs
-
-
-def _overrides(sensor: Sensor, method: str) -> bool:
-    return getattr(type(sensor), method) is not getattr(Sensor, method)

@@ -10,9 +10,8 @@ import gymnasium
 
 from mjsense.core.arguments import KnownAttributes, checked
 from mjsense.core.arrays import ids_of_worlds
-from mjsense.core.errors import UnknownNameError
-from mjsense.core.representations import printable
-from mjsense.sensors.foreign_sensor import as_sensor
+from mjsense.core.errors import UnknownNameError, printable
+from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.sensor import Sensor
 
 
@@ -31,13 +30,13 @@ class SensorSuite(KnownAttributes):
 
     def add(self, sensor: Any) -> None:
         """Adds a sensor of the scene, of the core suite, a user-defined one, or one written for MolmoSpaces. Raises ValueError
-        for a sensor without a name, and AssertionError, as MolmoSpaces does, if the name is in use."""
+        for a sensor without a name, and if the name is in use."""
         sensor = as_sensor(sensor)
         uuid = sensor.uuid
         if not uuid:
             raise ValueError(f"{type(sensor).__name__} has no uuid")
         if uuid in self.sensors:
-            raise AssertionError(f"'{uuid}' is a duplicated sensor uuid")
+            raise ValueError(f"'{uuid}' is a duplicated sensor uuid")
         self.sensors[uuid] = sensor
 
     def extend(self, sensors: Iterable[Any]) -> None:
@@ -104,12 +103,12 @@ class SensorSuite(KnownAttributes):
             raise ValueError(f"batch_index {batch_index}: must be in [0, {sim.num_worlds})")
         out = {}
         for uuid, sensor in self.sensors.items():
-            if isinstance(sensor, Sensor) and task is not None and sensor._mjs_by_world():
-                out[uuid] = sensor._mjs_observe(sim.env if env is sim else env, task, batch_index)
-            elif isinstance(sensor, Sensor):
+            if not isinstance(sensor, Sensor):
+                out[uuid] = sensor._row(batch_index)
+            elif task is None:
                 out[uuid] = sensor._mjs_row(batch_index)
             else:
-                out[uuid] = sensor._row(batch_index)
+                out[uuid] = sensor._mjs_calls.observe(sim.env if env is sim else env, task, batch_index)
         return out
 
 

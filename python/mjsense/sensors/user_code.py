@@ -24,28 +24,19 @@ def _parameters_of(function: Any) -> tuple[inspect.Parameter, ...]:
         return ()
 
 
-def _parameters(function: Any) -> tuple[inspect.Parameter, ...]:
+def parameters(function: Any) -> tuple[inspect.Parameter, ...]:
     """The parameters that a call must pass, without self."""
     return _parameters_of(function.__func__)[1:] if inspect.ismethod(function) else _parameters_of(function)
 
 
 def required(function: Any) -> list[inspect.Parameter]:
     """Positional parameters without a default."""
-    return [p for p in _parameters(function) if p.default is p.empty and p.kind < 2]
+    return [p for p in parameters(function) if p.default is p.empty and p.kind < 2]
 
 
 def takes(function: Any, count: int) -> bool:
     """Whether it has at least `count` positional parameters."""
-    return len([p for p in _parameters(function) if p.kind < 2]) >= count
-
-
-def observe(instance: Any, env: Any, task: Any, world: int) -> Any:
-    """Calls get_observation() like MolmoSpaces."""
-    function = instance.get_observation
-    names = {p.name for p in _parameters(function)}
-    if "batch_index" in names or any(p.kind is p.VAR_KEYWORD for p in _parameters(function)):
-        return function(env, task, batch_index=world)
-    return function(env, task)
+    return len([p for p in parameters(function) if p.kind < 2]) >= count
 
 
 _RANDOM: Any = np.random  # its type stubs lack get_bit_generator() and set_bit_generator()

@@ -3,16 +3,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from mjsense.scene.written_values import write_component
 
-if TYPE_CHECKING:
-    from mjsense.sim.simulation import Simulation
-
 STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
+
+
+class Owner(Protocol):
+    """The part of a simulation that is read here."""
+
+    num_worlds: int
+    _core: Any
+    _derived: dict[str, tuple[Any, np.ndarray]]
+
+    def _component(self, name: str) -> np.ndarray: ...
 
 
 class DerivedFields:
@@ -22,7 +29,7 @@ class DerivedFields:
     read.
     """
 
-    _sim: Simulation
+    _sim: Owner
     # Declared for editors and type checkers; all other fields of mjData are available too and listed by dir().
     xpos: np.ndarray
     xquat: np.ndarray
@@ -50,7 +57,7 @@ class DerivedFields:
     sensordata: np.ndarray
     cfrc_ext: np.ndarray
 
-    def __init__(self, sim: Simulation) -> None:
+    def __init__(self, sim: Owner) -> None:
         object.__setattr__(self, "_sim", sim)
 
     def __repr__(self) -> str:

@@ -5,23 +5,22 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsense import _core
-from mjsense.compat.peer import PeerEnv
-from mjsense.core import libmujoco, mujoco_names, representations
+from mjsense.core import mujoco_names, representations
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds
 from mjsense.core.errors import UnknownNameError, did_you_mean
+from mjsense.core.later_rooms import provided
 from mjsense.scene.physics_options import Options
 from mjsense.scene.scene import Scene
 from mjsense.scene.written_values import numbers, write_component
 from mjsense.sensors.drawing import DebugShapes
-from mjsense.sensors.foreign_sensor import as_sensor
+from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.native_sensor import NativeSensor
 from mjsense.sensors.sensor import Sensor
 from mjsense.sim.derived_fields import DerivedFields
@@ -69,7 +68,7 @@ class Simulation(KnownAttributes):
     _stepped_elsewhere = False
 
     def __new__(cls, *args: Any, backend: str = "cpu", **options: Any) -> Simulation:
-        return _on_warp(*args, **options) if backend == "warp" else super().__new__(cls)
+        return provided("warp_simulation")(*args, **options) if backend == "warp" else super().__new__(cls)
 
     def __init__(
         self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
@@ -137,7 +136,7 @@ class Simulation(KnownAttributes):
     def _begin(self, scene: Scene, view: Any = None) -> None:
         self.scene = scene
         self._view = view
-        self._env: PeerEnv | None = None
+        self._env: Any = None
         self.num_worlds: int = self._core.num_worlds
         """Number of worlds, ``B``."""
         self.decimation: int = self._core.decimation
@@ -263,11 +262,11 @@ class Simulation(KnownAttributes):
     userdata = _State("User data [B, nuserdata].")
 
     @property
-    def env(self) -> PeerEnv:
+    def env(self) -> Any:
         """The worlds in the interface of sensors written for MolmoSpaces: the first argument of ``get_observation(env, task,
         batch_index)``."""
         if self._env is None:
-            self._env = PeerEnv(self, self._view)
+            self._env = provided("env")(self, self._view)
         return self._env
 
     @property
@@ -482,42 +481,3 @@ class Simulation(KnownAttributes):
 
 # Otherwise help() would show the arguments of __new__.
 Simulation.__signature__ = inspect.Signature([*inspect.signature(Simulation.__init__).parameters.values()][1:])  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def warp_module(name: str) -> Any:
-    """A module of ``mjsense.warp``. Raises ImportError, with the extra, if mujoco_warp is not installed or is of another series."""
-    import importlib.metadata  # slow to import
-
-    try:
-        found = importlib.metadata.version("mujoco-warp")
-    except importlib.metadata.PackageNotFoundError:
-        found = ""  # the import below says what is missing
-    series = ".".join(map(str, libmujoco.SERIES))
-    if found and not found.startswith(f"{series}."):
-        raise ImportError(
-            f"backend='warp' needs mujoco-warp {series}, and {found} is installed, with {libmujoco.installed()}: "
-            "pip install \"mjsense[warp]\" (in another environment if a package needs the installed one), or use backend='cpu'"
-        )
-    try:
-        return importlib.import_module(f"mjsense.warp.{name}")
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.split(".")[0] not in ("warp", "mujoco_warp", "mujoco"):
-            raise
-        raise ImportError(f"backend='warp' needs {error.name}: pip install \"mjsense[warp]\"") from None
-
-
-@partial(checked, context="Simulation()")
-def _on_warp(
-    scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
-    device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
-) -> Any:  # fmt: skip
-    """The simulation of this scene on mujoco_warp."""
-    warp = warp_module("simulation")
-    if scene._simulation is not None:
-        raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
-    if threads:
-        raise ValueError("Simulation(): threads is for backend='cpu'")
-    compiled = Simulation._compiled(scene, decimation, seed)
-    sim = warp.WarpSimulation(compiled, scene.cfg.num_envs if num_worlds is None else num_worlds, device, nconmax, njmax)
-    scene._simulation = compiled._core
-    return sim

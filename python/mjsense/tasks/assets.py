@@ -1,68 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of other installed packages: meshes of robots, and objects for scenes. Without them, robots are drawn with built-in
-primitive shapes; their motion is the same."""
+"""Objects for scenes, and other files of installed packages."""
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-_PACKAGE = "package:"
+from mjsense.core.installed_files import name_package_folders
+
 _GENERATORS = {"scene_synthesizer": "mjsense.tasks.synthesized_objects"}
 """Modules that write the files of a source's objects with its packages."""
-
-
-def installed_meshes(robots: Iterable[str]) -> dict[str, Path]:
-    """Folders of meshes by the name of their environment variable, for robots given by the texts of their files. Imports no
-    package."""
-    import tomllib  # slow to import
-
-    found = {}
-    for text in robots:
-        meshes = tomllib.loads(text).get("meshes", {})
-        if "env" not in meshes or not meshes.get("folder", "").startswith(_PACKAGE):
-            continue
-        package, _, inside = meshes["folder"].removeprefix(_PACKAGE).partition("/")
-        spec = importlib.util.find_spec(package)
-        for root in (spec.submodule_search_locations or ()) if spec else ():
-            folder = Path(root, inside)
-            if all((folder / file).is_file() for file in meshes.get("files", {}).values()):
-                found[meshes["env"]] = folder
-    return found
-
-
-def use_installed_meshes() -> None:
-    """Makes tasks created from now on draw robots with the installed meshes. An environment variable that is set, even if empty,
-    has priority."""
-    from mjsense import _core
-
-    for variable, folder in installed_meshes(map(_core.robot_text, _core.robot_names())).items():
-        os.environ.setdefault(variable, str(folder))
-
-
-def use_installed_files(words: list[str]) -> None:
-    """Makes the C++ program, run with these arguments in this process, use the meshes and the ffmpeg of installed packages."""
-    from mjsense.recording.ffmpeg import use_installed_ffmpeg  # this file also runs alone
-
-    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
-        use_installed_meshes()
-    use_installed_ffmpeg()
-
-
-def name_package_folders() -> None:
-    """Tells the library the folders of installed packages, for scenes that refer to their files. A variable that is set has
-    priority."""
-    folders = dict.fromkeys(path for path in sys.path if Path(path).name in ("site-packages", "dist-packages"))
-    os.environ.setdefault("MJSENSE_PACKAGES", os.pathsep.join(folders))
 
 
 def _objects() -> list[dict[str, Any]]:
@@ -133,8 +86,3 @@ def install_objects(source: str) -> list[str]:
     if left:
         raise RuntimeError(f"{source}: the installed packages have no files of {', '.join(left)}")
     return missing
-
-
-if __name__ == "__main__":  # Prints lines for a shell, for the robots in a folder.
-    for variable, folder in installed_meshes(p.read_text() for p in Path(sys.argv[1]).glob("*/robot.toml")).items():
-        print(f"export {variable}=${{{variable}-{folder}}}")

@@ -8,13 +8,7 @@ import re
 import gymnasium
 
 from mjsense import _core
-
-
-def env_id(task: str, robot: str | None = None) -> str:
-    """Id of an environment, ``mjsense/PickAndPlace-Franka-v0``; without a robot ``mjsense/PickAndPlace-v0``, which uses the
-    task's default robot."""
-    words = ["".join(part.capitalize() for part in name.split("_")) for name in (task, robot) if name]
-    return f"mjsense/{'-'.join(words)}-v0"
+from mjsense.core.env_ids import env_id
 
 
 def register(task: str, robot: str | None = None) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from mjsense.sensors.foreign_sensor import as_sensor
+from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.native_sensor import NativeSensor
 from mjsense.sensors.sensor import Sensor
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
-from mjsense.sensors.foreign_sensor import list_of_sensors
+from mjsense.sensors.given_sensor import list_of_sensors
 from mjsense.sensors.nested_streams import choose_streams, nest, stream_path
 from mjsense.tasks.task import episode_rng, group_slices, snake_case
 

@@ -12,10 +12,10 @@ from typing import Any
 from mjsense import _core
 from mjsense.core import representations
 from mjsense.core.errors import UnknownNameError, did_you_mean
-from mjsense.core.progress_line import line_of, of_recording
+from mjsense.core.installed_files import use_installed_meshes
+from mjsense.core.progress_line import clock, line_of
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
 from mjsense.sim.simulation import Simulation
-from mjsense.tasks.assets import use_installed_meshes
 from mjsense.tasks.parts import parts_of
 
 PARTS: dict[str, Any] = {"task": "pick", "robot": None, "policy": "planner", "scene": "", "resume": False, "append": False}
@@ -42,6 +42,15 @@ class RecordProgress:
     """Wall-clock time."""
     seconds_left: float
     """Estimated remaining time; NaN until an episode has ended."""
+
+
+def of_recording(p: RecordProgress) -> str:
+    """``3/10 episodes  75 % success  412 steps/s  0:41 left``, as the program shows it."""
+    ended, seconds = p.succeeded + p.failed, max(p.seconds, 1e-9)
+    parts = [f"{p.kept}/{p.wanted} episodes", f"{100 * p.succeeded / ended:.0f} % success" if ended else "", f"{p.steps / seconds:.0f} steps/s"]
+    parts.append(f"{p.frames / seconds:.0f} frames/s" if p.frames else "")
+    parts.append(f"{clock(p.seconds_left)} left" if p.seconds_left == p.seconds_left and p.kept < p.wanted else "")
+    return "  ".join(filter(None, parts))
 
 
 @dataclass(frozen=True)
@@ -86,17 +95,29 @@ def record_here(options: dict[str, Any], sensors: Iterable[Any] = (), progress: 
     Args:
         options: Options of ``mjsense.record`` by name; ``out`` and those that differ from the defaults.
     """
-    options = {**PARTS, **options, "out": str(options["out"])}
-    objects = parts_of(options, sensors)
     line = line_of(progress)
     show = progress if callable(progress) else None if line is None else lambda p: line.show(of_recording(p))
-    report = None if show is None else lambda p: show(RecordProgress(**p))
-    if options.get("meshes") == "real":
-        use_installed_meshes()
-    use_installed_ffmpeg()
-    made = _core.record(options, report, objects, Simulation._of)
-    made["path"] = Path(made["path"])
+    made = job_result(options, sensors, None if show is None else lambda p: show(RecordProgress(**p)))
+    del made["work"]
     summary = RecordSummary(**made)
     if line is not None:
         line.show(of_recording(summary), last=True)
     return summary
+
+
+def job_result(
+    options: dict[str, Any], sensors: Iterable[Any], report: Callable[..., None] | None, *, stop_on_signals: bool = False
+) -> dict[str, Any]:
+    """Records episodes. Returns the fields of a RecordSummary, and ``work``: what ran in addition to the simulation.
+
+    Args:
+        report: Called with the fields of a RecordProgress; with ``stop_on_signals`` also with the number of signals.
+        stop_on_signals: The first Ctrl-C or SIGTERM finishes the running episodes, the second discards them, the third ends the process.
+            Otherwise Ctrl-C discards them and raises KeyboardInterrupt.
+    """
+    options = {**PARTS, **options, "out": str(options["out"])}
+    objects = parts_of(options, sensors)
+    if options.get("meshes") == "real":
+        use_installed_meshes()
+    use_installed_ffmpeg()
+    return _core.record(options, report, objects, Simulation._of, stop_on_signals)

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 from mjsense.core.arguments import Seed, checked
-from mjsense.core.progress_line import line_of, of_recording
+from mjsense.core.later_rooms import provided
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks
 from mjsense.tasks.record_job import RecordProgress, RecordSummary, record_here
 
@@ -163,7 +162,7 @@ def record(
         given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
         if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording") if given[name]]:
             raise ValueError(f"record: {refused[0]} cannot be combined with ray")
-        return _record_on_ray({**options, "format": format, "sensors": sensors}, ray, progress)
+        return provided("record_on_ray")({**options, "format": format, "sensors": sensors}, ray, progress)
     if format == "mjsense":
         if map is not None or trim_idle is not None or keep_recording:
             raise ValueError("record: map, trim_idle and keep_recording are options of format='lerobot'")
@@ -175,31 +174,3 @@ def record(
     with converted(out, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
         summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))
-
-
-def _record_on_ray(options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
-    from mjsense.cluster import ClusterProgress, Job, record_on_ray
-
-    own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
-    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
-        del options[name]
-    if not options["threads"]:
-        del options["threads"]  # one per worker
-
-    def counts(now: ClusterProgress) -> dict[str, Any]:
-        return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
-                "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
-
-    line = line_of(progress)
-
-    def show(now: ClusterProgress) -> None:
-        about = RecordProgress(**counts(now), seconds_left=math.nan)
-        if callable(progress):
-            progress(about)
-        elif line is not None:
-            line.show(of_recording(about))
-
-    made = record_on_ray(Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"], resume=own["resume"],
-                         address=address, progress=show)  # fmt: skip
-    return RecordSummary(**counts(made), seconds_left=0.0, interrupted=False, enough=made.enough, failures=made.failures, lengths=[], times={},
-                         published_bytes=0, path=Path(own["out"]))  # fmt: skip

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +16,7 @@ from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, checked
 from mjsense.core.errors import UnknownNameError
 from mjsense.sensors.configs import EntityCfg
+from mjsense.sensors.named_class import sensor_of_class
 
 
 @dataclass(frozen=True)
@@ -193,16 +193,3 @@ def _sensors_of_file(name_or_path: str) -> list[Any]:
         sensor.uuid = name
         sensors.append(sensor)
     return sensors
-
-
-def sensor_of_class(reference: str, arguments: dict[str, Any], context: str) -> Any:
-    """An object of the class ``package.module:Class``, made with keyword arguments."""
-    module, _, attribute = reference.partition(":")
-    try:
-        cls: Any = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"{context}: class '{reference}' is not found: {error}") from error
-    try:
-        return cls(**arguments)
-    except TypeError as error:
-        raise TypeError(f"{context}: class '{reference}' cannot be made: {error}") from error

@@ -16,7 +16,7 @@ from mjsense.core.arrays import on_host
 from mjsense.core.errors import did_you_mean
 from mjsense.scene.scene import prepared
 from mjsense.scene.written_values import numbers, write_component
-from mjsense.sensors.foreign_sensor import list_of_sensors
+from mjsense.sensors.given_sensor import list_of_sensors
 from mjsense.tasks import gymnasium_registry
 
 if TYPE_CHECKING:

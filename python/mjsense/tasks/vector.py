@@ -17,12 +17,13 @@ from mjsense import _core
 from mjsense.core import mujoco_names
 from mjsense.core.arguments import Seed, checked
 from mjsense.core.errors import did_you_mean
+from mjsense.core.installed_files import use_installed_meshes
+from mjsense.core.later_rooms import provided
 from mjsense.scene.scene import Scene
 from mjsense.scene.written_values import numbers
 from mjsense.sensors.native_sensor import box_of
 from mjsense.sensors.nested_streams import choose_streams, nest, stream_path
-from mjsense.sim.simulation import Simulation, warp_module
-from mjsense.tasks.assets import use_installed_meshes
+from mjsense.sim.simulation import Simulation
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense.tasks.task import group_slices
 
@@ -499,7 +500,7 @@ def make_vec(
             raise ValueError(
                 f"make_vec(): task '{options['task']}' is not available with backend='warp', which plays tasks written in Python"
             )
-        made = warp_module("rollout").WarpTaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+        made = provided("warp_environment")(options, objects, observations, render_mode, autoreset_mode, action_space)
     else:
         made = TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
     made._arguments = arguments

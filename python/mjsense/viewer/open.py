@@ -6,23 +6,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mjsense._core import robot_names
-from mjsense.core.errors import UnknownNameError
+from mjsense.core.later_rooms import provided
 from mjsense.dataset import Dataset
 from mjsense.dataset.files import INDEX
 from mjsense.dataset.remote import is_address
 from mjsense.scene.scene import Scene
-from mjsense.sensors.configs import SceneCfg, SceneFileCfg
+from mjsense.sensors.configs import SceneCfg
 from mjsense.sim.simulation import Simulation
-from mjsense.tasks.env import TaskEnv
-from mjsense.tasks.task import task_names
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
 from mjsense.viewer.live import LiveViewer
 from mjsense.viewer.recorded import RecordingViewer
-from mjsense.viewer.source import LiveSource, TaskSource
+from mjsense.viewer.source import LiveSource
 from mjsense.viewer.viewer import Viewer
 
-_IMAGE = {"width": 320, "height": 240, "depth": True, "segmentation": True}
 _PERIOD = 1 / 60  # s, about: control step of a model that is viewed alone
 
 
@@ -53,32 +48,17 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
         return LiveSource(thing)
     if hasattr(thing, "warp_model"):
         raise NotImplementedError("mjs.view is not available with backend='warp'; use backend='cpu'")
-    if isinstance(thing, TaskEnv):
-        thing = thing.worlds
-    if isinstance(thing, TaskVectorEnv):
-        return TaskSource(thing)
-    if isinstance(thing, (str, Path)) and is_address(thing):
+    if not isinstance(thing, (str, Path)):
+        return provided("task_source")(thing, worlds, seed, options)
+    if is_address(thing):
         return Dataset(thing)
-    if isinstance(thing, Path) or (isinstance(thing, str) and Path(thing).exists() and thing not in task_names()):
+    if isinstance(thing, Path) or (Path(thing).exists() and thing not in provided("task_names")()):
         path = Path(thing)
         if is_recording(path):
             return Dataset(path)
         if path.suffix in (".xml", ".mjcf"):
             return _model(path, worlds, seed)
-    options = {"policy": "planner", "render_mode": "rgb_array", "num_envs": worlds, "seed": seed, **_IMAGE, **options}
-    if not isinstance(thing, (str, Path, SceneFileCfg)):
-        return TaskSource(make_vec(thing, **options), type(thing).__name__)
-    if isinstance(thing, str) and thing in task_names():
-        return TaskSource(make_vec(thing, **options), thing)
-    if thing in robot_names():
-        raise ValueError(f"'{thing}' is a robot: name a task, and the robot as an option (--robot {thing}, robot='{thing}')")
-    title = thing.name if isinstance(thing, SceneFileCfg) else str(thing)
-    try:
-        return TaskSource(make_vec(options.pop("task", "pick"), scene=thing, **options), title)
-    except UnknownNameError as error:
-        raise UnknownNameError(
-            f"'{thing}' is neither a file nor the name of a task ({', '.join(task_names())}) or scene: {error}"
-        ) from None
+    return provided("task_source")(thing, worlds, seed, options)
 
 
 def _model(path: Path, worlds: int, seed: int) -> LiveSource:

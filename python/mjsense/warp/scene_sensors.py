@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import warp as wp
 
@@ -17,9 +17,6 @@ from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, unsupported
 from mjsense.warp.stepper import Stepper
 from mjsense.warp.user import UserSensor
 
-if TYPE_CHECKING:
-    from mjsense.warp.simulation import WarpSimulation
-
 __all__ = ["SceneSensors", "builtin", "camera", "contact", "effect_sensor", "imu", "lidar", "rays", "terrain_height"]  # each registers its sensors
 
 
@@ -30,7 +27,7 @@ class SceneSensors:
     what the C++ simulation is on the CPU: they call :meth:`refresh` before their arrays are read.
     """
 
-    def __init__(self, sim: WarpSimulation, worlds: Worlds, stepper: Stepper, graphs: Graphs) -> None:
+    def __init__(self, sim: Any, worlds: Worlds, stepper: Stepper, graphs: Graphs) -> None:
         self._sim, self._worlds, self._stepper, self._graphs = sim, worlds, stepper, graphs
         self.by_name: dict[str, WarpSensor] = worlds.sensors
         self.meansize = float(sim.model.stat.meansize)

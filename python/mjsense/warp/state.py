@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,9 +12,6 @@ import warp as wp
 from mjsense.core.errors import did_you_mean
 from mjsense.warp import arrays
 from mjsense.warp.sensor import scalar_view
-
-if TYPE_CHECKING:
-    from mjsense.warp.simulation import WarpSimulation
 
 STATE = ("qpos", "qvel", "act", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 """Components of the state, except ctrl, whose values for the next step are not those of the physics."""
@@ -31,10 +28,10 @@ class Component:
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, sim: WarpSimulation | None, owner: type) -> Any:
+    def __get__(self, sim: Any, owner: type) -> Any:
         return self if sim is None else sim._shared(self._name)
 
-    def __set__(self, sim: WarpSimulation, value: Any) -> None:
+    def __set__(self, sim: Any, value: Any) -> None:
         array = sim._component(self._name)
         shape = tuple(value.shape) if hasattr(value, "shape") else np.shape(value)
         try:
@@ -49,7 +46,7 @@ class Component:
 class DerivedFields:
     """Fields of mjData of all worlds at the current state, on the device: ``sim.data.xpos`` is float32 ``[B, nbody, 3]``."""
 
-    def __init__(self, sim: WarpSimulation) -> None:
+    def __init__(self, sim: Any) -> None:
         self._sim = sim
 
     def __dir__(self) -> list[str]:

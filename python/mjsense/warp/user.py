@@ -12,7 +12,7 @@ import warp as wp
 
 from mjsense.core.arrays import on_host
 from mjsense.sensors.row_declarations import leaves, nested, rows_of_space
-from mjsense.sensors.user_code import named, required, takes
+from mjsense.sensors.user_code import named
 from mjsense.warp import arrays
 from mjsense.warp.sensor import DTYPES, Stage, WarpSensor, Worlds, unsupported
 
@@ -28,7 +28,7 @@ class UserSensor(WarpSensor):
 
     def __init__(self, worlds: Worlds, sensor: Sensor, sim: Any, reader: Any) -> None:
         self.worlds, self.name, self.cfg, self.sensor, self._sim = worlds, sensor.uuid, None, sensor, weakref.ref(sim)
-        if sensor._mjs_by_world() or type(sensor)._mjs_original(sensor) is not sensor:
+        if sensor._mjs_calls.by_world:
             raise unsupported(self.name, "get_observation(), which computes one world at a time,")
         if sensor.is_dict:
             raise unsupported(self.name, "is_dict = True")
@@ -45,20 +45,14 @@ class UserSensor(WarpSensor):
 
     def initialize(self) -> None:
         """Called when the simulation is complete."""
-        initialize, sim = self.sensor.initialize, self._simulation()
-        with named(self.name, "initialize"):
-            if len(required(initialize)) == 4:
-                initialize(sim.model, sim.warp_model, sim.data, sim.device)  # type: ignore[call-arg]
-            else:
-                initialize(sim)
+        self.sensor._mjs_calls.initialize(self._simulation())
         self._started = True
 
     def update(self) -> None:
         sensor: Any = self.sensor
         sim = self._simulation()
+        value = sensor._mjs_calls.compute(sim, list(range(sim.num_worlds))).of_worlds
         with named(self.name, "compute"):
-            every = range(sim.num_worlds)
-            value = sensor.compute(sim, list(every)) if takes(sensor.compute, 2) else sensor.compute(sim)
             if not self._rows:
                 sensor._mjs_value = value
                 return
@@ -79,15 +73,11 @@ class UserSensor(WarpSensor):
     def substep(self) -> None:
         """After a control step."""
         if self.sensor._mjs_updates():
-            with named(self.name, "update"):
-                self.sensor.update(self.worlds.step_dt)
+            self.sensor._mjs_calls.update(self._simulation(), list(range(self.worlds.num_worlds)), self.worlds.step_dt)
 
     def reset(self, mask: Any) -> None:
         if not self._started:
             return
         worlds: Sequence[int] = np.flatnonzero(on_host(mask)).tolist()
-        with named(self.name, "reset"):
-            if not takes(self.sensor.reset, 1):
-                self.sensor.reset()
-            elif worlds:
-                self.sensor.reset(None if len(worlds) == self.worlds.num_worlds else worlds)
+        if worlds:
+            self.sensor._mjs_calls.reset(worlds, self.worlds.num_worlds)

@@ -23,10 +23,6 @@ constexpr std::size_t kSumBytes = 4;  // fletcher32's checksum follows the data
 
 using Bytes = std::vector<std::uint8_t>;
 
-[[noreturn]] void refuse(const std::string& name, std::string_view why) {
-  throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
-}
-
 Bytes lzf_unpacked(const Bytes& packed, std::size_t maximum) {
   Bytes out(maximum);
   out.resize(lzf_unpack(packed, out));

@@ -18,10 +18,6 @@ namespace {
 constexpr std::uint64_t kMaxRatio = 1100;
 constexpr std::uint64_t kFreeBytes = std::uint64_t{1} << 26;
 
-[[noreturn]] void refuse(const std::string& name, std::string_view why) {
-  throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
-}
-
 // Opens one link, which must be a hard link to an object of this file.
 Id open_link(hid_t parent, const std::string& name) {
   if (name.empty() || name == "." || name.find('/') != std::string::npos)
@@ -85,6 +81,10 @@ struct Walk {
 };
 
 }  // namespace
+
+void refuse(const std::string& name, std::string_view why) {
+  throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
+}
 
 Id open_group(hid_t parent, const std::string& path) {
   Id object = open_path(parent, path);

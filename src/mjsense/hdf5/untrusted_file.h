@@ -22,6 +22,14 @@ inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 24;  // maximum s
 // Maximum size of a row or a chunk.
 inline constexpr std::uint64_t kMaxRowBytes = std::uint64_t{1} << 26;
 
+// True for rows that are more than 1 GiB and 200 times the size of their file: a decompression bomb.
+inline bool is_bomb(std::uint64_t unpacked_bytes, std::uint64_t file_bytes) {
+  return unpacked_bytes > (std::uint64_t{1} << 30) + 200 * file_bytes;
+}
+
+// Throws RuntimeError "'name' why".
+[[noreturn]] void refuse(const std::string& name, std::string_view why);
+
 // Opens `path` link by link. Only hard links are followed. Throws RuntimeError for a soft or
 // external link, which it names, and for an object of another kind.
 [[nodiscard]] Id open_group(hid_t parent, const std::string& path);

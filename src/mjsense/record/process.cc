@@ -157,7 +157,7 @@ void read_log(Child& child) {
   constexpr int kMaxReads = 16;  // the caller has other children
   char piece[1 << 14];
   for (int i = 0; i < kMaxReads && child.log; ++i) {
-    const ssize_t n = read(child.log.get(), piece, sizeof piece);
+    const ssize_t n = ::read(child.log.get(), piece, sizeof piece);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0 && errno == EAGAIN) return;
     if (n <= 0) {
@@ -210,7 +210,7 @@ std::string run_process(const std::vector<std::string>& argv, const ProcessLimit
       if (ready == 0 && has_exited(child.pid) != 0) kill_group(child.pid);
       continue;
     }
-    const ssize_t n = read(child.out.get(), buffer, sizeof buffer);
+    const ssize_t n = ::read(child.out.get(), buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) break;
     heard = Clock::now();

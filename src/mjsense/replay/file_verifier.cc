@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
+#include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recording_description.h"
 #include "mjsense/replay/description_checks.h"
@@ -22,8 +23,6 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t kMaxSteps = 10'000'000;  // per episode: a week at 15 Hz
 constexpr std::size_t kMaxFindings = 200;       // per file
-// A file whose rows are more than this many times its own size is taken for a decompression bomb.
-constexpr std::uint64_t kMaxUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
 class FileVerifier {
  public:
@@ -154,7 +153,7 @@ class FileVerifier {
                      const std::string& context) {
     const RowDataset dataset(trajectory, name);
     unpacked_ += dataset.bytes();
-    if (unpacked_ > kFreeBytes + kMaxUnpacked * bytes_)
+    if (hdf5::is_bomb(unpacked_, bytes_))
       return error(context, "is not read: the file declares far more data than it contains");
     record::Checksum sum;
     if (name == "obs_scene") {

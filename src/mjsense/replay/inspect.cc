@@ -25,9 +25,6 @@ namespace fs = std::filesystem;
 namespace mjsense::replay {
 namespace {
 
-// A file whose rows are more than this many times its own size is taken for a decompression bomb.
-constexpr std::uint64_t kMaxUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
-
 // Mean and standard deviation in one pass, accurate for values far from zero (Welford).
 struct Accumulator {
   std::int64_t count = 0, nan = 0, infinite = 0;
@@ -106,7 +103,7 @@ class Inspector {
       if (name.starts_with("obs/sensor_data/")) return;
       const RowDataset dataset(trajectory, name);
       unpacked_ += dataset.bytes();
-      if (unpacked_ > kFreeBytes + kMaxUnpacked * bytes_)
+      if (hdf5::is_bomb(unpacked_, bytes_))
         throw RuntimeError(
             fmt::format("'{}': the files declare far more data than they contain", name));
       Stream& stream = stream_of(dataset, name);

@@ -5,8 +5,12 @@
 
 #include <atomic>
 #include <mutex>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
+
+#include "mjsense/core/system/print_stderr.h"
 
 namespace mjsense::scene {
 namespace {
@@ -43,6 +47,20 @@ void disable_mujoco_log_file() {
   if (std::string_view(config.logfile) != "MUJOCO_LOG.TXT") return;
   config.logto_file = 0;
   mju_setLogConfig(config);
+}
+
+void print_warnings_once() {
+  mju_user_warning = [](const char* text) {
+    static std::mutex mutex;
+    static std::set<std::string> shown;
+    std::string warning = text;
+    if (warning.find("simulation is unstable") != std::string::npos) return;
+    warning.erase(warning.find_last_not_of(" \n") + 1);
+    for (std::size_t at; (at = warning.find('\n')) != std::string::npos;)
+      warning.replace(at, 1, "; ");
+    const std::lock_guard lock(mutex);
+    if (shown.insert(warning).second) print_stderr("mjsense: MuJoCo: {}\n", warning);
+  };
 }
 
 WarningCapture::WarningCapture(std::vector<std::string>& messages) {

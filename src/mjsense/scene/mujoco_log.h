@@ -14,6 +14,10 @@ namespace mjsense::scene {
 // process.
 void disable_mujoco_log_file();
 
+// Prints each of MuJoCo's warnings once from now on, as one line on stderr. Divergence is not printed:
+// it is reported with its episode. For programs only, like disable_mujoco_log_file().
+void print_warnings_once();
+
 // While one exists, MuJoCo's warnings on this thread are appended to `messages` instead of printed.
 // One at a time in the process; the messages of other threads are unaffected.
 class WarningCapture {

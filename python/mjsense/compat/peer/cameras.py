@@ -4,20 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mjsense.compat.peer.matrices import matrix_of
-
-if TYPE_CHECKING:
-    from mjsense.compat.peer.env import PeerEnv
+from mjsense.compat.peer.worlds import PeerWorlds
 
 
 class Cameras:
     """Cameras by the name of the sensor that renders them."""
 
-    def __init__(self, env: PeerEnv) -> None:
+    def __init__(self, env: PeerWorlds) -> None:
         self._env = env
 
     def _names(self) -> dict[str, str]:
@@ -49,7 +46,7 @@ class Cameras:
 class PeerCamera:
     """A camera in the world whose sensor is being computed, in its current pose."""
 
-    def __init__(self, env: PeerEnv, name: str, camera: int) -> None:
+    def __init__(self, env: PeerWorlds, name: str, camera: int) -> None:
         self._env, self.name, self._id = env, name, camera
 
     @property

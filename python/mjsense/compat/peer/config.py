@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-if TYPE_CHECKING:
-    from mjsense.compat.peer.task import PeerTask
+
+class TaskOfWorld(Protocol):
+    """The part of a task that its configuration reads: the view, and the world whose sensor is being computed."""
+
+    _view: Any
+
+    @property
+    def _world(self) -> int: ...
 
 
 class PeerConfig:
     """Configuration of a task: its type and periods, its objects (``task_config``), its cameras (``camera_config``)."""
 
-    def __init__(self, task: PeerTask) -> None:
+    def __init__(self, task: TaskOfWorld) -> None:
         view = task._view
         self.task_type: str = view.type
         self.task_horizon: int = view.horizon
@@ -36,7 +42,7 @@ class PeerTaskConfig:
     use_sensors = True
     action_dtype = "float32"
 
-    def __init__(self, task: PeerTask) -> None:
+    def __init__(self, task: TaskOfWorld) -> None:
         self._task = task
         self.task_type: str = task._view.type
         self.added_objects: dict[str, str] = {}

@@ -3,40 +3,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense import _core
-from mjsense.compat.peer.by_world import ByWorld
 from mjsense.compat.peer.cameras import Cameras
-from mjsense.compat.peer.robot import PeerRobot
+from mjsense.compat.peer.robot import RobotWorlds
 from mjsense.compat.peer.task import PeerTask
-from mjsense.core import mujoco_names, mujoco_views
-
-if TYPE_CHECKING:
-    import mujoco
-
-    from mjsense.sim.simulation import Simulation
+from mjsense.core import mujoco_names
+from mjsense.sim.simulation import Simulation
 
 
-class PeerEnv:
+class PeerEnv(RobotWorlds):
     """The worlds of a simulation. All other attributes are the simulation's: ``env.qpos[batch_index]``, ``env.scene["imu"]``."""
 
     def __init__(self, sim: Simulation, view: _core.TaskView | None = None) -> None:
-        self.sim = sim
-        """The simulation."""
-        self._view = view
+        super().__init__(sim, view)
         self._task: PeerTask | None = None
-        self._world = 0
-        self._datas: list[mujoco.MjData] = []
-        self._copies: Any = None
         self.camera_manager = SimpleNamespace(registry=Cameras(self))
         """``camera_manager.registry[name]``: cameras by the names of the sensors that render them."""
-        self._robots: tuple[PeerRobot, ...] = ()
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__") or name in ("sim", "_view"):
@@ -52,56 +41,6 @@ class PeerEnv:
             self._task = PeerTask(self, self._view)
         return self._task
 
-    @property
-    def n_batch(self) -> int:
-        """Number of worlds."""
-        return self.sim.num_worlds
-
-    @property
-    def current_batch_index(self) -> int:
-        """Index of the world whose sensor is being computed."""
-        return self._world
-
-    @current_batch_index.setter
-    def current_batch_index(self, world: int) -> None:
-        if not 0 <= world < self.n_batch:
-            raise ValueError(f"Batch index {world} out of range [0, {self.n_batch - 1}]")
-        self._world = world
-
-    @property
-    def mj_models(self) -> Sequence[mujoco.MjModel]:
-        """A mujoco.MjModel of each world with the world's own values: :meth:`mjsense.Simulation.model_of`."""
-        return ByWorld(self.n_batch, self.sim.model_of)
-
-    @property
-    def mj_model(self) -> mujoco.MjModel:
-        """The model of the world whose sensor is being computed."""
-        return self.sim.model_of(self._world)
-
-    current_model = mj_model
-
-    @property
-    def mj_datas(self) -> Sequence[mujoco.MjData]:
-        """A mujoco.MjData of each world as it is now, derived quantities and contacts included.
-
-        These are copies: writing to them does not change the worlds.
-        """
-        if self._copies is None:
-            self._datas = [mujoco_views.data_of(model) for model in self.mj_models]
-            self._copies = self.sim._core.data_copies(self._datas)
-        self._make_current()
-        return self._datas
-
-    @property
-    def current_data(self) -> mujoco.MjData:
-        """The data of the world whose sensor is being computed."""
-        return self.mj_datas[self._world]
-
-    def _make_current(self) -> None:
-        self.sim._models.follow()
-        if self._copies is not None:
-            self.sim._core.refresh(self._copies)
-
     @contextmanager
     def _computing_sensors(self) -> Iterator[PeerEnv]:
         """Context in which sensors are computed: MjModel and MjData objects that they keep are current.
@@ -114,20 +53,6 @@ class PeerEnv:
             yield self
         finally:
             self._world = before
-
-    @property
-    def robots(self) -> Sequence[PeerRobot]:
-        """The robot of each world."""
-        if self._view is None:
-            raise AttributeError("robots")
-        if not self._robots:
-            self._robots = tuple(PeerRobot(self, self._view, world) for world in range(self.n_batch))
-        return self._robots
-
-    @property
-    def current_robot(self) -> PeerRobot:
-        """The robot of the world whose sensor is being computed."""
-        return self.robots[self._world]
 
     def _image(self, camera_name: str, field: str) -> np.ndarray:
         sensors = self.sim.scene.sensors

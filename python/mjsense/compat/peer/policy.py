@@ -4,21 +4,19 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mjsense import _core
 from mjsense.compat.peer.matrices import matrix_of_pose
-
-if TYPE_CHECKING:
-    from mjsense.compat.peer.env import PeerEnv
+from mjsense.compat.peer.worlds import PeerWorlds
 
 
 class PeerPolicy:
     """A planner that drives the robot, in the world whose sensor is being computed."""
 
-    def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
+    def __init__(self, env: PeerWorlds, view: _core.TaskView) -> None:
         self._env = env
         self._view: Any = view
 

@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mjsense import _core
 from mjsense.compat.peer.matrices import matrix_of, matrix_of_pose
+from mjsense.compat.peer.worlds import PeerWorlds
 from mjsense.core import mujoco_names
+from mjsense.sim.simulation import Simulation
 
 if TYPE_CHECKING:
     import mujoco
-
-    from mjsense.compat.peer.env import PeerEnv
 
 
 class MoveGroup:
@@ -158,7 +159,7 @@ class Base(MoveGroup):
 class RobotView:
     """A robot's move groups in one world."""
 
-    def __init__(self, env: PeerEnv, view: _core.TaskView, world: int) -> None:
+    def __init__(self, env: PeerWorlds, view: _core.TaskView, world: int) -> None:
         self._env, self._world = env, world
         self.name: str = view.robot_name
         self.base_body: int = view.base_body
@@ -220,7 +221,7 @@ class RobotView:
 class PeerRobot:
     """A robot in one world."""
 
-    def __init__(self, env: PeerEnv, view: _core.TaskView, world: int) -> None:
+    def __init__(self, env: PeerWorlds, view: _core.TaskView, world: int) -> None:
         self._task, self._world = view, world
         self.robot_view = RobotView(env, view, world)
         """Move groups and their frames."""
@@ -239,3 +240,25 @@ class PeerRobot:
         """4x4 of every group's tool frame with its joints there: in the base frame, or in the world with the base at base_pose."""
         poses = {name: matrix_of_pose(pose) for name, pose in self._task.fk({k: list(v) for k, v in move_group_qpos.items()}).items()}
         return poses if rel_to_base else {name: np.asarray(base_pose) @ pose for name, pose in poses.items()}
+
+
+class RobotWorlds(PeerWorlds):
+    """Worlds with the robot of each."""
+
+    def __init__(self, sim: Simulation, view: _core.TaskView | None) -> None:
+        super().__init__(sim, view)
+        self._robots: tuple[PeerRobot, ...] = ()
+
+    @property
+    def robots(self) -> Sequence[PeerRobot]:
+        """The robot of each world."""
+        if self._view is None:
+            raise AttributeError("robots")
+        if not self._robots:
+            self._robots = tuple(PeerRobot(self, self._view, world) for world in range(self.n_batch))
+        return self._robots
+
+    @property
+    def current_robot(self) -> PeerRobot:
+        """The robot of the world whose sensor is being computed."""
+        return self.robots[self._world]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from mjsense.compat.peer import policy
 from mjsense.compat.peer.by_world import ByWorld
 from mjsense.compat.peer.config import PeerConfig
 from mjsense.compat.peer.policy import PeerPolicy
-
-if TYPE_CHECKING:
-    from mjsense.compat.peer.env import PeerEnv
+from mjsense.compat.peer.robot import RobotWorlds
 
 
 class PeerTask:
@@ -26,7 +24,7 @@ class PeerTask:
     sensors, so ``get_info()`` and ``judge_success()`` then refer to the previous observation.
     """
 
-    def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
+    def __init__(self, env: RobotWorlds, view: _core.TaskView) -> None:
         self.env = self._env = env
         self._view: Any = view
         self.config = PeerConfig(self)

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <deque>
@@ -165,66 +164,6 @@ void check_list(const FieldDecl& field, const FieldType& type, const void* value
   }
 }
 
-template <class T>
-bool parse_number(std::string_view text, T& out) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-  return error == std::errc() && end == text.data() + text.size() && !text.empty();
-}
-
-// Parses `text` into `value`. Returns false if it is not text of this type.
-bool read_value(const FieldDecl& field, const FieldType& type, void* value, std::string_view text) {
-  switch (type.kind) {
-    case Kind::kBool:
-      if (text != "true" && text != "false") return false;
-      *static_cast<bool*>(value) = text == "true";
-      return true;
-    case Kind::kInt: {
-      std::int64_t x = 0;
-      return parse_number(text, x) && set_integer(type, value, x);
-    }
-    case Kind::kUnsigned:
-      return parse_number(text, *static_cast<std::uint64_t*>(value));
-    case Kind::kNumber: {
-      double x = 0;
-      if (!parse_number(text, x)) return false;
-      set_number(type, value, x);
-      return true;
-    }
-    case Kind::kText:
-      *static_cast<std::string*>(value) = text;
-      return true;
-    case Kind::kPath:
-      *static_cast<std::filesystem::path*>(value) = text;
-      return true;
-    case Kind::kEnum:
-      set_integer(type, value, enum_index(text, type.words, "", field.option_name()));
-      return true;
-    case Kind::kOptional:
-      type.clear(value);
-      return read_value(field, type.element(), type.append(value), text);
-    case Kind::kArray:
-    case Kind::kList: {
-      if (type.clear) type.clear(value);
-      if (type.clear && text == "none") return true;
-      std::size_t i = 0;
-      for (std::size_t begin = 0; begin <= text.size(); ++i) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        const std::string_view item = text.substr(begin, end - begin);
-        if (item.empty() || (!type.clear && i >= type.count(value))) return false;
-        void* place = type.append ? type.append(value) : type.at(value, i);
-        if (!read_value(field, type.element(), place, item)) return false;
-        begin = end + 1;
-      }
-      return type.clear || i == type.count(value);
-    }
-    case Kind::kMap:
-    case Kind::kObject:
-    case Kind::kChoice:
-      break;
-  }
-  return false;
-}
-
 std::string write_value(const FieldType& type, const void* value) {
   void* v = const_cast<void*>(value);
   switch (type.kind) {
@@ -348,16 +287,6 @@ void check_fields(const StructDecl& decl, const void* object, std::string_view c
 void check_field(const FieldDecl& field, const void* object, std::string_view context) {
   if (!field.type) return;
   check_value(field, *field.type, at(object, field), context, field.option_name());
-}
-
-void read_text(const FieldDecl& field, void* object, std::string_view text) {
-  if (read_value(field, *field.type, at(object, field), text)) return;
-  throw ValueError(
-      fmt::format("{} is '{}': must be {}", field.option_name(), text, expected(*field.type)));
-}
-
-std::string write_text(const FieldDecl& field, const void* object) {
-  return write_value(*field.type, at(object, field));
 }
 
 void write_json(JsonWriter& json, const FieldDecl& field, const void* object) {

@@ -266,11 +266,6 @@ void check_fields(const T& object, std::string_view context) {
   check_fields(struct_of<T>(), &object, context);
 }
 
-// Parses a value as written on the command line: "3", "true", "maxforce", "0,0,1", "wrist,exo",
-// "none" for an empty list. The ValueError names the field (by its option) and what was expected.
-void read_text(const FieldDecl& field, void* object, std::string_view text);
-// Inverse of read_text(); "" for an optional without a value.
-std::string write_text(const FieldDecl& field, const void* object);
 // Writes a bool, a number or a text.
 void write_json(JsonWriter& json, const FieldDecl& field, const void* object);
 // Access to numbers of any width. set_integer() returns false if the value does not fit.

@@ -18,7 +18,7 @@
 namespace mjsense::render {
 namespace {
 
-constexpr float kEndless = 1e30f;
+constexpr float kUnbounded = 1e30f;
 constexpr int kSpot = 0, kDirectional = 1, kPoint = 2;  // mjtLightType, the same in all versions
 
 bool finite(std::span<const float> values) {
@@ -208,7 +208,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
   switch (geom.type) {
     case mjGEOM_PLANE:
       if (geom.dataid < 0 && !(size[0] > 0 && size[1] > 0)) return;
-      set_box(kEndless, kEndless, kEndless, shape);
+      set_box(kUnbounded, kUnbounded, kUnbounded, shape);
       break;
     case mjGEOM_SPHERE:
     case mjGEOM_ELLIPSOID:

@@ -10,7 +10,7 @@ namespace mjsense::render {
 namespace {
 
 // Tolerance relative to lengths and positions, for the rounding of rays and intersection tests.
-constexpr double kSlack = 1e-4;
+constexpr double kRelativeSlack = 1e-4;
 
 bool misses(const rays::KernelBoxes& boxes, int k, const Frustum& frustum) {
   const float low[3] = {boxes.low[0][k], boxes.low[1][k], boxes.low[2][k]};
@@ -55,7 +55,7 @@ bool Frustum::misses(const float low[3], const float high[3]) const {
       minimum += term;
       scale += std::abs(term);
     }
-    if (minimum > kSlack * scale) return true;
+    if (minimum > kRelativeSlack * scale) return true;
   }
   return false;
 }

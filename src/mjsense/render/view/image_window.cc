@@ -5,12 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace mjsense::render {
 namespace {
 
-constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr float kNearest = 1e-4f;  // m; nearer points count as behind the camera
 
 }  // namespace

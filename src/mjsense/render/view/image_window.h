@@ -2,6 +2,8 @@
 #pragma once
 // The part of an image that a geom may cover.
 
+#include <limits>
+
 #include "mjsense/render/view/view.h"
 
 namespace mjsense::render {
@@ -10,6 +12,8 @@ namespace mjsense::render {
 // not larger than this, relative to the width of a pixel, in one direction: the geom may be between
 // the centres of pixels.
 inline constexpr float kThin = 2.5f;
+
+inline constexpr float kEndless = std::numeric_limits<float>::infinity();
 
 // Sets center, radius, window and nearest of `g` from its pose and box. Returns false if no point
 // of it can be in the image of view.grid between view.near and view.far.

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "mjsense/render/view/image_window.h"
@@ -16,7 +15,6 @@ namespace {
 constexpr int kFaces = 6;  // faces of a cube around a light that shines in all directions
 // Cosine: one frame serves a spot with a cutoff of up to 66 degrees.
 constexpr float kNarrow = 0.4f;
-constexpr float kEndless = std::numeric_limits<float>::infinity();
 
 float length(const float* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 

@@ -14,14 +14,15 @@
 namespace mjsense::render {
 namespace {
 
-constexpr double kEndless = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 constexpr float kPlane = 1e29f;  // m; boxes of planes are larger, others are not
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Bounding box of all objects except planes.
 struct Extent {
-  double low[3] = {kEndless, kEndless, kEndless}, high[3] = {-kEndless, -kEndless, -kEndless};
+  double low[3] = {kUnlimited, kUnlimited, kUnlimited},
+         high[3] = {-kUnlimited, -kUnlimited, -kUnlimited};
 
   void add(const rays::KernelBoxes& boxes, int k) {
     for (int i = 0; i < 3; ++i) {
@@ -73,7 +74,7 @@ double longest_shadow(const rays::RayWorld& world, const Extent& extent,
     const double n[3] = {plane.mat[2], plane.mat[5], plane.mat[8]};
     const double height = dot(n, plane.pos), slope = std::abs(dot(n, to_light));
     const double away = std::max(extent.maximum(n) - height, height - extent.minimum(n));
-    longest = std::max(longest, slope > 0 ? away / slope : kEndless);
+    longest = std::max(longest, slope > 0 ? away / slope : kUnlimited);
   };
   boxes.each([&](int block) { return is_plane(boxes.blocks(), block); }, add_plane);
   return longest;

@@ -15,14 +15,14 @@
 namespace mjsense::tasks::policies {
 namespace {
 
-constexpr episode::Phase kPhases[] = {{"NAVIGATE_TO_DOOR", DoorPlanner::kNavigate},
-                                      {"REACH_PRE_GRASP", DoorPlanner::kPregrasp},
-                                      {"REACH_GRASP", DoorPlanner::kReach},
-                                      {"GRASP_HANDLE", DoorPlanner::kGrasp},
-                                      {"OPEN_DOOR", DoorPlanner::kOpen},
-                                      {"RELEASE_HANDLE", DoorPlanner::kRelease},
-                                      {"COMPLETE", DoorPlanner::kComplete},
-                                      {"RECOVERY", DoorPlanner::kRecovery}};
+constexpr episode::Phase kDoorPhases[] = {{"NAVIGATE_TO_DOOR", DoorPlanner::kNavigate},
+                                          {"REACH_PRE_GRASP", DoorPlanner::kPregrasp},
+                                          {"REACH_GRASP", DoorPlanner::kReach},
+                                          {"GRASP_HANDLE", DoorPlanner::kGrasp},
+                                          {"OPEN_DOOR", DoorPlanner::kOpen},
+                                          {"RELEASE_HANDLE", DoorPlanner::kRelease},
+                                          {"COMPLETE", DoorPlanner::kComplete},
+                                          {"RECOVERY", DoorPlanner::kRecovery}};
 constexpr double kThere = 0.06, kThereYaw = 0.1;  // m and rad, from the desired base pose
 constexpr int kPlaces = 2;                        // further base poses tried before a retry
 constexpr std::size_t kReachParts = 16;           // waypoints on the path to the pregrasp
@@ -30,7 +30,7 @@ constexpr std::size_t kParts = 5;  // segments of the opening; progress is check
 
 }  // namespace
 
-std::span<const episode::Phase> DoorPlanner::phases() const { return kPhases; }
+std::span<const episode::Phase> DoorPlanner::phases() const { return kDoorPhases; }
 
 void DoorPlanner::initialize_planner() {
   door_ = dynamic_cast<const tasks::DoorOpeningTask*>(&task());

@@ -14,7 +14,7 @@
 namespace mjsense::tasks::policies {
 namespace {
 
-constexpr episode::Phase kPhases[] = {{"navigate", 0}};
+constexpr episode::Phase kNavPhases[] = {{"navigate", 0}};
 constexpr double kLook = 0.4;        // rad, turn to each side
 constexpr double kElsewhere = 0.35;  // m, minimum distance from poses that were tried
 constexpr int kLooks = 2;
@@ -33,7 +33,7 @@ CommandPath base_path(int group, std::span<const scenes::BasePose> poses,
   return path;
 }
 
-std::span<const episode::Phase> NavPlanner::phases() const { return kPhases; }
+std::span<const episode::Phase> NavPlanner::phases() const { return kNavPhases; }
 
 void NavPlanner::initialize_planner() {
   nav_ = dynamic_cast<const tasks::NavToObjTask*>(&task());

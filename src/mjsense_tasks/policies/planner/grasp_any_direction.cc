@@ -21,7 +21,7 @@ constexpr int kDirections = 40;
 constexpr int kAroundAxis = 12;  // closing directions about each axis of the body
 constexpr int kApproaches = 16;  // approaches for each closing direction
 // m, perpendicular to closing direction and approach
-constexpr std::array<double, 3> kSlides{0.0, 0.015, -0.015};
+constexpr std::array<double, 3> kAnyDirectionSlides{0.0, 0.015, -0.015};
 // m, depth of the pads' ends behind the first surface along the approach. The small depths are for
 // flat objects, where deeper finger tips would hit the support.
 constexpr std::array<double, 4> kDepths{0.0091, 0.0191, 0.0291, 0.0471};
@@ -105,7 +105,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const episode:
       for (double end : kDepths) {
         const double depth = end - half_length - gripper.pad_middle;
         if (near + depth > mid + 0.002) break;
-        for (double slide : kSlides) {
+        for (double slide : kAnyDirectionSlides) {
           const Vec3 center = middle + (near + depth) * approach + slide * across;
           const FingerContact s =
               measure_finger_contact(points, center + gripper.pad_middle * approach, close, across,

@@ -18,8 +18,8 @@ namespace {
 // at the end of the fast segment the tool is 2 cm behind its command, and fingers that are already
 // next to a tall object would push it over.
 constexpr double kPathMargin = 0.008;
-constexpr double kGraspMargin = 0.003;  // m, at the grasp
-constexpr double kPathStep = 0.01;      // m
+constexpr double kPickMargin = 0.003;  // m, at the grasp
+constexpr double kPathStep = 0.01;     // m
 
 }  // namespace
 
@@ -82,7 +82,7 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen, std::string& w
       if (body == target.body) continue;
       blocked = blocked ||
                 gripper_shape_->hits(grasp.pose, body_pose(world.data, body),
-                                     scene_->shape(world.id, static_cast<int>(i)), kGraspMargin);
+                                     scene_->shape(world.id, static_cast<int>(i)), kPickMargin);
     }
     if (blocked) {
       rejections.push_back({"with another object in the way"});

@@ -26,7 +26,7 @@ void chair(RoomWriter& room, const char* name, double x, double y, double back) 
   room.close_body();
 }
 
-scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make_dining(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   RoomWriter room("dining");
   write_shell_finishes(room, rng);
@@ -76,7 +76,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
 }  // namespace
 
 Generator dining_generator() {
-  return {"dining", "A table in a dining room with chairs, a rug and a window.", {}, make};
+  return {"dining", "A table in a dining room with chairs, a rug and a window.", {}, make_dining};
 }
 
 }  // namespace mjsense::tasks::scenes

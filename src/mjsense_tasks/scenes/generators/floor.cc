@@ -238,7 +238,7 @@ void write_pictures(RoomWriter& out, const FloorPlan& plan, Rng& rng) {
   }
 }
 
-scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make_floor(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   FloorPlan plan(rng);
   RoomWriter out("floor");
@@ -283,7 +283,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
 }  // namespace
 
 Generator floor_generator() {
-  return {"floor", "Four to six furnished rooms, open to each other.", {}, make};
+  return {"floor", "Four to six furnished rooms, open to each other.", {}, make_floor};
 }
 
 }  // namespace mjsense::tasks::scenes

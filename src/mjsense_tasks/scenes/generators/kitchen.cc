@@ -86,7 +86,7 @@ void clutter(RoomWriter& room, Rng& rng, double z, double y0, double wide) {
   room.close_body();
 }
 
-scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make_kitchen(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   RoomWriter room("kitchen");
   materials(room, rng);
@@ -179,7 +179,8 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
 }  // namespace
 
 Generator kitchen_generator() {
-  return {"kitchen", "A fitted kitchen: drawers, cabinets, oven, fridge, microwave.", {}, make};
+  return {
+      "kitchen", "A fitted kitchen: drawers, cabinets, oven, fridge, microwave.", {}, make_kitchen};
 }
 
 }  // namespace mjsense::tasks::scenes

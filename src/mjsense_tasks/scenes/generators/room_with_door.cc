@@ -48,7 +48,7 @@ void write_shell_of(RoomWriter& out, const Sizes& s, const HingedDoor& door) {
     write_window(out, {x, s.left, 0}, 0, kWindow, kSill, kLintel);
 }
 
-void write_materials(RoomWriter& out, Rng& rng) {
+void write_door_materials(RoomWriter& out, Rng& rng) {
   constexpr Colour kPaints[] = {{0.90, 0.89, 0.86},
                                 {0.62, 0.67, 0.66},
                                 {0.80, 0.76, 0.68},
@@ -98,7 +98,7 @@ void write_door_wall(RoomWriter& out, const Sizes& s, const HingedDoor& door, Rn
   }
 }
 
-scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make_room_with_door(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   HingedDoor door = draw_door(rng);
   if (input.parameters[0] > 0) door.width = input.parameters[0];
@@ -106,7 +106,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
   const Sizes s{rng.uniform(3.4, 4.0), rng.uniform(3.4, 4.0), rng.uniform(2.1, 2.6),
                 rng.uniform(2.1, 2.6)};
   RoomWriter out("room_with_door");
-  write_materials(out, rng);
+  write_door_materials(out, rng);
   write_shell_of(out, s, door);
   const double mid = 0.5 * (s.left - s.right);
   for (const auto& [name, x] :
@@ -167,7 +167,7 @@ Generator room_with_door_generator() {
           {{"door_width", 0, "Width (m) of the leaf; 0: drawn."},
            {"hinge_left", 0,
             "1: the hinge is on the left when pushing the door, -1: on the right; 0: drawn."}},
-          make};
+          make_room_with_door};
 }
 
 }  // namespace mjsense::tasks::scenes

@@ -30,7 +30,7 @@ void books(RoomWriter& room, Rng& rng, double x, double y0, double length, doubl
   }
 }
 
-scene::ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+scene::ModelSource make_shelf(GeneratorInput& input, SceneFileCfg& cfg) {
   Rng& rng = input.rng;
   RoomWriter room("shelf");
   write_shell_finishes(room, rng);
@@ -121,7 +121,7 @@ Generator shelf_generator() {
   return {"shelf",
           "A bookcase with boards on which objects stand.",
           {{"lowest", 0, "Height (m) of the lowest board that is used; 0: drawn."}},
-          make};
+          make_shelf};
 }
 
 }  // namespace mjsense::tasks::scenes

@@ -13,7 +13,7 @@ namespace {
 using std::numbers::pi;
 
 // Materials of the room, and textures from which `vary` can choose another one in every episode.
-void write_materials(RoomWriter& room, Rng& rng) {
+void write_table_materials(RoomWriter& room, Rng& rng) {
   write_shell_finishes(room, rng);
   write_furniture_materials(room, rng);
   write_picture(room, "painting", rng);
@@ -50,10 +50,10 @@ void write_table(RoomWriter& room) {
   room.close_body();
 }
 
-scene::ModelSource make(GeneratorInput& input, SceneFileCfg&) {
+scene::ModelSource make_table_room(GeneratorInput& input, SceneFileCfg&) {
   Rng& rng = input.rng;
   RoomWriter room("table_room");
-  write_materials(room, rng);
+  write_table_materials(room, rng);
   ShellCfg shell{.x0 = -1.9, .x1 = rng.uniform(2.2, 2.5), .y0 = -2.2, .y1 = 2.2};
   shell.window_x = rng.uniform(0.4, 0.9);
   shell.window_wide = 1.4;
@@ -84,7 +84,7 @@ scene::ModelSource make(GeneratorInput& input, SceneFileCfg&) {
 }  // namespace
 
 Generator table_room_generator() {
-  return {"table_room", "A table in a furnished room with a window.", {}, make};
+  return {"table_room", "A table in a furnished room with a window.", {}, make_table_room};
 }
 
 }  // namespace mjsense::tasks::scenes

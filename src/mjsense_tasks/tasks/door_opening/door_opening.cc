@@ -19,14 +19,14 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr std::string_view kScene = "room_with_door";
+constexpr std::string_view kDoorScene = "room_with_door";
 constexpr const char* kHandle = "door handle";
 constexpr double kNear = 1.15, kFar = 1.9;  // m, distance of the start from the leaf
 constexpr double kAside = 0.5;              // m, lateral half range of the start
 constexpr double kTurned = 0.35;            // rad, half range of the start's heading
-constexpr int kStarts = 200;                // maximum number of sampled base placements
+constexpr int kDoorStarts = 200;            // maximum number of sampled base placements
 // {0}: the door, {1}: push or pull, {2}: pushing or pulling, {3}: away from or towards.
-constexpr std::array<const char*, 14> kSentences{
+constexpr std::array<const char*, 14> kDoorSentences{
     "Open {0} by {2} it",
     "{1} open {0}",
     "{1} {0} open",
@@ -48,7 +48,7 @@ bool mentions_handle(std::string_view text) { return text.find("handle") != text
 }  // namespace
 
 DoorOpeningTask::DoorOpeningTask(episode::TaskCfg cfg)
-    : scenes::ObjectTask(std::move(cfg), kScene, kRole) {}
+    : scenes::ObjectTask(std::move(cfg), kDoorScene, kRole) {}
 
 void DoorOpeningTask::initialize_task() {
   scenes::ObjectTask::initialize_task();
@@ -95,8 +95,8 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng,
   const Side& side = sides_[episode.door];
   const Vec3 along{-side.direction.y, side.direction.x, 0};
   const bool push = rng.below(2) == 0;
-  for (int attempt = 0; attempt < kStarts; ++attempt) {
-    episode.push = attempt < kStarts / 2 ? push : !push;
+  for (int attempt = 0; attempt < kDoorStarts; ++attempt) {
+    episode.push = attempt < kDoorStarts / 2 ? push : !push;
     const Vec3 away = episode.push ? -side.direction : side.direction;
     const Vec3 at = side.middle + (rng.uniform(kNear, kFar) + footprint_->radius() - 0.5) * away +
                     rng.uniform(-kAside, kAside) * along;
@@ -147,7 +147,7 @@ std::string DoorOpeningTask::paraphrase(const World& world, Rng& rng) const {
     doors.emplace_back(left > 0 ? "the door with the handle on the left"
                                 : "the door with the handle on the right");
   }
-  const std::string_view sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  const std::string_view sentence = kDoorSentences[sentence_index(world.id, kDoorSentences.size())];
   if (mentions_handle(sentence)) std::erase_if(doors, mentions_handle);
   const bool push = pushes(world);
   return fmt::format(

@@ -20,12 +20,12 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr std::string_view kScene = "floor";
+constexpr std::string_view kNavScene = "floor";
 constexpr const char* kCamera = "head_camera";
 constexpr int kPoints = 16;
 constexpr double kFarStart = 2.0;  // m, preferred minimum distance of the start from the target
-constexpr int kStarts = 30;        // maximum number of sampled base placements
-constexpr std::array<const char*, 13> kSentences{
+constexpr int kNavStarts = 30;     // maximum number of sampled base placements
+constexpr std::array<const char*, 13> kNavSentences{
     "Navigate to {}",     "Drive to {}",        "Go to {}",          "Move to {}",
     "Drive up to {}",     "Go near {}",         "Approach {}",       "Find {} and go to it",
     "Head over to {}",    "Please drive to {}", "Can you go to {}?", "Could you find {}?",
@@ -34,7 +34,7 @@ constexpr std::array<const char*, 13> kSentences{
 }  // namespace
 
 NavToObjTask::NavToObjTask(episode::TaskCfg cfg)
-    : scenes::ObjectTask(std::move(cfg), kScene, kRole) {}
+    : scenes::ObjectTask(std::move(cfg), kNavScene, kRole) {}
 
 // Uses the robot's head camera if it has one, otherwise its first recorded camera.
 void NavToObjTask::find_camera() {
@@ -125,10 +125,10 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed,
                                               const robots::StateRow& state, Rng& rng) const {
   const double* at = state.qpos + free_qpos(model(), this->object(world).body);
   const auto distance = [at](double x, double y) { return std::hypot(x - at[0], y - at[1]); };
-  for (int attempt = 0; attempt < kStarts && !places_.empty(); ++attempt) {
+  for (int attempt = 0; attempt < kNavStarts && !places_.empty(); ++attempt) {
     const auto [x, y] = places_[rng.below(static_cast<std::uint32_t>(places_.size()))];
     const scenes::BasePose from{x, y, rng.uniform(-pi, pi)};
-    if (attempt < kStarts / 2 && distance(x, y) < kFarStart) continue;
+    if (attempt < kNavStarts / 2 && distance(x, y) < kFarStart) continue;
     if (!routes_->free(from)) continue;
     const auto path = routes_->find(
         from, [&](const scenes::BasePose& p) { return distance(p.x, p.y) < arrived_; },
@@ -203,7 +203,7 @@ std::string NavToObjTask::paraphrase(const World& world, Rng& rng) const {
       scenes::draw_reference(scenes::object_references(world, scene(), targets_[world.id],
                                                        robot().base_pose(world), {}, true),
                              rng);
-  const char* sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  const char* sentence = kNavSentences[sentence_index(world.id, kNavSentences.size())];
   return object.empty() ? "" : fmt::format(fmt::runtime(sentence), object);
 }
 

@@ -16,7 +16,7 @@
 namespace mjsense::tasks {
 namespace {
 
-constexpr std::string_view kScene = "kitchen";
+constexpr std::string_view kOpeningScene = "kitchen";
 // Fractions of the range that planners aim at: a drawer is pulled far out, and a door is swung
 // until it is clearly open.
 constexpr double kAimSlide = 0.55, kAimHinge = 0.38;
@@ -82,7 +82,7 @@ constexpr std::array<const char*, 24> kCloseSentences{
 }  // namespace
 
 OpeningTask::OpeningTask(episode::TaskCfg cfg, OpeningKind kind)
-    : scenes::ObjectTask(std::move(cfg), kScene, kRole), kind_(kind) {}
+    : scenes::ObjectTask(std::move(cfg), kOpeningScene, kRole), kind_(kind) {}
 
 void OpeningTask::initialize_task() {
   scenes::ObjectTask::initialize_task();

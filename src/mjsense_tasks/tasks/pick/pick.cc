@@ -20,28 +20,28 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr std::string_view kScene = "varied_table";
-constexpr double kLift = 0.01;  // m, lift at which the task succeeds
-constexpr double kGoal = 0.05;  // m, goal above the start
-constexpr std::array<const char*, 15> kSentences{"Pick up {}",
-                                                 "Pick up {} for me",
-                                                 "Lift {}",
-                                                 "Lift up {}",
-                                                 "Grasp {} and lift it",
-                                                 "Grab {}",
-                                                 "Take {}",
-                                                 "Take hold of {} and raise it",
-                                                 "Get {}",
-                                                 "Please pick up {}",
-                                                 "Can you pick up {}?",
-                                                 "Could you lift {} for me?",
-                                                 "I need {}. Please pick it up",
-                                                 "Reach for {} and pick it up",
-                                                 "Raise {}"};
+constexpr std::string_view kPickScene = "varied_table";
+constexpr double kLift = 0.01;      // m, lift at which the task succeeds
+constexpr double kPickGoal = 0.05;  // m, goal above the start
+constexpr std::array<const char*, 15> kPickSentences{"Pick up {}",
+                                                     "Pick up {} for me",
+                                                     "Lift {}",
+                                                     "Lift up {}",
+                                                     "Grasp {} and lift it",
+                                                     "Grab {}",
+                                                     "Take {}",
+                                                     "Take hold of {} and raise it",
+                                                     "Get {}",
+                                                     "Please pick up {}",
+                                                     "Can you pick up {}?",
+                                                     "Could you lift {} for me?",
+                                                     "I need {}. Please pick it up",
+                                                     "Reach for {} and pick it up",
+                                                     "Raise {}"};
 
 }  // namespace
 
-PickTask::PickTask(episode::TaskCfg cfg) : scenes::ObjectTask(std::move(cfg), kScene, kRole) {}
+PickTask::PickTask(episode::TaskCfg cfg) : scenes::ObjectTask(std::move(cfg), kPickScene, kRole) {}
 
 void PickTask::initialize_task() {
   scenes::ObjectTask::initialize_task();
@@ -131,7 +131,7 @@ std::string PickTask::description(int world) const { return "Pick up the " + obj
 std::string PickTask::paraphrase(const World& world, Rng& rng) const {
   const std::string object = scenes::draw_reference(
       scenes::object_references(world, scene(), targets_[world.id], robot().base_pose(world)), rng);
-  const char* sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  const char* sentence = kPickSentences[sentence_index(world.id, kPickSentences.size())];
   return object.empty() ? "" : fmt::format(fmt::runtime(sentence), object);
 }
 
@@ -141,13 +141,13 @@ episode::Task::Referrals PickTask::referrals(int world) const {
 
 std::optional<Pose> PickTask::goal_pose(int world, std::string_view role) const {
   Pose pose = start_pose(world, role);
-  pose.p.z += kGoal;
+  pose.p.z += kPickGoal;
   return pose;
 }
 
 void PickTask::write_info(const World& world, JsonWriter& json) const {
   const int body = object(world.id).body;
-  const Vec3 goal = start(world.id).p + Vec3{0, 0, kGoal};
+  const Vec3 goal = start(world.id).p + Vec3{0, 0, kPickGoal};
   json.key("episode_step").value(episode_step(world.id));
   json.key("position_error").value(norm(vec3(world.data->xpos + 3 * body) - goal));
   json.key("rotation_error")

@@ -18,8 +18,8 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr std::string_view kScene = "tableware";
-constexpr double kGoal = 0.03;                       // m, goal above the start
+constexpr std::string_view kPlacingScene = "tableware";
+constexpr double kPlacingGoal = 0.03;                // m, goal above the start
 constexpr double kMoved = 0.1, kMovedBeside = 0.05;  // m, maximum displacement of the receptacle
 constexpr double kTurned = 45 * pi / 180;            // rad, maximum tilt or rotation of it
 constexpr double kBeside = 0.05 + 0.01;              // m, maximum horizontal gap
@@ -38,7 +38,7 @@ constexpr int kMaxCells = 6;       // along each side of an object
 
 // {0}: the object, {1}: where it is put ("next to the plate"), {2}: where it is moved to ("into the
 // box").
-constexpr std::array<const char*, 14> kSentences{
+constexpr std::array<const char*, 14> kPlacingSentences{
     "Pick up {0} and place it {1}",
     "Put {0} {1}",
     "Place {0} {1}",
@@ -67,7 +67,7 @@ const std::string& noun(const scenes::SceneObject& object) {
 }  // namespace
 
 PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, episode::TaskCfg cfg)
-    : scenes::SceneTask(std::move(cfg), kScene), kind_(kind) {}
+    : scenes::SceneTask(std::move(cfg), kPlacingScene), kind_(kind) {}
 
 std::string_view PickAndPlaceTask::name() const {
   switch (kind_) {
@@ -401,7 +401,7 @@ std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
   } else if (is_any(kOnTop)) {
     at = "on ", to = "onto ";
   }
-  const char* sentence = kSentences[sentence_index(world.id, kSentences.size())];
+  const char* sentence = kPlacingSentences[sentence_index(world.id, kPlacingSentences.size())];
   return fmt::format(fmt::runtime(sentence), object, at + where, to + where);
 }
 
@@ -432,7 +432,7 @@ Pose PickAndPlaceTask::start_pose(int world, std::string_view role) const {
 std::optional<Pose> PickAndPlaceTask::goal_pose(int world, std::string_view role) const {
   Pose pose = start_pose(world, role);
   if (role == kReceptacle) return {};
-  pose.p.z += kGoal;
+  pose.p.z += kPlacingGoal;
   return pose;
 }
 

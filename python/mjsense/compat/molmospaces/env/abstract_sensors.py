@@ -8,8 +8,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mjsense.sensors import suite
 from mjsense.sensors.sensor import Sensor
-from mjsense.sensors.suite import SensorSuite
 
 
 class CoreSensor(Sensor):
@@ -23,6 +23,16 @@ class CoreSensor(Sensor):
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
         raise RuntimeError(f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()")
+
+
+class SensorSuite(suite.SensorSuite):
+    """A suite that raises AssertionError, as MolmoSpaces does, if a name is in use."""
+
+    def add(self, sensor: Any) -> None:
+        """Adds a sensor."""
+        if (uuid := getattr(sensor, "uuid", None)) in self.sensors:
+            raise AssertionError(f"'{uuid}' is a duplicated sensor uuid")
+        super().add(sensor)
 
 
 __all__ = ["Sensor", "SensorSuite"]

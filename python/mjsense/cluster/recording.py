@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings on Ray with the arguments, the progress and the result of :func:`mjsense.record`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mjsense.cluster.driver import ClusterProgress, record_on_ray
+from mjsense.cluster.job import Job
+from mjsense.core.progress_line import line_of
+from mjsense.tasks.record_job import RecordProgress, RecordSummary, of_recording
+
+
+def record_from_options(options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
+    """``mjsense.record(..., ray=address)``."""
+    own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
+    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
+        del options[name]
+    if not options["threads"]:
+        del options["threads"]  # one per worker
+
+    def counts(now: ClusterProgress) -> dict[str, Any]:
+        return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
+                "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
+
+    line = line_of(progress)
+
+    def show(now: ClusterProgress) -> None:
+        about = RecordProgress(**counts(now), seconds_left=math.nan)
+        if callable(progress):
+            progress(about)
+        elif line is not None:
+            line.show(of_recording(about))
+
+    made = record_on_ray(Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"], resume=own["resume"],
+                         address=address, progress=show)  # fmt: skip
+    return RecordSummary(**counts(made), seconds_left=0.0, interrupted=False, enough=made.enough, failures=made.failures, lengths=[], times={},
+                         published_bytes=0, path=Path(own["out"]))  # fmt: skip
