@@ -26,7 +26,7 @@ class View(NamedTuple):
     scene: str
     robot: str = "franka"
     steps: int = 45
-    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # m, camera; None: the robot's camera_follower
+    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # m, camera; None: the robot's head_camera
     target: tuple[float, float, float] = (0.7, 0.0, 0.6)
     seed: int = 3
 
@@ -60,7 +60,7 @@ VIEWS = {
     "task_close": in_kitchen("close", steps=75),
     "task_door_opening": View("door_opening", "room_with_door", "rby1", steps=165, pos=None),
     "task_multi_task": in_kitchen("open+pick", steps=60),
-    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=40, pos=None, seed=4),
+    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=70, pos=None, seed=4),
 }  # fmt: skip
 
 
@@ -74,7 +74,7 @@ def write_jpeg(path: Path, pixels: np.ndarray) -> None:
 
 def picture(view: View) -> np.ndarray:
     """Two episodes side by side, [H, 2 W, 3]."""
-    where = 'mount = "mjcf"\ncamera = "camera_follower"\n'
+    where = 'mount = "mjcf"\ncamera = "head_camera"\n'
     if view.pos is not None:
         where = f'mount = "fixed"\npos = {list(view.pos)}\ntarget = {list(view.target)}\nfovy = 62\n'
     with tempfile.TemporaryDirectory() as folder:

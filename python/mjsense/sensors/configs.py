@@ -120,8 +120,8 @@ class TerrainCfg(config_methods.Config):
     seed: int = 0
     """Seed of the tile shapes and of the worlds' start tiles."""
     daylight: bool = True
-    """Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none. False: MuJoCo's headlight is
-    the only light."""
+    """Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none; lights that a robot carries,
+    or that follow a body, do not count. False: MuJoCo's headlight is the only light that is added."""
 
 
 @dataclass
@@ -330,6 +330,8 @@ class CameraSensorCfg(SensorCfg):
     """Distance of the far plane from the camera plane; 0: no limit. [m]"""
     clip_near: Literal["none", "model"] = "none"
     """model: clip at the near plane of MuJoCo's renderers, ``visual/map/znear`` times the model's extent."""
+    clip_far: Literal["none", "model"] = "none"
+    """model: clip at the far plane of MuJoCo's renderers, ``visual/map/zfar`` times the model's extent."""
     update_period: float = 0.0
     """Time between images; 0: a new image at every read. [s]"""
     phase: float = 0.0

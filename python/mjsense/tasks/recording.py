@@ -46,7 +46,7 @@ def record(
     perturb: float = 0.0,
     instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
-    max_penetration: float = 0.004,
+    max_penetration: float | None = None,
     episodes: int = 1,
     max_attempts: int = 0,
     num_attempts: int = 0,
@@ -118,7 +118,8 @@ def record(
             distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
         max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
-            any depth. Pairs of geoms that are deeper at the start do not count. [m]
+            any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
+            deeper at the start do not count. [m]
         episodes: Number of episodes to keep.
         max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
         num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
