@@ -13,7 +13,9 @@ print(f"{summary.kept} episodes, {summary.frames} frames in {summary.seconds:.1f
 dataset = mjs.Dataset(summary.path)
 sample = dataset[10]
 print("observed:", ", ".join(name for name in sample if name.startswith("obs/")))
-print("image:", sample["obs/sensor_data/wrist_camera"].shape, "joints:", sample["obs/agent/qpos/arm"].shape, "task:", sample["task"])
+print(
+    "image:", sample["obs/sensor_data/wrist_camera"].shape, "joints:", sample["obs/agent/qpos/arm"].shape, "task:", sample["task"]
+)
 print("success at step", int(dataset.episodes[0]["success"].argmax()))
 
 env = mjs.make_vec("pick", num_envs=2, policy="planner", cameras=[], seed=7)

@@ -114,16 +114,18 @@ from mjsense.tasks.teleoperation import play
 from mjsense.tasks.vector import make_vec
 from mjsense.viewer import plot, view
 
-later_rooms.provide({
-    "env": "mjsense.compat.peer.env:PeerEnv",
-    "foreign_sensor": "mjsense.compat.peer.per_world:foreign_sensor",
-    "record_on_ray": "mjsense.cluster.recording:record_from_options",
-    "sensor_adapters": "mjsense.compat.sensor_adapters:ADAPTERS",
-    "task_names": "mjsense.tasks.task:task_names",
-    "task_source": "mjsense.tasks.viewer_source:task_source",
-    "warp_environment": "mjsense.warp.start:environment",
-    "warp_simulation": "mjsense.warp.start:simulation",
-})
+later_rooms.provide(
+    {
+        "env": "mjsense.compat.peer.env:PeerEnv",
+        "foreign_sensor": "mjsense.compat.peer.per_world:foreign_sensor",
+        "record_on_ray": "mjsense.cluster.recording:record_from_options",
+        "sensor_adapters": "mjsense.compat.sensor_adapters:ADAPTERS",
+        "task_names": "mjsense.tasks.task:task_names",
+        "task_source": "mjsense.tasks.viewer_source:task_source",
+        "warp_environment": "mjsense.warp.start:environment",
+        "warp_simulation": "mjsense.warp.start:simulation",
+    }
+)
 
 installed_files.name_package_folders()
 

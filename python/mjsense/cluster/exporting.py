@@ -62,7 +62,9 @@ def export_on_ray(
     return Path(out)
 
 
-def _export_parts(ray: Any, format: str, out: Path, source: Source, options: dict[str, Any], progress: Callable[[int, int], None] | None) -> None:
+def _export_parts(
+    ray: Any, format: str, out: Path, source: Source, options: dict[str, Any], progress: Callable[[int, int], None] | None
+) -> None:
     if out.exists():
         raise FileExistsError(f"{out} exists; name another output, or delete it")
     with own_folder(out.absolute().with_name(f"{out.name}.parts"), f"another process writes {out}") as folder:
@@ -70,11 +72,20 @@ def _export_parts(ray: Any, format: str, out: Path, source: Source, options: dic
 
 
 def _join_parts(
-    ray: Any, format: str, out: Path, folder: Path, source: Source, options: dict[str, Any], progress: Callable[[int, int], None] | None
+    ray: Any,
+    format: str,
+    out: Path,
+    folder: Path,
+    source: Source,
+    options: dict[str, Any],
+    progress: Callable[[int, int], None] | None,
 ) -> None:
     module = module_of(format)
     ends = [*range(_CHUNK, len(source), _CHUNK), len(source)]
-    calls = [(format, module.__name__, source.part(begin, end), str(folder / str(end)), options) for begin, end in zip([0, *ends], ends)]
+    calls = [
+        (format, module.__name__, source.part(begin, end), str(folder / str(end)), options)
+        for begin, end in zip([0, *ends], ends)
+    ]
 
     def parts(written: Iterator[Any]) -> Iterator[Path]:
         """The parts in their order, which are deleted when the next one is wanted."""

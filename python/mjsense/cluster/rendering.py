@@ -47,7 +47,12 @@ class _Rendering:
         render(self.root, folder, episodes=chosen, **{"threads": 1, **self.arguments, "progress": False})
         episodes = Dataset(folder).episodes
         succeeded = sum(episode.success for episode in episodes)
-        return {"succeeded": succeeded, "failed": len(episodes) - succeeded, "steps": sum(e.length for e in episodes), "failures": {}}
+        return {
+            "succeeded": succeeded,
+            "failed": len(episodes) - succeeded,
+            "steps": sum(e.length for e in episodes),
+            "failures": {},
+        }
 
 
 def _text(value: Any) -> str:
@@ -91,5 +96,8 @@ def render_on_ray(
     if invalid := [i for i in positions if not 0 <= i < count]:
         raise ValueError(f"episodes: {invalid[0]} is not in {root}, which has {count} episodes")
     job = _Rendering(absolute(root), absolute(out), positions, options)
-    shards = [Shard(n, first, min(shard_episodes, len(positions) - first)) for n, first in enumerate(range(0, len(positions), shard_episodes))]
+    shards = [
+        Shard(n, first, min(shard_episodes, len(positions) - first))
+        for n, first in enumerate(range(0, len(positions), shard_episodes))
+    ]
     return run_job(job, shards, len(positions), {"shard_episodes": shard_episodes}, address, resume, runtime_env, progress)

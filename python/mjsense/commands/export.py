@@ -22,8 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("format", choices=FORMATS, metavar="FORMAT", help=f"{formats}.")
     parser.add_argument("path", metavar="IN", help="A recording.")
     parser.add_argument("out", metavar="OUT", help="Output, which must not exist.")
-    parser.add_argument("--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras.")
-    parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
+    parser.add_argument(
+        "--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras."
+    )
+    parser.add_argument(
+        "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
+    )
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
     for name, option in OPTIONS.items():
         switch = argparse.BooleanOptionalAction if option.default is None else "store_true"

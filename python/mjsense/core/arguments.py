@@ -69,9 +69,14 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Iterable[str]": (_is_iterable_of_str, "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),
-    "Tasks": (lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task") or hasattr(value, "_mjs_compose"), "a mjsense.Task or the name of one"),
+    "Tasks": (
+        lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task") or hasattr(value, "_mjs_compose"),
+        "a mjsense.Task or the name of one",
+    ),
     "Policies": (
-        lambda value: value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy") or hasattr(value, "_mjs_policy"),
+        lambda value: (
+            value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy") or hasattr(value, "_mjs_policy")
+        ),
         "a mjsense.Policy, a function, or the name of one",
     ),
     "Scenes": (

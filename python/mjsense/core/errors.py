@@ -11,6 +11,7 @@ def printable(text: str) -> str:
     """Replaces control characters and bidirectional marks by '?', because names come from untrusted files."""
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
+
 _NUMBER_OF_WORLDS = {"num_worlds", "num_envs", "worlds"}  # Gymnasium's and mjlab's word is num_envs
 
 

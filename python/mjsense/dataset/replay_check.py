@@ -100,7 +100,9 @@ class ReplayReport:
                     reasons.setdefault(reason, set()).add(name)
             lines += [f"not computed: {', '.join(sorted(names))}: {reason}" for reason, names in sorted(reasons.items())]
         for e in self.episodes:
-            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()] + [f"  {e.refused}"] * bool(e.refused)
+            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()] + [
+                f"  {e.refused}"
+            ] * bool(e.refused)
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -142,7 +144,9 @@ def _deviation(stepper: Stepper, t: int, recorded: np.ndarray, replayed: np.ndar
         return None
     first = int(differs.argmax())
     part, i = stepper.part(first)
-    return Deviation(t, part, _element(stepper.model, part, i), float(recorded[first]), float(replayed[first]), int(differs.sum()))
+    return Deviation(
+        t, part, _element(stepper.model, part, i), float(recorded[first]), float(replayed[first]), int(differs.sum())
+    )
 
 
 def _stepper(episode: Episode) -> Stepper:

@@ -68,12 +68,18 @@ OPTIONS = {
 _LEROBOT = ("trim_idle", "exact_rate")
 FORMATS = {
     "lerobot": Format("LeRobot v3.0", "`lerobot` 0.4 and newer", "export", "pyarrow", _LEROBOT, while_recording=True),
-    "lerobot21": Format("LeRobot v2.1 with meta/modality.json, as GR00T reads it", "`lerobot` 0.3, GR00T", "export", "pyarrow", _LEROBOT),
-    "robomimic": Format("one HDF5 file of robomimic, with simulator states and models", "robomimic", "robomimic", "h5py", ("trim_idle",)),
+    "lerobot21": Format(
+        "LeRobot v2.1 with meta/modality.json, as GR00T reads it", "`lerobot` 0.3, GR00T", "export", "pyarrow", _LEROBOT
+    ),
+    "robomimic": Format(
+        "one HDF5 file of robomimic, with simulator states and models", "robomimic", "robomimic", "h5py", ("trim_idle",)
+    ),
     "rlds": Format("RLDS for tensorflow-datasets", "Octo, OpenVLA, openpi", "rlds", "google_crc32c", ("trim_idle",)),
     "zarr": Format("Zarr 2, as Diffusion Policy reads it", "Diffusion Policy", "zarr", "zarr", ("trim_idle",)),
     "rerun": Format("files for the Rerun viewer, one for each episode", "the Rerun viewer", "rerun", "rerun"),
-    "mcap": Format("MCAP files with Foxglove's schemas, one for each episode", "Foxglove", "mcap", "mcap_protobuf", ("encode_again",)),
+    "mcap": Format(
+        "MCAP files with Foxglove's schemas, one for each episode", "Foxglove", "mcap", "mcap_protobuf", ("encode_again",)
+    ),
 }
 """The formats by name. A module of another package adds its own line, ``FORMATS["name"] = Format(..., module="package.module")``."""
 

@@ -170,7 +170,10 @@ class Writer:
                     place, first = videos.add(path, video.fps, frames, length)
                 histograms[key] = image_histograms(episode, self._source.cameras[camera])
             entry |= {f"videos/{key}/{name}": value for name, value in place.items()}
-            entry |= {f"videos/{key}/from_timestamp": first, f"videos/{key}/to_timestamp": first + length / float(self._source.fps)}
+            entry |= {
+                f"videos/{key}/from_timestamp": first,
+                f"videos/{key}/to_timestamp": first + length / float(self._source.fps),
+            }
         for name, found in self._statistics.add(columns, histograms).items():
             entry |= {f"stats/{name}/{key}": value for key, value in found.items()}
         entry |= {f"meta/episodes/{name}": value for name, value in self._episodes.place.items()}
@@ -208,12 +211,20 @@ class Writer:
         _write_tasks(self._path / "meta/tasks.parquet", self._tasks)
         write_json(self._path / "meta/stats.json", self._statistics.all())
         info = {
-            "codebase_version": "v3.0", "robot_type": self._source.robot or None, "total_episodes": self._count, "total_frames": self._frames,
-            "total_tasks": len(self._tasks), "chunks_size": FILES_PER_CHUNK, "data_files_size_in_mb": DATA_FILE_MB,
-            "video_files_size_in_mb": VIDEO_FILE_MB, "fps": number(self._source.fps), "splits": {"train": f"0:{self._count}"},
-            "data_path": f"data/{_PLACE}.parquet", "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
+            "codebase_version": "v3.0",
+            "robot_type": self._source.robot or None,
+            "total_episodes": self._count,
+            "total_frames": self._frames,
+            "total_tasks": len(self._tasks),
+            "chunks_size": FILES_PER_CHUNK,
+            "data_files_size_in_mb": DATA_FILE_MB,
+            "video_files_size_in_mb": VIDEO_FILE_MB,
+            "fps": number(self._source.fps),
+            "splits": {"train": f"0:{self._count}"},
+            "data_path": f"data/{_PLACE}.parquet",
+            "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
             "features": features_of(self._source, self._codec),
-        }  # fmt: skip
+        }
         write_json(self._path / self.LAST_FILE, info)
 
 
@@ -223,5 +234,7 @@ def _write_tasks(path: Path, tasks: list[str]) -> None:
     column = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object", "metadata": None}
     index = {"name": "task_index", "field_name": "task_index", "pandas_type": "int64", "numpy_type": "int64", "metadata": None}
     about = {"index_columns": ["task"], "column_indexes": [], "columns": [index, column], "pandas_version": "2.0.0"}
-    table = pa.table({"task_index": list(range(len(tasks))), "task": tasks}).replace_schema_metadata({"pandas": json.dumps(about)})
+    table = pa.table({"task_index": list(range(len(tasks))), "task": tasks}).replace_schema_metadata(
+        {"pandas": json.dumps(about)}
+    )
     needs("pyarrow.parquet").write_table(table, in_folder(path))

@@ -63,24 +63,42 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
                 copy.add(file, video.fps, frames, episode.length - 1)
                 copy.close()
             histograms[image_key(camera)] = image_histograms(episode, source.cameras[camera])
-        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1,
-                        "trimmed_steps": episode.trimmed_steps, "recorded_fps": float(source.recorded_fps)})  # fmt: skip
+        entries.append(
+            {
+                "episode_index": position,
+                "tasks": [episode.task],
+                "length": episode.length - 1,
+                "trimmed_steps": episode.trimmed_steps,
+                "recorded_fps": float(source.recorded_fps),
+            }
+        )
         found.append({"episode_index": position, "stats": statistics.add(columns, histograms)})
         first += episode.length - 1
     _write_lines(path / "meta/episodes.jsonl", entries)
     _write_lines(path / "meta/episodes_stats.jsonl", found)
     _write_lines(path / "meta/tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(source.tasks)])
     # GR00T's loader takes the numbers of a move group out of every statistic, so each must have as many as the column.
-    write_json(path / "meta/stats.json", {name: {key: value for key, value in found.items() if key != "count"} for name, found in statistics.all().items()})
+    write_json(
+        path / "meta/stats.json",
+        {name: {key: value for key, value in found.items() if key != "count"} for name, found in statistics.all().items()},
+    )
     write_json(path / "meta/modality.json", modality)
     count = len(source)
     info = {
-        "codebase_version": "v2.1", "robot_type": source.robot or None, "total_episodes": count, "total_frames": first,
-        "total_tasks": len(source.tasks), "total_videos": count * len(source.cameras), "total_chunks": -(-count // FILES_PER_CHUNK),
-        "chunks_size": FILES_PER_CHUNK, "fps": number(source.fps), "splits": {"train": f"0:{count}"}, "data_path": _DATA,
+        "codebase_version": "v2.1",
+        "robot_type": source.robot or None,
+        "total_episodes": count,
+        "total_frames": first,
+        "total_tasks": len(source.tasks),
+        "total_videos": count * len(source.cameras),
+        "total_chunks": -(-count // FILES_PER_CHUNK),
+        "chunks_size": FILES_PER_CHUNK,
+        "fps": number(source.fps),
+        "splits": {"train": f"0:{count}"},
+        "data_path": _DATA,
         "video_path": _VIDEO if source.cameras else None,
         "features": features_of(source, codec) | {f"annotation.{_INSTRUCTION}": {"dtype": "int64", "shape": [1], "names": None}},
-    }  # fmt: skip
+    }
     write_json(path / "meta/info.json", info)
 
 

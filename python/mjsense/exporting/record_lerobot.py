@@ -60,7 +60,9 @@ def converted(
     final, mapping = Path(out), Mapping.of(map)
     if not format_of(format).while_recording:
         known = ", ".join(name for name, one in FORMATS.items() if one.while_recording)
-        raise ValueError(f"format '{format}' cannot be written during a recording, only {known}: record first, and export the recording")
+        raise ValueError(
+            f"format '{format}' cannot be written during a recording, only {known}: record first, and export the recording"
+        )
     for module in ("av", format_of(format).library):
         needs(module, format_of(format).extra)
     writer = module_of(format).Writer

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of the Rerun viewer. They have these entities:
 
-    task                            the instruction
-    features/NAME                   a curve for each number
-    world/cameras/NAME              pose and focal length of a camera, if they are known
-    world/cameras/NAME/colour       its images or video; also /depth and other images of the camera
-    world/scene/BODY                pose of a body; its name begins with its number in the model
-    world/scene/BODY/GEOM           a geom of it; its name begins with its number in the body
+task                            the instruction
+features/NAME                   a curve for each number
+world/cameras/NAME              pose and focal length of a camera, if they are known
+world/cameras/NAME/colour       its images or video; also /depth and other images of the camera
+world/scene/BODY                pose of a body; its name begins with its number in the model
+world/scene/BODY/GEOM           a geom of it; its name begins with its number in the body
 """
 
 from __future__ import annotations
@@ -91,7 +91,9 @@ class RerunFile:
         """Logs the present pose of a body. ``quat`` is wxyz."""
         self.stream.log(body, self._transform(position, quat))
 
-    def mesh(self, place: str, position: np.ndarray, quat: np.ndarray, *, vertices: np.ndarray, faces: np.ndarray, **looks: Any) -> None:
+    def mesh(
+        self, place: str, position: np.ndarray, quat: np.ndarray, *, vertices: np.ndarray, faces: np.ndarray, **looks: Any
+    ) -> None:
         """Logs a geom, in the frame of its body.
 
         Args:
@@ -136,7 +138,10 @@ def _blueprint(source: Source, episode: Episode) -> Any:
         eye = None
     cameras = [rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name) for name in source.cameras]
     curves = [rrb.TimeSeriesView(origin=f"features/{name}", name=name) for name in source.features]
-    shown = ["$origin/**", *(f"- $origin/cameras/{name}/depth" for name in source.cameras)]  # depth images would cover the scene with points
+    shown = [
+        "$origin/**",
+        *(f"- $origin/cameras/{name}/depth" for name in source.cameras),
+    ]  # depth images would cover the scene with points
     scene = rrb.Spatial3DView(origin="world", name="scene", contents=shown, eye_controls=eye)
     left = rrb.Vertical(scene, rrb.TextDocumentView(origin="task", name="task"), row_shares=[9, 1])
     right = rrb.Vertical(*cameras, rrb.Tabs(*curves)) if cameras else rrb.Tabs(*curves)
@@ -144,13 +149,18 @@ def _blueprint(source: Source, episode: Episode) -> Any:
 
 
 def _times(rr: Any, source: Source, rows: int) -> list[Any]:
-    return [rr.TimeColumn("time", duration=[float(t / source.fps) for t in range(rows)]), rr.TimeColumn("frame", sequence=range(rows))]
+    return [
+        rr.TimeColumn("time", duration=[float(t / source.fps) for t in range(rows)]),
+        rr.TimeColumn("frame", sequence=range(rows)),
+    ]
 
 
 def _log_features(rr: Any, stream: Any, source: Source, episode: Episode) -> None:
     for name, rows in source.rows(episode).items():
         stream.log(f"features/{name}", rr.SeriesLines(names=list(source.features[name].names)), static=True)
-        stream.send_columns(f"features/{name}", _times(rr, source, len(rows)), rr.Scalars.columns(scalars=rows.astype(np.float64)))
+        stream.send_columns(
+            f"features/{name}", _times(rr, source, len(rows)), rr.Scalars.columns(scalars=rows.astype(np.float64))
+        )
 
 
 def _log_camera(rr: Any, stream: Any, source: Source, episode: Episode, name: str) -> None:
@@ -158,7 +168,9 @@ def _log_camera(rr: Any, stream: Any, source: Source, episode: Episode, name: st
     video.check()
     asset = rr.AssetVideo(path=video.path)
     stream.log(f"{place}/colour", asset, static=True)
-    frames = rr.VideoFrameReference.columns(timestamp=[rr.components.VideoTimestamp(nanoseconds=int(t)) for t in asset.read_frame_timestamps_nanos()])
+    frames = rr.VideoFrameReference.columns(
+        timestamp=[rr.components.VideoTimestamp(nanoseconds=int(t)) for t in asset.read_frame_timestamps_nanos()]
+    )
     stream.send_columns(f"{place}/colour", times, frames)
     poses = _camera_poses(source, episode, name)
     if poses is None:
@@ -192,7 +204,9 @@ def _log_scene(rr: Any, stream: Any, source: Source, episode: Episode) -> None:
             stream.log(geom_entity(place, shape.number, shape.name), _drawn(rr, shape), static=True)
         quats = body.quats[:, [1, 2, 3, 0]]
         if body.moves:
-            stream.send_columns(place, _times(rr, source, episode.length), rr.Transform3D.columns(translation=body.positions, quaternion=quats))
+            stream.send_columns(
+                place, _times(rr, source, episode.length), rr.Transform3D.columns(translation=body.positions, quaternion=quats)
+            )
         else:
             stream.log(place, rr.Transform3D(translation=body.positions[0], quaternion=quats[0]), static=True)
 
@@ -206,7 +220,9 @@ def _drawn(rr: Any, shape: Shape) -> Any:
     """Rerun's shape."""
     x, _, z = shape.size
     if shape.triangles is not None:
-        corners = shape.triangles.reshape(-1, 3) @ shape.rotation.T + shape.position  # each triangle has its own, so that edges are sharp
+        corners = (
+            shape.triangles.reshape(-1, 3) @ shape.rotation.T + shape.position
+        )  # each triangle has its own, so that edges are sharp
         normals = np.repeat(np.cross(corners[1::3] - corners[::3], corners[2::3] - corners[::3]), 3, 0)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return rr.Mesh3D(vertex_positions=corners, vertex_normals=normals, albedo_factor=shape.rgba)

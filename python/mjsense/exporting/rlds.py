@@ -43,11 +43,18 @@ def _write_data_set(source: Source, records: Iterable[bytes], path: Path) -> Non
     name = path.name
     observed = [feature for feature in source.features if not source.features[feature].of_step]
     others = [feature for feature in source.features if source.features[feature].of_step and feature not in FLAGS]
-    check_names([*((key, f"RLDS's '{key}'") for key in _OWN), *((feature, f"the feature '{feature}'") for feature in others),
-                 *named_streams(source, observed, "observation/")])  # fmt: skip
+    check_names(
+        [
+            *((key, f"RLDS's '{key}'") for key in _OWN),
+            *((feature, f"the feature '{feature}'") for feature in others),
+            *named_streams(source, observed, "observation/"),
+        ]
+    )
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         valid = re.sub(r"\W+", "_", name.lower())
-        raise ValueError(f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'")
+        raise ValueError(
+            f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'"
+        )
     folder = path / _VERSION
     folder.mkdir(parents=True)
     shards: list[list[int]] = []  # bytes of the examples of each shard
@@ -59,8 +66,12 @@ def _write_data_set(source: Source, records: Iterable[bytes], path: Path) -> Non
         shards[-1].append(len(record) - _FRAME_BYTES)
     for k in range(len(shards)):
         (folder / f"shard_{k}").rename(folder / f"{name}-train.tfrecord-{k:05d}-of-{len(shards):05d}")
-    split = {"name": "train", "filepathTemplate": "{DATASET}-{SPLIT}.{FILEFORMAT}-{SHARD_X_OF_Y}",
-             "shardLengths": [str(len(shard)) for shard in shards], "numBytes": str(sum(sum(shard) for shard in shards))}  # fmt: skip
+    split = {
+        "name": "train",
+        "filepathTemplate": "{DATASET}-{SPLIT}.{FILEFORMAT}-{SHARD_X_OF_Y}",
+        "shardLengths": [str(len(shard)) for shard in shards],
+        "numBytes": str(sum(sum(shard) for shard in shards)),
+    }
     about = f"{len(source)} episodes of the robot {source.robot} at {source.fps} observations per second, recorded with mjsense."
     info = {"name": name, "version": _VERSION, "description": about, "fileFormat": "tfrecord", "splits": [split]}
     (folder / "dataset_info.json").write_text(json.dumps(info, indent=2))
@@ -77,7 +88,11 @@ def _dict(features: dict[str, Any]) -> dict[str, Any]:
 def _tensor(dtype: str, shape: tuple[int, ...] = (), description: str = "") -> dict[str, Any]:
     kind = "tensor_feature.Tensor" if shape else "scalar.Scalar"
     dimensions = {"dimensions": [str(n) for n in shape]} if shape else {}
-    return {"pythonClassName": _MODULE + kind, "tensor": {"dtype": dtype, "encoding": "none", "shape": dimensions}, "description": description}
+    return {
+        "pythonClassName": _MODULE + kind,
+        "tensor": {"dtype": dtype, "encoding": "none", "shape": dimensions},
+        "description": description,
+    }
 
 
 def _image(dtype: str, shape: tuple[int, ...], description: str = "") -> dict[str, Any]:
@@ -100,13 +115,26 @@ def _features(source: Source) -> dict[str, Any]:
     step |= {"reward": _tensor("float32"), "discount": _tensor("float32"), "language_instruction": _text()}
     for name, feature in source.features.items():
         if name not in FLAGS:
-            (step if feature.of_step else observation)[name] = _tensor(_stored(feature.dtype), (feature.size,), ", ".join(feature.names))
+            (step if feature.of_step else observation)[name] = _tensor(
+                _stored(feature.dtype), (feature.size,), ", ".join(feature.names)
+            )
     for name in source.cameras if source.episodes else ():
         observation[name] = _image("uint8", source.video(source.episodes[0], name).shape[1:])
     for name, video in depth_videos(source, source.episodes[0]).items() if source.episodes else ():
-        observation[f"{name}_depth"] = _image("uint16", (*video.shape[1:], 1), f"Distance to the camera plane in units of {depth_unit(video)} m; 0: no measurement.")
-    steps = {"pythonClassName": f"{_MODULE}dataset_feature.Dataset", "sequence": {"feature": _dict({"observation": _dict(observation), **step}), "length": "-1"}}
-    metadata = {"file_path": _text(), "outcome": _text(), "success": _tensor("bool"), "seed": _tensor("int64"), "trimmed_steps": _tensor("int64")}
+        observation[f"{name}_depth"] = _image(
+            "uint16", (*video.shape[1:], 1), f"Distance to the camera plane in units of {depth_unit(video)} m; 0: no measurement."
+        )
+    steps = {
+        "pythonClassName": f"{_MODULE}dataset_feature.Dataset",
+        "sequence": {"feature": _dict({"observation": _dict(observation), **step}), "length": "-1"},
+    }
+    metadata = {
+        "file_path": _text(),
+        "outcome": _text(),
+        "success": _tensor("bool"),
+        "seed": _tensor("int64"),
+        "trimmed_steps": _tensor("int64"),
+    }
     return _dict({"steps": steps, "episode_metadata": _dict(metadata)})
 
 

@@ -36,8 +36,13 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
 def _check_names(source: Source) -> None:
     observed = [name for name, feature in source.features.items() if not feature.of_step]
     others = [name for name, feature in source.features.items() if feature.of_step and name not in ("action", *FLAGS)]
-    check_names([*((name, f"robomimic's '{name}'") for name in _OWN), *((name, f"the feature '{name}'") for name in others),
-                 *named_streams(source, observed, "obs/", "_image")])  # fmt: skip
+    check_names(
+        [
+            *((name, f"robomimic's '{name}'") for name in _OWN),
+            *((name, f"the feature '{name}'") for name in others),
+            *named_streams(source, observed, "obs/", "_image"),
+        ]
+    )
 
 
 def join(source: Source, parts: Iterable[Path], path: Path) -> None:
@@ -122,7 +127,9 @@ def _write_demo(demo: Any, models: dict[bytes, Any], source: Source, episode: Ep
 
 def _write_video(demo: Any, name: str, video: Video) -> None:
     shape = video.shape if len(video.shape) == 4 else (*video.shape, 1)  # robomimic's depth images have one channel
-    options = dict(dtype=video.dtype, chunks=(1, *shape[1:]), compression="gzip", compression_opts=1, shuffle=video.dtype.itemsize > 1)
+    options = dict(
+        dtype=video.dtype, chunks=(1, *shape[1:]), compression="gzip", compression_opts=1, shuffle=video.dtype.itemsize > 1
+    )
     steps = len(video) - 1
     now, after = (demo.create_dataset(f"{group}/{name}", (steps, *shape[1:]), **options) for group in ("obs", "next_obs"))
     for t in range(steps + 1):

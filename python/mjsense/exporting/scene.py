@@ -78,14 +78,18 @@ def bodies(episode: Episode) -> list[Body]:
     positions, quats = np.stack([p for p, _ in poses]), np.stack([q for _, q in poses])
     absent = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in playback.inputs_of(episode).held}
     present = [i for i in range(model.nbody) if i == 0 or int(model.body_rootid[i]) not in absent]
-    return [Body(model.body(i).name, i, shapes, positions[:, i], quats[:, i]) for i in present if (shapes := tuple(_shapes(model, i)))]
+    return [
+        Body(model.body(i).name, i, shapes, positions[:, i], quats[:, i]) for i in present if (shapes := tuple(_shapes(model, i)))
+    ]
 
 
 def _shapes(model: mujoco.MjModel, body: int) -> Iterator[Shape]:
     kinds = mujoco.mjtGeom
     for i in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
         material, size, position = model.geom_matid[i], model.geom_size[i], model.geom_pos[i]
-        rgba = model.mat_rgba[material] if material >= 0 and np.array_equal(model.geom_rgba[i], _NO_COLOUR) else model.geom_rgba[i]
+        rgba = (
+            model.mat_rgba[material] if material >= 0 and np.array_equal(model.geom_rgba[i], _NO_COLOUR) else model.geom_rgba[i]
+        )
         if model.geom_group[i] >= _SEEN_GROUPS or rgba[3] == 0:
             continue
         name, quat = model.geom(i).name or f"geom_{i}", model.geom_quat[i]

@@ -24,8 +24,10 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     data = group.create_group("data")
     ends = _ends(source)
     steps = int(ends[-1])
-    arrays = {name: data.create_dataset(name, shape=(steps, feature.size), chunks=(_ROWS, feature.size), dtype=feature.dtype)
-              for name, feature in source.features.items()}  # fmt: skip
+    arrays = {
+        name: data.create_dataset(name, shape=(steps, feature.size), chunks=(_ROWS, feature.size), dtype=feature.dtype)
+        for name, feature in source.features.items()
+    }
     for i, episode in enumerate(source.each(progress)):
         begin, end = int(ends[i]) - episode.length + 1, int(ends[i])
         for name, rows in source.rows(episode).items():
@@ -76,7 +78,9 @@ def join(source: Source, parts: Iterable[Path], path: Path) -> None:
 def _zarr() -> Any:
     zarr = needs("zarr", "zarr")
     if not zarr.__version__.startswith("2."):
-        raise RuntimeError(f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip install 'mjsense[zarr]'")
+        raise RuntimeError(
+            f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip install 'mjsense[zarr]'"
+        )
     return zarr
 
 
@@ -95,5 +99,7 @@ def _attributes(source: Source) -> dict[str, Any]:
         "fps": float(source.fps),
         "robot": source.robot,
         "names": {name: list(feature.names) for name, feature in source.features.items()},
-        "episodes": [{"task": e.task, "outcome": e.outcome, "seed": e.seed, "trimmed_steps": e.trimmed_steps} for e in source.episodes],
+        "episodes": [
+            {"task": e.task, "outcome": e.outcome, "seed": e.seed, "trimmed_steps": e.trimmed_steps} for e in source.episodes
+        ],
     }

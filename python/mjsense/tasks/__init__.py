@@ -52,11 +52,35 @@ _NAMES = {
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
-    "MoveGroup", "Policy", "RecordProgress", "RecordSummary", "Robot", "RobotCamera", "Task", "TaskEnv", "TaskVectorEnv",
-    "Teleoperation", "WorldState", "SceneFileCfg", "SceneHeadlightCfg", "SceneMoodCfg", "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg",
-    "SceneSkyCfg", "SceneVaryCfg", "make", "make_vec", "play", "policy_names", "record", "register_policy", "register_task",
-    "robot_names", "task_names",
-]  # fmt: skip
+    "MoveGroup",
+    "Policy",
+    "RecordProgress",
+    "RecordSummary",
+    "Robot",
+    "RobotCamera",
+    "Task",
+    "TaskEnv",
+    "TaskVectorEnv",
+    "Teleoperation",
+    "WorldState",
+    "SceneFileCfg",
+    "SceneHeadlightCfg",
+    "SceneMoodCfg",
+    "SceneObjectCfg",
+    "SceneRegionCfg",
+    "SceneRobotCfg",
+    "SceneSkyCfg",
+    "SceneVaryCfg",
+    "make",
+    "make_vec",
+    "play",
+    "policy_names",
+    "record",
+    "register_policy",
+    "register_task",
+    "robot_names",
+    "task_names",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -162,7 +162,11 @@ def record(
         del options[name]
     if ray is not None:
         given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
-        if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording") if given[name]]:
+        if refused := [
+            name
+            for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording")
+            if given[name]
+        ]:
             raise ValueError(f"record: {refused[0]} cannot be combined with ray")
         return provided("record_on_ray")({**options, "format": format, "sensors": sensors}, ray, progress)
     if format == "mjsense":
@@ -173,6 +177,8 @@ def record(
         raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
     from mjsense.exporting.record_lerobot import converted
 
-    with converted(out, format=format, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
+    with converted(
+        out, format=format, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False
+    ) as folder:
         summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))

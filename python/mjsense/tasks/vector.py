@@ -123,8 +123,10 @@ class TaskVectorEnv(VectorEnv):
             try:
                 copy.deepcopy(value)
             except Exception as error:
-                raise TypeError(f"this environment cannot be copied or pickled, because its argument {name} cannot: {error}; "
-                                "make it with the name or the class instead of an object") from None  # fmt: skip
+                raise TypeError(
+                    f"this environment cannot be copied or pickled, because its argument {name} cannot: {error}; "
+                    "make it with the name or the class instead of an object"
+                ) from None
         return self._arguments
 
     _arguments: dict[str, Any] | None = None
@@ -365,9 +367,25 @@ def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
 
 
 _WITH_WARP = {
-    "task", "num_envs", "seed", "horizon", "policy_dt_ms", "terminate_upon_success", "observations", "sensors", "use_sensors",
-    "instructions", "shadows", "meshes", "autoreset_mode", "action_space", "backend", "device", "nconmax", "njmax",
-}  # fmt: skip
+    "task",
+    "num_envs",
+    "seed",
+    "horizon",
+    "policy_dt_ms",
+    "terminate_upon_success",
+    "observations",
+    "sensors",
+    "use_sensors",
+    "instructions",
+    "shadows",
+    "meshes",
+    "autoreset_mode",
+    "action_space",
+    "backend",
+    "device",
+    "nconmax",
+    "njmax",
+}
 """Arguments of make_vec() that have an effect, or no meaning, with backend="warp"."""
 
 

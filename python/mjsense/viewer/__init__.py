@@ -56,7 +56,14 @@ def view(
     """
     from mjsense.viewer.open import source_of, viewer_of
 
-    viewer = viewer_of(source_of(thing, num_worlds=max(num_worlds, world + 1), seed=seed, **options), world=world, episode=episode, seed=seed, host=host, port=port)
+    viewer = viewer_of(
+        source_of(thing, num_worlds=max(num_worlds, world + 1), seed=seed, **options),
+        world=world,
+        episode=episode,
+        seed=seed,
+        host=host,
+        port=port,
+    )
     if block:
         viewer.run(open_browser)
     else:

@@ -36,7 +36,15 @@ class Moment(NamedTuple):
     images: dict[str, np.ndarray]
 
 
-def export(source: LiveSource | Dataset, path: str | Path, *, world: int = 0, episode: int = 0, seconds: float = 10.0, progress: bool | None = None) -> None:
+def export(
+    source: LiveSource | Dataset,
+    path: str | Path,
+    *,
+    world: int = 0,
+    episode: int = 0,
+    seconds: float = 10.0,
+    progress: bool | None = None,
+) -> None:
     """Writes an episode of a recording, or some seconds of a live world, to a file.
 
     Args:
@@ -75,13 +83,21 @@ def _recorded(dataset: Dataset, episode: Episode, full: bool) -> Iterator[Moment
     model = episode.model()
     rows, videos = {}, {}
     if full:
-        names = [n for n, s in dataset.streams.items() if s.kind != "video" and s.dtype.kind in "fiub" and 0 < np.prod(s.shape) <= MAX_CURVES]
+        names = [
+            n
+            for n, s in dataset.streams.items()
+            if s.kind != "video" and s.dtype.kind in "fiub" and 0 < np.prod(s.shape) <= MAX_CURVES
+        ]
         rows = {name: episode[name] for name in names if name in episode}
         videos = {name: episode.video(name) for name, stream in dataset.streams.items() if stream.kind == "video"}
     for t, data in episode.replay(model=model):
-        yield Moment(t / float(dataset.fps), None if t else model, {name: getattr(data, name).copy() for name in fields_of(model)},
-                     {name: np.asarray(values[t], np.float64).reshape(-1) for name, values in rows.items()},
-                     {name: video[t] for name, video in videos.items()})  # fmt: skip
+        yield Moment(
+            t / float(dataset.fps),
+            None if t else model,
+            {name: getattr(data, name).copy() for name in fields_of(model)},
+            {name: np.asarray(values[t], np.float64).reshape(-1) for name, values in rows.items()},
+            {name: video[t] for name, video in videos.items()},
+        )
 
 
 def _write_viser(moments: Iterator[Moment], period: float, path: Path) -> None:

@@ -125,4 +125,8 @@ class SB3VecEnv(VecEnv):
 
 def _image_space(spec: Any) -> gymnasium.spaces.Box:
     """The space of a colour or depth image."""
-    return gymnasium.spaces.Box(0, np.inf, (1, *spec.shape), np.float32) if is_depth(spec) else gymnasium.spaces.Box(0, 255, spec.shape, np.uint8)
+    return (
+        gymnasium.spaces.Box(0, np.inf, (1, *spec.shape), np.float32)
+        if is_depth(spec)
+        else gymnasium.spaces.Box(0, 255, spec.shape, np.uint8)
+    )

@@ -154,7 +154,9 @@ class OwnSensor(mjsense.Sensor):
 
     def initialize(self, sim: mjsense.Simulation) -> None:
         on_warp: Any = sim
-        self.original.initialize(sim.model, getattr(on_warp, "warp_model", sim.model), Data(sim), getattr(on_warp, "device", "cpu"))
+        self.original.initialize(
+            sim.model, getattr(on_warp, "warp_model", sim.model), Data(sim), getattr(on_warp, "device", "cpu")
+        )
 
     def compute(self, sim: mjsense.Simulation) -> Any:
         self.original._invalid = False
