@@ -45,7 +45,9 @@ def rays(build: pathlib.Path) -> dict[str, float]:
     names = "|".join(f"^{name}(/real_time)?$" for name in RAYS)
     command = [build / "mjsense_bench", f"--benchmark_filter={names}", "--benchmark_format=json", "--benchmark_min_time=0.1"]
     text = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
-    return {r["run_name"].removesuffix("/real_time"): 1e-3 * r["real_time"] for r in json.loads(text[text.index("{") :])["benchmarks"]}
+    return {
+        r["run_name"].removesuffix("/real_time"): 1e-3 * r["real_time"] for r in json.loads(text[text.index("{") :])["benchmarks"]
+    }
 
 
 def medians(builds: list[pathlib.Path], measure) -> list[dict[str, float]]:

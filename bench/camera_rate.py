@@ -36,11 +36,15 @@ class Ours:
     def __init__(self, view: View, shots: Sequence[Shot], worlds: int, threads: int = CPUS) -> None:
         cameras = [
             mjs.CameraSensorCfg(
-                name=f"cam{i}", camera_name=f"w/{view.camera}", width=shot.size[0], height=shot.size[1], data_types=shot.kinds,
+                name=f"cam{i}",
+                camera_name=f"w/{view.camera}",
+                width=shot.size[0],
+                height=shot.size[1],
+                data_types=shot.kinds,
                 use_shadows=shot.shadows,
             )
             for i, shot in enumerate(shots)
-        ]  # fmt: skip
+        ]
         entity = mjs.EntityCfg(model=camera_scenes.spec_of(view.scene))
         self.view = view
         self.scene = mjs.Scene(mjs.SceneCfg(entities={"w": entity}, sensors=cameras))

@@ -89,7 +89,9 @@ def model_fields(model: mujoco.MjModel, view: View, worlds: int, frame: int, pre
         fields["light_dir"] /= np.linalg.norm(fields["light_dir"], axis=-1, keepdims=True)
         for name in ("mat_rgba", "geom_rgba"):
             value = getattr(model, name)
-            fields[name] = value * np.append(rng.uniform(0.5, 1, 3), 1) * rng.uniform(0.8, 1, (worlds, len(value), 1)) ** [1, 1, 1, 0]
+            fields[name] = (
+                value * np.append(rng.uniform(0.5, 1, 3), 1) * rng.uniform(0.8, 1, (worlds, len(value), 1)) ** [1, 1, 1, 0]
+            )
         fields["light_diffuse"] = model.light_diffuse * rng.uniform(0.6, 1, (worlds, model.nlight, 3))
     return fields
 
@@ -199,8 +201,13 @@ def go1() -> mujoco.MjSpec:
         name="terrain", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="terrain", pos=[0, 0, -0.75], rgba=[0.45, 0.5, 0.4, 1]
     )
     spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.5, 0.7, 0.9], rgb2=[0.1, 0.2, 0.3], width=256, height=256,
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.5, 0.7, 0.9],
+        rgb2=[0.1, 0.2, 0.3],
+        width=256,
+        height=256,
     )
     directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     spec.worldbody.add_light(pos=[0, 0, 5], dir=[0.2, 0.3, -1], type=directional, castshadow=True)

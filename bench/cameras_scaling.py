@@ -28,7 +28,9 @@ def by_worlds(name: str) -> list[Row]:
         case.frame()
         # 256 images per measurement, because a single image takes too little time to measure.
         seconds = [sum(case.frame()[0] for _ in range(256 // worlds)) for _ in range(RUNS)]
-        rows.append(lower(f"{name}: an image of 84x84, worlds: {worlds}", 1e6 * statistics.median(seconds) / 256, "us", rows, "1 world"))
+        rows.append(
+            lower(f"{name}: an image of 84x84, worlds: {worlds}", 1e6 * statistics.median(seconds) / 256, "us", rows, "1 world")
+        )
     return rows
 
 

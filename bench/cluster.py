@@ -30,7 +30,7 @@ from mjsense.cluster.job import Shard, ShardResult, run_shard
 from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import read_index
 
-ARGUMENTS = {"task": "pick", "horizon": 80, "keep_failures": True, "width": 320, "height": 184, "worlds": 2, "seed": 2}
+ARGUMENTS = {"task": "pick", "horizon": 80, "keep_failures": True, "width": 320, "height": 184, "num_worlds": 2, "seed": 2}
 
 
 def cpu() -> float:
@@ -53,8 +53,10 @@ def scaling(counts: list[int]) -> None:
         ray.shutdown()
         os.sched_setaffinity(0, every)
         first = first or summary.seconds * workers
-        print(f"{workers} workers on {workers} CPUs: {summary.seconds:.1f} s for {summary.kept} episodes, {first / summary.seconds:.2f} x one worker, "
-              f"{peak:.0f} MB per worker")  # fmt: skip
+        print(
+            f"{workers} workers on {workers} CPUs: {summary.seconds:.1f} s for {summary.kept} episodes, {first / summary.seconds:.2f} x one worker, "
+            f"{peak:.0f} MB per worker"
+        )
 
 
 def _peak() -> float:
@@ -64,7 +66,10 @@ def _peak() -> float:
 def overhead() -> None:
     """Prints what a division into one more shard costs in a warm worker."""
     words = ("pick", "--horizon", "80", "--keep-failures", "--size", "320x184", "--worlds", "1", "--seed", "2")
-    jobs: list[tuple[str, dict[str, Any]]] = [("mjs.record", {"arguments": {**ARGUMENTS, "worlds": 1}}), ("command", {"words": words})]
+    jobs: list[tuple[str, dict[str, Any]]] = [
+        ("mjs.record", {"arguments": {**ARGUMENTS, "num_worlds": 1}}),
+        ("command", {"words": words}),
+    ]
     for name, made in jobs:
         with tempfile.TemporaryDirectory() as out:
             job = Job(out, **made)
@@ -82,14 +87,30 @@ def overhead() -> None:
 def memory() -> None:
     for worlds in (2, 4):
         with tempfile.TemporaryDirectory() as out:
-            run_shard(Job(out, {**ARGUMENTS, "horizon": 20, "width": 640, "height": 368, "worlds": worlds}), Shard(0, 0, 4), "")
+            run_shard(
+                Job(out, {**ARGUMENTS, "horizon": 20, "width": 640, "height": 368, "num_worlds": worlds}), Shard(0, 0, 4), ""
+            )
         print(f"memory of a worker with {worlds} worlds, two cameras of 640x368, without Ray and encoders: {_peak():.0f} MB")
 
 
 def _result(number: int, episodes: int) -> ShardResult:
-    row = {"path": "house_0/trajectories_batch_1_of_4.h5", "seed": 2, "length": 81, "success": True, "outcome": "success", "task": "Raise the red brick"}
+    row = {
+        "path": "house_0/trajectories_batch_1_of_4.h5",
+        "seed": 2,
+        "length": 81,
+        "success": True,
+        "outcome": "success",
+        "task": "Raise the red brick",
+    }
     first = number * 16
-    return ShardResult(Shard(number, first, 16), "0" * 16, [{**row, "episode": first + i, "trajectory": f"traj_{i}"} for i in range(episodes)], 16, 0, 1280)
+    return ShardResult(
+        Shard(number, first, 16),
+        "0" * 16,
+        [{**row, "episode": first + i, "trajectory": f"traj_{i}"} for i in range(episodes)],
+        16,
+        0,
+        1280,
+    )
 
 
 def index(shards: int, episodes: int) -> None:
@@ -103,8 +124,10 @@ def index(shards: int, episodes: int) -> None:
         wrote = time.perf_counter() - begun
         begun = time.perf_counter()
         assert len(read_index(Path(out))) == rows
-        print(f"index of {shards} shards with {episodes} episodes: {(Path(out) / 'index.parquet').stat().st_size / 1e6:.3f} MB, written in {wrote:.2f} s, "
-              f"read in {time.perf_counter() - begun:.2f} s; driver's totals {added / shards * 1e6:.1f} us per shard")  # fmt: skip
+        print(
+            f"index of {shards} shards with {episodes} episodes: {(Path(out) / 'index.parquet').stat().st_size / 1e6:.3f} MB, written in {wrote:.2f} s, "
+            f"read in {time.perf_counter() - begun:.2f} s; driver's totals {added / shards * 1e6:.1f} us per shard"
+        )
 
 
 def study(workers: int, episodes: int) -> None:
@@ -115,7 +138,9 @@ def study(workers: int, episodes: int) -> None:
     death_s = 360_000.0  # a worker dies once in 100 h, and Ray needs 10 s to start its shard again
     episode_mb, videos = 0.85, 2  # docs/formats.md, Sizes: 9.8 kB per observation
     rng = random.Random(0)
-    print(f"{'attempts per shard':>18} {'shards':>8} {'hours':>6} {'efficiency':>10} {'driver busy':>11} {'repeated':>9} {'surplus':>8} {'files, million':>14}")
+    print(
+        f"{'attempts per shard':>18} {'shards':>8} {'hours':>6} {'efficiency':>10} {'driver busy':>11} {'repeated':>9} {'surplus':>8} {'files, million':>14}"
+    )
     for size in (1, 4, 16, 64, 256):
         shards, ended, repeated, driver_free, done = -(-episodes // size), 0.0, 0.0, 0.0, 0
         ready = [(0.0, w) for w in range(workers)]
@@ -135,8 +160,12 @@ def study(workers: int, episodes: int) -> None:
             ended = max(ended, start + duration)
         ideal = episodes * attempt_s / workers
         surplus = workers * size / episodes
-        print(f"{size:18} {shards:8} {ended / 3600:6.2f} {ideal / ended:10.1%} {busy / ended:11.1%} {repeated / 3600:7.2f} h {surplus:8.1%} {(episodes * (videos + 0.25) + 2 * shards) / 1e6:14.1f}")
-    print(f"storage: {episodes * episode_mb / 1e6:.2f} TB, written at {episodes * episode_mb / (episodes * attempt_s / workers) / 1e3:.2f} GB/s")
+        print(
+            f"{size:18} {shards:8} {ended / 3600:6.2f} {ideal / ended:10.1%} {busy / ended:11.1%} {repeated / 3600:7.2f} h {surplus:8.1%} {(episodes * (videos + 0.25) + 2 * shards) / 1e6:14.1f}"
+        )
+    print(
+        f"storage: {episodes * episode_mb / 1e6:.2f} TB, written at {episodes * episode_mb / (episodes * attempt_s / workers) / 1e3:.2f} GB/s"
+    )
 
 
 if __name__ == "__main__":

@@ -98,8 +98,16 @@ def one_world() -> list[Row]:
                 cost = m[name.replace(kind, ours)]
                 if cost["contacts"] != other["contacts"]:
                     raise RuntimeError(f"{name}: {cost['contacts']:.0f} contacts on our side")
-                rows.append(Row(case + memory, cost["cpu"] * 1e-3, "us", other["cpu"] * 1e-3, "MuJoCo's contact sensors",
-                                higher_is_better=False))  # fmt: skip
+                rows.append(
+                    Row(
+                        case + memory,
+                        cost["cpu"] * 1e-3,
+                        "us",
+                        other["cpu"] * 1e-3,
+                        "MuJoCo's contact sensors",
+                        higher_is_better=False,
+                    )
+                )
     return rows
 
 
@@ -122,22 +130,47 @@ def main() -> None:
             case.measure(steps)
     rows.append(Row("64 Go1 on rough terrain: physics", cases["physics"].us_per_world_step(), "us per world and substep"))
     physics = cases["physics"]
-    rows.append(Row("IMU alone, needs one constraint solve at the new state", share(cases["imu"], physics), "% of physics",
-                    higher_is_better=False))  # fmt: skip
+    rows.append(
+        Row(
+            "IMU alone, needs one constraint solve at the new state",
+            share(cases["imu"], physics),
+            "% of physics",
+            higher_is_better=False,
+        )
+    )
     peer = share(cases["mujoco"], physics)
-    rows.append(Row("IMU and feet, 7 fields, including that solve", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
-                    higher_is_better=False))
-    remembered = Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics",
-                     higher_is_better=False)
+    rows.append(
+        Row(
+            "IMU and feet, 7 fields, including that solve",
+            share(cases["fields"], physics),
+            "% of physics",
+            peer,
+            "MuJoCo's sensors",
+            higher_is_better=False,
+        )
+    )
+    remembered = Row(
+        "the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics", higher_is_better=False
+    )
     rows.append(remembered)
     if "--mjlab" in sys.argv:
         other = run_peer("mjlab", "mjlab_contact")
         sensing = other["sensors"] + other["torch"]
-        remembered.peer, remembered.peer_name = 100 * sensing / other["physics"], f"mjlab on the CPU, of its {other['physics']:.0f} us"
+        remembered.peer, remembered.peer_name = (
+            100 * sensing / other["physics"],
+            f"mjlab on the CPU, of its {other['physics']:.0f} us",
+        )
         touching = (cases["memory"].scene["feet"].data.found > 0).mean(), other["feet_in_contact"]
-        rows.append(Row("- in time ({:.0%} of the feet touch, {:.0%} of mjlab's)".format(*touching),
-                        added_us(cases["memory"], physics), "us per world and substep", sensing,
-                        f"mjlab on the CPU, {other['torch']:.1f} of it in torch", higher_is_better=False))
+        rows.append(
+            Row(
+                "- in time ({:.0%} of the feet touch, {:.0%} of mjlab's)".format(*touching),
+                added_us(cases["memory"], physics),
+                "us per world and substep",
+                sensing,
+                f"mjlab on the CPU, {other['torch']:.1f} of it in torch",
+                higher_is_better=False,
+            )
+        )
     for worlds in (16, 256) if quick else (16, 256, 2048):
         case = Case(xml, worlds, (feet(**memory),), ["feet"], rough=False)
         for _ in range(3):

@@ -43,9 +43,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(args.keep or folder)
         if not list(root.glob("house_*/*.h5")):
-            mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, worlds=2)
+            mjs.record(
+                "pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, num_worlds=2
+            )
         dataset = mjs.Dataset(root)
-        print(f"{len(dataset.episodes)} episodes, {len(dataset)} observations, decoder: {'PyAV' if video.have_av() else 'ffmpeg'}")
+        print(
+            f"{len(dataset.episodes)} episodes, {len(dataset)} observations, decoder: {'PyAV' if video.have_av() else 'ffmpeg'}"
+        )
         orders = {"sequential": np.arange(len(dataset)), "random": np.random.default_rng(0).permutation(len(dataset))}
         for name, streams in (("rows", ROWS), ("rows and images", [*ROWS, "obs/sensor_data/*"])):
             for order, indices in orders.items():

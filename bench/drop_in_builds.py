@@ -48,7 +48,9 @@ def line_of(build: subprocess.Popen[str]) -> str:
 def compare(name: str, size: str, rounds: int, folders: list[str]) -> None:
     command = [sys.executable, "-W", "ignore", __file__, "--draw", name, "--size", size, "", ""]
     builds = [
-        subprocess.Popen(command, env={**os.environ, "PYTHONPATH": folder}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        subprocess.Popen(
+            command, env={**os.environ, "PYTHONPATH": folder}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
         for folder in folders
     ]
     for build in builds:

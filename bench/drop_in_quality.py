@@ -136,8 +136,14 @@ def main() -> None:
     if rows:
         median = {key: float(np.median([row[key] for row in rows])) for key in BOUNDS}
         print(row_of({"environment": f"median of {len(rows)}", **median}))
-        low = [row["environment"] for row in rows if row["psnr"] < BOUNDS["psnr"] or row["ssim"] < BOUNDS["ssim"]
-               or row["depth_mm"] > BOUNDS["depth_mm"] or row["segmentation"] < BOUNDS["segmentation"]]  # fmt: skip
+        low = [
+            row["environment"]
+            for row in rows
+            if row["psnr"] < BOUNDS["psnr"]
+            or row["ssim"] < BOUNDS["ssim"]
+            or row["depth_mm"] > BOUNDS["depth_mm"]
+            or row["segmentation"] < BOUNDS["segmentation"]
+        ]
         print("outliers:", *low)
     if arguments.json:
         arguments.json.write_text(json.dumps(rows, indent=1))

@@ -23,17 +23,51 @@ RUNS = 5
 OURS = ("-c:v", "libx264", "-preset", "veryfast", "-crf", "25", "-bf", "0", "-g", "20", "-tune", "fastdecode")
 OTHERS = {
     "libx264, superfast, crf 28": ("-c:v", "libx264", "-preset", "superfast", "-crf", "28"),
-    "libx265, ultrafast, crf 18": ("-c:v", "libx265", "-preset", "ultrafast", "-crf", "18", "-x265-params", "pools=1:frame-threads=1"),
+    "libx265, ultrafast, crf 18": (
+        "-c:v",
+        "libx265",
+        "-preset",
+        "ultrafast",
+        "-crf",
+        "18",
+        "-x265-params",
+        "pools=1:frame-threads=1",
+    ),
     "SVT-AV1, preset 10, crf 35": ("-c:v", "libsvtav1", "-preset", "10", "-crf", "35", "-svtav1-params", "lp=1"),
     "SVT-AV1, preset 12, crf 28": ("-c:v", "libsvtav1", "-preset", "12", "-crf", "28", "-svtav1-params", "lp=1"),
-    "libvpx-vp9, realtime 8, crf 28": ("-c:v", "libvpx-vp9", "-deadline", "realtime", "-cpu-used", "8", "-crf", "28", "-b:v", "0"),
+    "libvpx-vp9, realtime 8, crf 28": (
+        "-c:v",
+        "libvpx-vp9",
+        "-deadline",
+        "realtime",
+        "-cpu-used",
+        "8",
+        "-crf",
+        "28",
+        "-b:v",
+        "0",
+    ),
     "mpeg4, q 4": ("-c:v", "mpeg4", "-q:v", "4"),
     "mjpeg, q 3": ("-c:v", "mjpeg", "-q:v", "3", "-pix_fmt", "yuvj420p"),
 }
 
 
 def raw_videos(folder: pathlib.Path) -> list[pathlib.Path]:
-    record = [*MJSENSE, "record", "pick", "--worlds", "2", "--episodes", "2", "--crf", "0", "--out", folder / "out", "-q", "--no-sheet"]
+    record = [
+        *MJSENSE,
+        "record",
+        "pick",
+        "--worlds",
+        "2",
+        "--episodes",
+        "2",
+        "--crf",
+        "0",
+        "--out",
+        folder / "out",
+        "-q",
+        "--no-sheet",
+    ]
     subprocess.run(record, check=True, stdout=subprocess.DEVNULL)
     return decoded(folder)
 

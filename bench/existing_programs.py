@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cost of mjsense.attach and mjsense.RecordEpisodes for a program that steps its own data or environment, in CPU time.
 
-    ./dev python bench/existing_programs.py     (needs mujoco 4.0)
+./dev python bench/existing_programs.py     (needs mujoco 4.0)
 """
 
 import statistics
@@ -27,11 +27,15 @@ def microseconds(call: Callable[[], object], count: int) -> float:
 
 
 def attach() -> None:
-    scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")}, terrain=mjs.TerrainCfg()))
+    scene = mjs.Scene(
+        mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")}, terrain=mjs.TerrainCfg())
+    )
     model = mujoco.MjModel.from_xml_string(scene.to_xml())
     data = mujoco.MjData(model)
     sensors = (
-        mjs.ContactSensorCfg(name="feet", fields=("found", "force"), primary=mjs.ContactMatch(mode="geom", pattern=r".*_foot", entity="robot")),
+        mjs.ContactSensorCfg(
+            name="feet", fields=("found", "force"), primary=mjs.ContactMatch(mode="geom", pattern=r".*_foot", entity="robot")
+        ),
         mjs.ImuSensorCfg(name="imu", site=mjs.ObjRef(type="site", name="imu", entity="robot")),
     )
     with mjs.attach(model, data, sensors=sensors) as attached:
@@ -45,7 +49,9 @@ def attach() -> None:
         step = microseconds(lambda: mujoco.mj_step(model, data), 2000)
         attached.reset()
         both = microseconds(update, 2000)
-    print(f"attach, quadruped with contacts and IMU: update {both - step:.0f} us, mj_forward {microseconds(lambda: mujoco.mj_forward(model, data), 2000):.0f} us")
+    print(
+        f"attach, quadruped with contacts and IMU: update {both - step:.0f} us, mj_forward {microseconds(lambda: mujoco.mj_forward(model, data), 2000):.0f} us"
+    )
 
 
 def record_episodes() -> None:
@@ -65,7 +71,9 @@ def record_episodes() -> None:
             env = mjs.RecordEpisodes(gymnasium.make("Pendulum-v1"), out, episodes=steps // 200)
             costs.append(run(env, steps))
             env.close()
-    print(f"RecordEpisodes, Pendulum-v1, episodes of 200 steps: {statistics.median(costs) - alone:.0f} us per step, with the files of its episodes")
+    print(
+        f"RecordEpisodes, Pendulum-v1, episodes of 200 steps: {statistics.median(costs) - alone:.0f} us per step, with the files of its episodes"
+    )
 
 
 if __name__ == "__main__":

@@ -43,12 +43,12 @@ def read(root: Path, order: str, seconds: float, cache_mb: float) -> None:
 def export(root: Path, out: Path) -> None:
     """Exports all episodes to the folder ``complete`` of ``out``, and those without idle steps, whose videos are encoded again, to ``trimmed``."""
     shutil.rmtree(out, ignore_errors=True)
-    mjs.export_lerobot(root, out / "warm", episodes=[0])  # imports the libraries
+    mjs.exporting.export_lerobot(root, out / "warm", episodes=[0])  # imports the libraries
     shutil.rmtree(out)
     for name, trim_idle, repeats in (("complete", False, REPEATS), ("trimmed", True, 1)):
         dataset = mjs.Dataset(root, trim_idle=trim_idle)
         begun, cpu = time.perf_counter(), time.process_time()
-        mjs.export_lerobot(root, out / name, episodes=[*range(len(dataset.episodes))] * repeats, trim_idle=trim_idle)
+        mjs.exporting.export_lerobot(root, out / name, episodes=[*range(len(dataset.episodes))] * repeats, trim_idle=trim_idle)
         wall, cpu = time.perf_counter() - begun, time.process_time() - cpu
         cameras = sum(stream.kind == "video" and len(stream.shape) == 3 for stream in dataset.streams.values())
         images = len(dataset) * cameras * repeats
@@ -63,9 +63,37 @@ def encode(root: Path, steps: int) -> float:
         images = episode.video(camera)[:steps]
         length, height, width, _ = images.shape
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        command = ["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(dataset.fps), "-i", "-",
-                   "-c:v", "libx264", "-preset", "veryfast", "-crf", "24", "-threads", "1", "-pix_fmt", "yuv420p", "-f", "mp4",
-                   "-movflags", "frag_keyframe+empty_moov", "-y", "/dev/null"]  # fmt: skip
+        command = [
+            "ffmpeg",
+            "-v",
+            "error",
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+            "-s",
+            f"{width}x{height}",
+            "-r",
+            str(dataset.fps),
+            "-i",
+            "-",
+            "-c:v",
+            "libx264",
+            "-preset",
+            "veryfast",
+            "-crf",
+            "24",
+            "-threads",
+            "1",
+            "-pix_fmt",
+            "yuv420p",
+            "-f",
+            "mp4",
+            "-movflags",
+            "frag_keyframe+empty_moov",
+            "-y",
+            "/dev/null",
+        ]
         subprocess.run(command, input=images.tobytes(), check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu += after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -101,7 +129,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         root, out = Path(args.keep or folder, "recording"), Path(args.keep or folder, "lerobot")
         if not list(root.glob("house_*/*.h5")):
-            mjs.record("pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, worlds=2)
+            mjs.record(
+                "pick", out=root, episodes=args.episodes, width=args.width, height=args.height, keep_failures=True, num_worlds=2
+            )
         export(root, out)
         if args.only_export:
             return

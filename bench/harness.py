@@ -25,7 +25,9 @@ RESULTS = ROOT / ".cache" / "bench" / "results"  # results of the last runs, whi
 if not (RELEASE / "python").exists():
     sys.exit(f"{RELEASE} is missing: ./dev bench builds it")
 sys.path.insert(0, str(RELEASE / "python"))  # so that a later `import mjsense` finds the measured build
-os.environ["PYTHONPATH"] = os.pathsep.join([str(RELEASE / "python"), *filter(None, [os.environ.get("PYTHONPATH")])])  # in other processes too
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    [str(RELEASE / "python"), *filter(None, [os.environ.get("PYTHONPATH")])]
+)  # in other processes too
 MJSENSE = [sys.executable, "-m", "mjsense"]
 """The program."""
 
@@ -37,15 +39,28 @@ def program(name: str) -> str:
 
 def run_program(name: str, *options: str, **environment: str) -> str:
     """Standard output of a built program."""
-    return subprocess.run([program(name), *options], check=True, env={**os.environ, **environment}, stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL, text=True).stdout  # fmt: skip
+    return subprocess.run(
+        [program(name), *options],
+        check=True,
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ).stdout
 
 
 def google_benchmarks(names: str, runs: int = 5, /, **environment: str) -> dict[str, dict]:
     """Runs the benchmarks of mjsense_bench whose names match the pattern, interleaved. Returns by name the medians of real and
     CPU nanoseconds and of the items per iteration, and the counters of the first run."""
-    text = run_program("mjsense_bench", f"--benchmark_filter={names}", "--benchmark_format=json", "--benchmark_min_time=0.1",
-                       f"--benchmark_repetitions={runs}", "--benchmark_enable_random_interleaving=true", **environment)  # fmt: skip
+    text = run_program(
+        "mjsense_bench",
+        f"--benchmark_filter={names}",
+        "--benchmark_format=json",
+        "--benchmark_min_time=0.1",
+        f"--benchmark_repetitions={runs}",
+        "--benchmark_enable_random_interleaving=true",
+        **environment,
+    )
     same: dict[str, list[dict]] = {}
     for run in json.loads(text[text.index("{") :])["benchmarks"]:
         if run["run_type"] == "iteration":

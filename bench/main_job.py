@@ -30,8 +30,22 @@ CASES = {
 
 def run(options: list[str]) -> dict:
     with tempfile.TemporaryDirectory() as folder:
-        command = [*MJSENSE, "record", "pick", "--robot", "franka", "--worlds", "4", "--out", folder, "--json", "-q",
-                   "--no-sheet", *([] if "--meshes" in options else ["--meshes", "shapes"]), *options]
+        command = [
+            *MJSENSE,
+            "record",
+            "pick",
+            "--robot",
+            "franka",
+            "--worlds",
+            "4",
+            "--out",
+            folder,
+            "--json",
+            "-q",
+            "--no-sheet",
+            *([] if "--meshes" in options else ["--meshes", "shapes"]),
+            *options,
+        ]
         before = os.times()
         summary = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
         after = os.times()

@@ -59,7 +59,9 @@ def of_geometry(triangles: str) -> list[float]:
 def of_worlds(name: str, worlds: str) -> list[float]:
     """MB of a simulation with this number of worlds."""
     if name == "go1":
-        scan = mjs.RayCastSensorCfg(name="scan", frame=mjs.ObjRef("body", "w/trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1))
+        scan = mjs.RayCastSensorCfg(
+            name="scan", frame=mjs.ObjRef("body", "w/trunk"), pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1)
+        )
         feet = mjs.ContactMatch(mode="geom", pattern=r".*_foot_collision", entity="w")
         contact = mjs.ContactSensorCfg(name="feet", primary=feet, fields=("found", "force"), track_air_time=True)
         scene = scene_of("go1", "head", scan, contact)
@@ -98,7 +100,16 @@ def main() -> None:
     rows.append(Row("- added by a second simulation of an equal model", second, "MB"))
     rows.append(Row("- MuJoCo's model of either", model, "MB"))
     for name, label in SCENES.items():
-        rows.append(Row(f"one more world: {label}", a_world("worlds", name), "MB", a_world("mujoco", name), "mjData alone", higher_is_better=False))
+        rows.append(
+            Row(
+                f"one more world: {label}",
+                a_world("worlds", name),
+                "MB",
+                a_world("mujoco", name),
+                "mjData alone",
+                higher_is_better=False,
+            )
+        )
     report("Memory", rows)
 
 

@@ -49,7 +49,7 @@ def attempts(scene: Path, out: Path, number: int, robot: str) -> tuple[int, Coun
         scene=str(scene),
         out=out,
         num_attempts=number,
-        worlds=number,
+        num_worlds=number,
         cameras=[],
         replay=False,
         progress=False,
@@ -88,7 +88,9 @@ def sheet(images: list[np.ndarray]) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Success of the planner with each object of the catalogue, and a picture of them.")
+    parser = argparse.ArgumentParser(
+        description="Success of the planner with each object of the catalogue, and a picture of them."
+    )
     parser.add_argument("--pattern", default=".*", help="Regular expression of the objects' names.")
     parser.add_argument("--attempts", type=int, default=4, help="Attempts per object; 0: none.")
     parser.add_argument("--robot", default="franka")

@@ -67,7 +67,11 @@ def rays(body: str) -> list:
 
 def camera(body: str) -> list:
     """A camera of 4 x 4 pixels: measures the physics that cameras require, not the images themselves."""
-    return [mjs.CameraSensorCfg(name="eye", parent_body=f"robot/{body}", pos=(0.0, 0.0, 0.0), width=4, height=4, data_types=("depth",))]
+    return [
+        mjs.CameraSensorCfg(
+            name="eye", parent_body=f"robot/{body}", pos=(0.0, 0.0, 0.0), width=4, height=4, data_types=("depth",)
+        )
+    ]
 
 
 def forces(pattern: str) -> list:
@@ -156,8 +160,17 @@ def compare(name: str, scene: mjs.SceneCfg, body: str, touching: str, rounds: in
             own = statistics.median(again[case][3:]) if again[case] else 0.0
             for peer in peers:
                 wanted = goal if peer == "mj_batch" else None
-                rows.append(Row(label, statistics.median(spent[case][3:]) - own, "us per world and substep", statistics.median(spent[peer][3:]),
-                                peer, higher_is_better=False, goal=wanted))  # fmt: skip
+                rows.append(
+                    Row(
+                        label,
+                        statistics.median(spent[case][3:]) - own,
+                        "us per world and substep",
+                        statistics.median(spent[peer][3:]),
+                        peer,
+                        higher_is_better=False,
+                        goal=wanted,
+                    )
+                )
             if own:
                 rows.append(Row("- the sensors themselves", own, "us per world and substep"))
     return rows

@@ -58,12 +58,15 @@ def classic(model: mujoco.MjModel, data: mujoco.MjData, camera: str) -> tuple[np
 
 def compare(name: str, camera: str, folder: pathlib.Path) -> None:
     cfg = mjs.CameraSensorCfg(
-        name="cam", camera_name=f"w/{camera}", width=WIDTH, height=HEIGHT, use_shadows=True,
-        data_types=("rgb", "depth", "segmentation"), enabled_geom_groups=camera_scenes.SHOWN_GROUPS,
+        name="cam",
+        camera_name=f"w/{camera}",
+        width=WIDTH,
+        height=HEIGHT,
+        use_shadows=True,
+        data_types=("rgb", "depth", "segmentation"),
+        enabled_geom_groups=camera_scenes.SHOWN_GROUPS,
     )
-    scene = mjs.Scene(
-        mjs.SceneCfg(entities={"w": mjs.EntityCfg(model=getattr(camera_scenes, name)())}, sensors=(cfg,))
-    )
+    scene = mjs.Scene(mjs.SceneCfg(entities={"w": mjs.EntityCfg(model=getattr(camera_scenes, name)())}, sensors=(cfg,)))
     sim = mjs.Simulation(scene, num_worlds=1)
     if name in STEPS:
         sim.step(STEPS[name])

@@ -23,7 +23,10 @@ def robots() -> dict[str, str]:
     except Unavailable as error:
         print(f"rays: using stand-ins for the Go1 and the G1: {error}", file=sys.stderr)
         return {}
-    return {"MJSENSE_BENCH_QUADRUPED": f"{folder}/unitree_go1/xmls/go1.xml", "MJSENSE_BENCH_HUMANOID": f"{folder}/unitree_g1/xmls/g1.xml"}
+    return {
+        "MJSENSE_BENCH_QUADRUPED": f"{folder}/unitree_go1/xmls/go1.xml",
+        "MJSENSE_BENCH_HUMANOID": f"{folder}/unitree_g1/xmls/g1.xml",
+    }
 
 
 def rate(m: dict) -> float:
@@ -35,7 +38,9 @@ def peer(models: dict[str, str], benchmark: str, script: str, *kind: str) -> flo
     available."""
     with tempfile.TemporaryDirectory() as folder:
         scene = str(pathlib.Path(folder) / "scene.mjb")
-        run_program("mjsense_bench", f"--benchmark_filter={benchmark}$", "--benchmark_min_time=0.01", MJSENSE_BENCH_SAVE=scene, **models)
+        run_program(
+            "mjsense_bench", f"--benchmark_filter={benchmark}$", "--benchmark_min_time=0.01", MJSENSE_BENCH_SAVE=scene, **models
+        )
         try:
             return run_peer("warp", script, scene, *kind)["rays_per_second"] * 1e-6
         except Unavailable as error:
@@ -62,14 +67,25 @@ def main() -> None:
             if other is not None:
                 rows.append(Row(case, ours, unit, other, f"{name} on the CPU", goal=5))
     for name, case in (("height_scan/boxes", "height scan, boxes"), ("lidar", "lidar")):
-        rows.append(Row(f"{case}, two threads and one", m[f"{name}/2"]["real"] * 1e-3, "us", m[f"{name}/1"]["real"] * 1e-3,
-                        "one thread", higher_is_better=False, goal=1.9))
+        rows.append(
+            Row(
+                f"{case}, two threads and one",
+                m[f"{name}/2"]["real"] * 1e-3,
+                "us",
+                m[f"{name}/1"]["real"] * 1e-3,
+                "one thread",
+                higher_is_better=False,
+                goal=1.9,
+            )
+        )
     many = "lidar in 16 worlds, a step of physics (not timed) between"
     rows.append(Row(many, rate(m["lidar_worlds"]), unit, rate(m["lidar_worlds_mj_multiRay"]), "mj_multiRay", goal=5))
     for count in (100, 1000, 10000):
         ours = rate(m[f"among_boxes/{count}"])
         for name, column in (("mj_multiRay", "mj_multiRay"), ("of_one_mesh", "ours, the boxes as one mesh")):
-            rows.append(Row(f"lidar among {count:,} boxes and one that moves", ours, unit, rate(m[f"among_boxes_{name}/{count}"]), column))
+            rows.append(
+                Row(f"lidar among {count:,} boxes and one that moves", ours, unit, rate(m[f"among_boxes_{name}/{count}"]), column)
+            )
         rows.append(Row(f"- bringing the {count:,} up to date", m[f"among_boxes_update/{count}"]["cpu"] * 1e-3, "us"))
     for pose in ("moving", "still"):
         top = m[f"top_level/{pose}"]

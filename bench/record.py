@@ -24,8 +24,11 @@ from harness import Row, median_seconds, program, report
 WIDTH, HEIGHT = 640, 368
 PEER = "h5py and ffmpeg in sequence"
 JSON_STREAMS = {f"actions/{k}": 2000 for k in ("commanded_action", "ee_pose", "ee_twist", "joint_pos", "joint_pos_rel")} | {
-    "obs/agent/qpos": 2000, "obs/agent/qvel": 2000, "obs/extra/task_info": 4000, "obs/extra/grasp_state_pickup_obj": 2000,
-}  # fmt: skip
+    "obs/agent/qpos": 2000,
+    "obs/agent/qvel": 2000,
+    "obs/extra/task_info": 4000,
+    "obs/extra/grasp_state_pickup_obj": 2000,
+}
 
 
 def pictures(steps: int) -> np.ndarray:
@@ -44,7 +47,22 @@ def depth(steps: int) -> np.ndarray:
 
 
 def encode(frames: np.ndarray, path: pathlib.Path, codec: list[str]) -> None:
-    command = ["ffmpeg", "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{WIDTH}x{HEIGHT}", "-r", "15.15", "-i", "-"]
+    command = [
+        "ffmpeg",
+        "-y",
+        "-v",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{WIDTH}x{HEIGHT}",
+        "-r",
+        "15.15",
+        "-i",
+        "-",
+    ]
     process = subprocess.Popen([*command, *codec, path], stdin=subprocess.PIPE)
     assert process.stdin
     for frame in frames:
@@ -91,8 +109,24 @@ def main() -> None:
         rgb, metres = [pictures(steps)] * 2, [depth(steps)] * (2 if with_depth else 0)
         rows = [{"arm": list(np.sin(0.1 * t + np.arange(7))), "base": [], "gripper": [0.00296]} for t in range(steps)]
         scratch = pathlib.Path(tempfile.mkdtemp())
-        command = [program("record_fake"), scratch / "ours", "--measure", "--cameras", 2, "--steps", steps, "--episodes", episodes,
-                   "--worlds", episodes, "--width", WIDTH, "--height", HEIGHT, *([] if with_depth else ["--no-depth"])]  # fmt: skip
+        command = [
+            program("record_fake"),
+            scratch / "ours",
+            "--measure",
+            "--cameras",
+            2,
+            "--steps",
+            steps,
+            "--episodes",
+            episodes,
+            "--worlds",
+            episodes,
+            "--width",
+            WIDTH,
+            "--height",
+            HEIGHT,
+            *([] if with_depth else ["--no-depth"]),
+        ]
         walls, peer_cpu = [], []
 
         def ours():
@@ -115,7 +149,9 @@ def main() -> None:
         # CPU time is comparable even if other programs use the machine.
         ours_cpu = sum(split[k] for k in ("copy_s", "write_s", "encode_cpu_s"))
         per_frame = 1000 / split["frames"]
-        table.append(Row("- processor time", ours_cpu * per_frame, "ms/frame", statistics.median(peer_cpu[1:]) * per_frame, PEER, False))
+        table.append(
+            Row("- processor time", ours_cpu * per_frame, "ms/frame", statistics.median(peer_cpu[1:]) * per_frame, PEER, False)
+        )
         parts = ", ".join(f"{k[:-2]} {split[k]:.3f}" for k in ("copy_s", "wait_s", "write_s", "commit_s", "encode_cpu_s"))
         print(f"{case}: wall {split['wall_s']:.3f} s, of it {parts}; {split['disk_bytes'] / 1e6:.2f} MB", file=sys.stderr)
         shutil.rmtree(scratch)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """CPU time of record --format lerobot: of the whole recording, and of the thread that converts it.
 
-    ./dev python bench/record_lerobot.py [WIDTHxHEIGHT ...]
+./dev python bench/record_lerobot.py [WIDTHxHEIGHT ...]
 """
 
 import resource
@@ -14,7 +14,9 @@ from typing import Any
 import mjsense as mjs
 from mjsense.exporting import record_lerobot
 
-ARGUMENTS: dict[str, Any] = dict(task="pick", horizon=80, keep_failures=True, worlds=2, threads=1, seed=5, format="lerobot", progress=False)
+ARGUMENTS: dict[str, Any] = dict(
+    task="pick", horizon=80, keep_failures=True, num_worlds=2, threads=1, seed=5, format="lerobot", progress=False
+)
 used = 0.0
 run = record_lerobot._Conversion.run
 

@@ -40,10 +40,17 @@ def main() -> None:
     worlds = arguments.worlds
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        recorded = measure("recording", lambda: mjs.record(arguments.task, out=root / "a", worlds=worlds, episodes=arguments.episodes).frames)
-        measure("only a new camera", lambda: mjs.render(root / "a", root / "b", cameras=[], add_cameras=TOP, worlds=worlds).frames)
-        measure("a new camera, the others copied", lambda: recorded + mjs.render(root / "a", root / "c", add_cameras=TOP, worlds=worlds).frames)
-        measure("the recorded cameras again", lambda: mjs.render(root / "a", root / "d", copy=False, worlds=worlds).frames)
+        recorded = measure(
+            "recording", lambda: mjs.record(arguments.task, out=root / "a", num_worlds=worlds, episodes=arguments.episodes).frames
+        )
+        measure(
+            "only a new camera", lambda: mjs.render(root / "a", root / "b", cameras=[], add_cameras=TOP, num_worlds=worlds).frames
+        )
+        measure(
+            "a new camera, the others copied",
+            lambda: recorded + mjs.render(root / "a", root / "c", add_cameras=TOP, num_worlds=worlds).frames,
+        )
+        measure("the recorded cameras again", lambda: mjs.render(root / "a", root / "d", copy=False, num_worlds=worlds).frames)
 
 
 if __name__ == "__main__":

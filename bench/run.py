@@ -6,7 +6,18 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
-SHARED = {"run", "harness", "fetch", "opengl", "images", "camera_scenes", "camera_rate", "pictures", "page", "figures"}  # not benchmarks
+SHARED = {
+    "run",
+    "harness",
+    "fetch",
+    "opengl",
+    "images",
+    "camera_scenes",
+    "camera_rate",
+    "pictures",
+    "page",
+    "figures",
+}  # not benchmarks
 
 ASKED_FOR = {"builds"}  # run only if named: needs a second build
 
@@ -19,7 +30,9 @@ def main() -> int:
     if unknown:
         print(f"no benchmark named {', '.join(unknown)}; there are: {', '.join(known)}", file=sys.stderr)
         return 2
-    failed = [n for n in names or sorted({*known} - ASKED_FOR) if subprocess.run([sys.executable, HERE / f"{n}.py", *flags]).returncode]
+    failed = [
+        n for n in names or sorted({*known} - ASKED_FOR) if subprocess.run([sys.executable, HERE / f"{n}.py", *flags]).returncode
+    ]
     if failed:
         print("failed: " + ", ".join(failed), file=sys.stderr)
     return 1 if failed else 0

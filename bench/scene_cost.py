@@ -50,8 +50,20 @@ def milliseconds(options: dict, width: int, height: int) -> float:
     for episodes in (2, 6):
         with tempfile.TemporaryDirectory() as out:
             begun = cpu_seconds()
-            mjs.record("pick", "franka", out=out, episodes=episodes, worlds=2, horizon=HORIZON, keep_failures=True, width=width, height=height,
-                       seed=5, progress=False, **options)  # fmt: skip
+            mjs.record(
+                "pick",
+                "franka",
+                out=out,
+                episodes=episodes,
+                num_worlds=2,
+                horizon=HORIZON,
+                keep_failures=True,
+                width=width,
+                height=height,
+                seed=5,
+                progress=False,
+                **options,
+            )
             spent.append(cpu_seconds() - begun)
     return 1e3 * (spent[1] - spent[0]) / (4 * HORIZON)
 

@@ -63,10 +63,12 @@ def random_ms(path: pathlib.Path) -> float:
 
 
 def main() -> None:
-    print("| setting | bytes per frame | CPU ms per frame | PSNR exo, wrist, dB | CPU ms of a random frame of both cameras |\n| --- | ---: | ---: | ---: | ---: |")
+    print(
+        "| setting | bytes per frame | CPU ms per frame | PSNR exo, wrist, dB | CPU ms of a random frame of both cameras |\n| --- | ---: | ---: | ---: | ---: |"
+    )
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
-        mjs.record("pick", out=folder / "out", episodes=2, worlds=2, crf=0, keep_failures=True)
+        mjs.record("pick", out=folder / "out", episodes=2, num_worlds=2, crf=0, keep_failures=True)
         raw, out = decoded(folder), folder / "video.mp4"
         for name, setting in SETTINGS.items():
             frames, size, seconds, decoding, quality = 0, 0, 0.0, 0.0, []
@@ -81,7 +83,10 @@ def main() -> None:
                 size += out.stat().st_size
                 decoding += random_ms(out) / len(raw) * 2
             exo, wrist = (statistics.mean(quality[camera::2]) for camera in range(2))  # files are sorted by episode, then camera
-            print(f"| {name} | {size / frames:,.0f} | {1e3 * seconds / frames:.1f} | {exo:.1f}, {wrist:.1f} | {decoding:.1f} |", flush=True)
+            print(
+                f"| {name} | {size / frames:,.0f} | {1e3 * seconds / frames:.1f} | {exo:.1f}, {wrist:.1f} | {decoding:.1f} |",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -70,13 +70,23 @@ def ours(
     trunk = mjs.ObjRef(type="body", name="trunk", entity="robot")
     sensors = (
         mjs.RayCastSensorCfg(
-            "height scan", frame=trunk, pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1), ray_alignment="yaw", include_geom_groups=(0,)
+            "height scan",
+            frame=trunk,
+            pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1),
+            ray_alignment="yaw",
+            include_geom_groups=(0,),
         ),
         mjs.CameraSensorCfg(
-            "depth image", parent_body="robot/trunk", pos=(0.3, 0, 0), quat=(0.65, 0.27, -0.27, -0.65), fovy=60, width=SIZE, height=SIZE,
+            "depth image",
+            parent_body="robot/trunk",
+            pos=(0.3, 0, 0),
+            quat=(0.65, 0.27, -0.27, -0.65),
+            fovy=60,
+            width=SIZE,
+            height=SIZE,
             data_types=("depth",),
         ),
-    )  # fmt: skip
+    )
     entities = {name: mjs.EntityCfg(model=spec()) for name, spec in specs.items()}
     cfg = mjs.SceneCfg(entities=entities, sensors=sensors, spec_fn=add_ground)
     sim: Any = mjs.Simulation(mjs.Scene(cfg), worlds, backend="warp", device=device)
@@ -97,13 +107,23 @@ def mjlab(
     trunk = ObjRef(type="body", name="trunk", entity="robot")
     configs = {
         "height scan": RayCastSensorCfg(
-            name="scan", frame=trunk, pattern=GridPatternCfg(size=(1.6, 1.0), resolution=0.1), ray_alignment="yaw", include_geom_groups=(0,)
+            name="scan",
+            frame=trunk,
+            pattern=GridPatternCfg(size=(1.6, 1.0), resolution=0.1),
+            ray_alignment="yaw",
+            include_geom_groups=(0,),
         ),
         "depth image": CameraSensorCfg(
-            name="image", parent_body="robot/trunk", pos=(0.3, 0, 0), quat=(0.65, 0.27, -0.27, -0.65), fovy=60, width=SIZE, height=SIZE,
+            name="image",
+            parent_body="robot/trunk",
+            pos=(0.3, 0, 0),
+            quat=(0.65, 0.27, -0.27, -0.65),
+            fovy=60,
+            width=SIZE,
+            height=SIZE,
             data_types=("depth",),
         ),
-    }  # fmt: skip
+    }
     calls, writers, readers = {}, [], {}
     for name, cfg in configs.items():
         entities = {name: EntityCfg(spec_fn=spec) for name, spec in specs.items()}

@@ -3,13 +3,20 @@
 configurations (`mjsense.core.lazy_dataclass`) the signature that their fields make, and shows components of the state (`_State("text")`) as arrays.
 Members of a private base class in the same module are shown as those of the class."""
 
+import ast
 import copy
 import re
+from pathlib import Path
 from typing import Any
 
 import griffe
 
 ROLE = re.compile(r":(?:class|func|meth|mod|attr):`~?([\w.]+)`")
+
+_MODULE = ast.parse((Path(__file__).parents[1] / "python/mjsense/core/old_names.py").read_text())
+_MOVED = next(ast.literal_eval(node.value) for node in _MODULE.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MOVED")
+ROOMS = {name: room for room, names in _MOVED.items() for name in names}
+"""Modules of the public names that are not at the top of the package."""
 
 STATES = {"_State": ("float64", "NDArray[float64]"), "Component": ("float32, on the device", "Any")}
 
@@ -50,9 +57,9 @@ def reference(name: str, obj: griffe.Object) -> str:
     if name.startswith("mjsense"):
         path = name
     elif owner is not None and owner.is_class and name in owner.members:
-        path = f"mjsense.{owner.name}.{name}"
+        path = f"{ROOMS.get(owner.name, 'mjsense')}.{owner.name}.{name}"
     else:
-        path = f"mjsense.{name}"
+        path = f"{ROOMS.get(name.partition('.')[0], 'mjsense')}.{name}"
     return f"[`{name}`][{path}]"
 
 

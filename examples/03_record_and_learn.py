@@ -7,13 +7,15 @@ import tempfile
 import mjsense as mjs
 
 out = sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp()
-summary = mjs.record("pick", "franka", out=out, episodes=2, worlds=2, width=160, height=92)
+summary = mjs.record("pick", "franka", out=out, episodes=2, num_worlds=2, width=160, height=92)
 print(f"{summary.kept} episodes, {summary.frames} frames in {summary.seconds:.1f} s: {summary.path}")
 
 dataset = mjs.Dataset(summary.path)
 sample = dataset[10]
 print("observed:", ", ".join(name for name in sample if name.startswith("obs/")))
-print("image:", sample["obs/sensor_data/wrist_camera"].shape, "joints:", sample["obs/agent/qpos/arm"].shape, "task:", sample["task"])
+print(
+    "image:", sample["obs/sensor_data/wrist_camera"].shape, "joints:", sample["obs/agent/qpos/arm"].shape, "task:", sample["task"]
+)
 print("success at step", int(dataset.episodes[0]["success"].argmax()))
 
 env = mjs.make_vec("pick", num_envs=2, policy="planner", cameras=[], seed=7)

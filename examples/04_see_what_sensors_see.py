@@ -56,10 +56,15 @@ scene = mjs.Scene(
                 name="feet",
                 primary=mjs.ContactMatch("geom", ".*_foot", "dog"),
                 debug_vis=True,
-                viz=mjs.ContactVizCfg(force_scale=0.01),
+                viz=mjs.sensors.ContactVizCfg(force_scale=0.01),
             ),
             mjs.CameraSensorCfg(
-                name="head", camera_name="dog/head", width=64, height=48, debug_vis=True, viz=mjs.CameraVizCfg(frustum_depth=0.4)
+                name="head",
+                camera_name="dog/head",
+                width=64,
+                height=48,
+                debug_vis=True,
+                viz=mjs.sensors.CameraVizCfg(frustum_depth=0.4),
             ),
             mjs.BuiltinSensorCfg(name="gyro", sensor_type="gyro", obj=mjs.ObjRef("site", "imu", "dog")),
         ),

@@ -22,13 +22,24 @@ scene = mjs.Scene(
     mjs.SceneCfg(
         entities={"room": mjs.EntityCfg(model=ROOM)},
         sensors=(
-            mjs.CameraSensorCfg("eye", camera_name="room/eye", width=160, height=120, samples=4, use_shadows=True,
-                                data_types=("rgb", "depth", "segmentation")),
-            mjs.LidarSensorCfg("lidar", frame=mjs.ObjRef("site", "top", "room"), range_noise_std=0.01,
-                               scan=mjs.SpinningScanCfg(channels=32, elevation_min_deg=-40, elevation_max_deg=10)),
+            mjs.CameraSensorCfg(
+                "eye",
+                camera_name="room/eye",
+                width=160,
+                height=120,
+                samples=4,
+                use_shadows=True,
+                data_types=("rgb", "depth", "segmentation"),
+            ),
+            mjs.LidarSensorCfg(
+                "lidar",
+                frame=mjs.ObjRef("site", "top", "room"),
+                range_noise_std=0.01,
+                scan=mjs.SpinningScanCfg(channels=32, elevation_min_deg=-40, elevation_max_deg=10),
+            ),
         ),
     )
-)  # fmt: skip
+)
 sim = mjs.Simulation(scene, num_worlds=3, seed=7)
 rng = np.random.default_rng(7)
 sim.randomize("mat_rgba", np.concatenate([rng.uniform(0.1, 1, (3, 1, 3)), np.ones((3, 1, 1))], axis=2))

@@ -27,8 +27,17 @@ STEPS = 150  # of an episode that is judged; the planner needs 60 to 110
 def matrices(quat):
     """Rotation matrices ``[N, 3, 3]`` of quaternions wxyz ``[N, 4]``."""
     w, x, y, z = np.moveaxis(quat, -1, 0)
-    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
-            2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]  # fmt: skip
+    rows = [
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    ]
     return np.stack(rows, -1).reshape(*quat.shape[:-1], 3, 3)
 
 
@@ -73,8 +82,15 @@ class Clone(torch.nn.Module):
     def __init__(self, x, moves):
         super().__init__()
         width = 256
-        self.net = torch.nn.Sequential(torch.nn.Linear(x.shape[1], width), torch.nn.GELU(), torch.nn.Linear(width, width), torch.nn.GELU(),
-                                       torch.nn.Linear(width, width), torch.nn.GELU(), torch.nn.Linear(width, 8))  # fmt: skip
+        self.net = torch.nn.Sequential(
+            torch.nn.Linear(x.shape[1], width),
+            torch.nn.GELU(),
+            torch.nn.Linear(width, width),
+            torch.nn.GELU(),
+            torch.nn.Linear(width, width),
+            torch.nn.GELU(),
+            torch.nn.Linear(width, 8),
+        )
         for name, value in {"mean": x.mean(0), "scale": x.std(0) + 1e-3, "move": moves.std(0)}.items():
             self.register_buffer(name, value)
 
@@ -131,8 +147,21 @@ class ClonePolicy(mjs.Policy):
 
 def successes(policy, episodes, out):
     """In how many unseen episodes the object was lifted at the last step or before."""
-    return mjs.record("pick", scene="table", policy=policy, out=out, overwrite=True, num_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
-                      cameras=[], action_noise=False, terminate_upon_success=True, keep_failures=True).succeeded  # fmt: skip
+    return mjs.record(
+        "pick",
+        scene="table",
+        policy=policy,
+        out=out,
+        overwrite=True,
+        num_attempts=episodes,
+        num_worlds=50,
+        seed=10_000,
+        horizon=STEPS,
+        cameras=[],
+        action_noise=False,
+        terminate_upon_success=True,
+        keep_failures=True,
+    ).succeeded
 
 
 def wilson(successes, episodes, z=1.96):
@@ -145,8 +174,16 @@ def wilson(successes, episodes, z=1.96):
 
 def main(out, recorded=200, judged=200, passes=120):
     begun = time.perf_counter()
-    made = mjs.record("pick", scene="table", policy="top_down_planner", out=out / "demonstrations", overwrite=True, episodes=recorded,
-                      worlds=16, cameras=[])  # fmt: skip
+    made = mjs.record(
+        "pick",
+        scene="table",
+        policy="top_down_planner",
+        out=out / "demonstrations",
+        overwrite=True,
+        episodes=recorded,
+        num_worlds=16,
+        cameras=[],
+    )
     print(f"{made.kept} picks recorded in {time.perf_counter() - begun:.0f} s", flush=True)
     x, moves, closed = demonstrations(made.path)
     begun = time.perf_counter()

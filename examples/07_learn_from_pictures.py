@@ -91,8 +91,19 @@ def record(out, episodes):
     text = (MODELS / "robot.toml").read_text().replace('model = "', f'model = "{MODELS}/')
     robot = Path(out) / "franka_with_noise.toml"
     robot.write_text(text + "\n[noise]\nscale = 2.5\nmax_position = 0.03\n")
-    return mjs.record("pick", str(robot), policy="top_down_planner", camera_system=str(MODELS / "cameras/close_up.toml"), width=WIDTH,
-                      height=HEIGHT, crf=12, out=out, episodes=episodes, worlds=8, replay=False).path  # fmt: skip
+    return mjs.record(
+        "pick",
+        str(robot),
+        policy="top_down_planner",
+        camera_system=str(MODELS / "cameras/close_up.toml"),
+        width=WIDTH,
+        height=HEIGHT,
+        crf=12,
+        out=out,
+        episodes=episodes,
+        num_worlds=8,
+        replay=False,
+    ).path
 
 
 class Demonstrations:
@@ -313,9 +324,22 @@ def evaluate(network, episodes, scene="", seed=10_000, worlds=50):
     """For each of some unseen episodes, whether the robot held the object above the table for HELD steps without a break, and whether the
     training contained all words of the instruction: two bool arrays ``[episodes]``."""
     won, known = [], []
-    with closing(mjs.make_vec("pick", "franka", scene=scene, num_envs=min(worlds, episodes), arm_controller=CONTROLLER, horizon=STEPS + 1, width=WIDTH,
-                              height=HEIGHT, camera_system="close_up", instructions="canonical", action_noise=False,
-                              observations=[*CAMERAS, "qpos", "tcp_pose"])) as env:  # fmt: skip
+    with closing(
+        mjs.make_vec(
+            "pick",
+            "franka",
+            scene=scene,
+            num_envs=min(worlds, episodes),
+            arm_controller=CONTROLLER,
+            horizon=STEPS + 1,
+            width=WIDTH,
+            height=HEIGHT,
+            camera_system="close_up",
+            instructions="canonical",
+            action_noise=False,
+            observations=[*CAMERAS, "qpos", "tcp_pose"],
+        )
+    ) as env:
         while len(won) < episodes:
             obs, _ = env.reset(seed=seed + len(won))
             follow, held = Follower(network, env.instructions), np.zeros(env.num_envs, int)

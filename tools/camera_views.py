@@ -60,14 +60,27 @@ def count(task: str, robot: str, scene: str = "", episodes: int = 200, seed: int
     found = Count()
     width, height = picture_size(task, robot, scene)
     worlds = min(WORLDS, episodes)
-    with closing(mjs.make_vec(task, robot, scene=scene, num_envs=worlds, seed=seed, width=width, height=height,
-                              shadows=False, observations=["object_image_points"])) as env:  # fmt: skip
+    with closing(
+        mjs.make_vec(
+            task,
+            robot,
+            scene=scene,
+            num_envs=worlds,
+            seed=seed,
+            width=width,
+            height=height,
+            shadows=False,
+            observations=["object_image_points"],
+        )
+    ) as env:
         while found.starts + found.refused < episodes:
             points = env.reset()[0]["object_image_points"]
             faults = env._rollout.outcomes()[-1]  # failed starts are not visible in the first observation
             roles = {role: cameras for role, cameras in points.items() if "gripper" not in role}
-            shown = {role: [rows["num_points"][:, 0] > 0 for camera, rows in cameras.items() if "wrist" not in camera]
-                     for role, cameras in roles.items()}  # fmt: skip
+            shown = {
+                role: [rows["num_points"][:, 0] > 0 for camera, rows in cameras.items() if "wrist" not in camera]
+                for role, cameras in roles.items()
+            }
             for world in range(min(worlds, episodes - found.starts - found.refused)):
                 if world in faults:
                     found.refused += 1

@@ -27,7 +27,7 @@ ALTERNATIVES = (
 ENTRY_POINTS = ("main(", "LLVMFuzzerTestOneInput(")
 
 TOKEN = re.compile(
-    r'(?P<comment>//[^\n]*|/\*.*?\*/)'
+    r"(?P<comment>//[^\n]*|/\*.*?\*/)"
     r'|(?P<raw>R"(?P<delimiter>[^()\\\s]*)\(.*?\)(?P=delimiter)")'
     r"|(?P<string>\"(?:\\.|[^\"\\\n])*\"|(?<![0-9A-Za-z])'(?:\\.|[^'\\\n])+')"
     r"|(?P<directive>^[ \t]*\#(?:\\\n|[^\n])*)"
@@ -35,8 +35,27 @@ TOKEN = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 TYPE = {"class", "struct", "union", "enum"}
-NOT_A_NAME = {"if", "for", "while", "switch", "return", "catch", "sizeof", "alignof", "decltype", "noexcept", "requires", "TEST", "TEST_F",
-              "TEST_P", "NB_MODULE", "INSTANTIATE_TEST_SUITE_P", "alignas", "__attribute__", "static_assert"}
+NOT_A_NAME = {
+    "if",
+    "for",
+    "while",
+    "switch",
+    "return",
+    "catch",
+    "sizeof",
+    "alignof",
+    "decltype",
+    "noexcept",
+    "requires",
+    "TEST",
+    "TEST_F",
+    "TEST_P",
+    "NB_MODULE",
+    "INSTANTIATE_TEST_SUITE_P",
+    "alignas",
+    "__attribute__",
+    "static_assert",
+}
 
 
 class Definition(NamedTuple):
@@ -104,7 +123,11 @@ def function_name(words: list[str]) -> str | None:
             if depth == 0:
                 flat = flat[i + 1 :]
                 break
-    if "static" in flat or "friend" in flat or ("=" in flat[: flat.index("(") if "(" in flat else None] and "operator" not in flat):
+    if (
+        "static" in flat
+        or "friend" in flat
+        or ("=" in flat[: flat.index("(") if "(" in flat else None] and "operator" not in flat)
+    ):
         return None
     depth = 0
     for i, word in enumerate(flat):

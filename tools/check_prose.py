@@ -22,9 +22,24 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 CHECKED = [
-    "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CMakeLists.txt", "src", "python", "tests", "tools", "bench", "examples", "docs",
-    "packaging", "models", "cmake", "dev", ".ci", ".github",
-]  # fmt: skip
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "CMakeLists.txt",
+    "src",
+    "python",
+    "tests",
+    "tools",
+    "bench",
+    "examples",
+    "docs",
+    "packaging",
+    "models",
+    "cmake",
+    "dev",
+    ".ci",
+    ".github",
+]
 
 QUOTES = {"check_prose.py", "test_prose.py"}  # not checked: these files quote the phrases
 
@@ -46,14 +61,26 @@ PHRASES = {
     r"\bthe least of\b|\bthe most of\b|\bat the most\b|\bat the least\b": "minimum, maximum, at most, at least",
     r"\bas it is there\b|\bas of ours\b": "use plain words",
     r"\bgive (?:--|out)": "pass",
-    r"(?:^|[.:;|] |[\"'])What (?!is new)(?:nobody|nothing|cannot|can|a|is|are|does|has|they|it|others|lies|stands)\b[^.?!|]*\b(?:is|are|costs|stays)\b":
-        "begin the sentence with its subject",
-}  # fmt: skip
+    r"(?:^|[.:;|] |[\"'])What (?!is new)(?:nobody|nothing|cannot|can|a|is|are|does|has|they|it|others|lies|stands)\b[^.?!|]*\b(?:is|are|costs|stays)\b": "begin the sentence with its subject",
+}
 RULES = [(re.compile(pattern, re.IGNORECASE), advice) for pattern, advice in PHRASES.items()]
 
 # Names and words of other languages that codespell takes for mistakes.
 SPELLED = "reacher,kinf,ot,lod,datas,shepperd,fro,nd"
-SPELLING = ["docs", "src", "python", "tools", "bench", "examples", "models", "cmake", "packaging", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+SPELLING = [
+    "docs",
+    "src",
+    "python",
+    "tools",
+    "bench",
+    "examples",
+    "models",
+    "cmake",
+    "packaging",
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+]
 SKIPPED = "*_test.cc,test_*.py,*.xml,*.png,*.jpg,*.svg,*.stl,*.obj,*.msh,*.npy,_core.pyi"  # tests misspell on purpose
 
 
@@ -122,9 +149,21 @@ def xml(text: str) -> Iterator[tuple[int, str]]:
 
 # By suffix, or by name for files without one.
 READERS = {
-    ".md": markdown, ".h": cpp, ".cc": cpp, ".py": python, ".pyi": python, ".cmake": script, ".sh": script, "dev": script, "run": script,
-    ".toml": hashes, ".yml": hashes, ".txt": hashes, ".supp": hashes, ".xml": xml,
-}  # fmt: skip
+    ".md": markdown,
+    ".h": cpp,
+    ".cc": cpp,
+    ".py": python,
+    ".pyi": python,
+    ".cmake": script,
+    ".sh": script,
+    "dev": script,
+    "run": script,
+    ".toml": hashes,
+    ".yml": hashes,
+    ".txt": hashes,
+    ".supp": hashes,
+    ".xml": xml,
+}
 
 
 def reader(path: Path) -> Callable[[str], Iterator[tuple[int, str]]] | None:
@@ -151,8 +190,21 @@ def files(names: list[str]) -> Iterator[Path]:
 def main(names: list[str]) -> int:
     found = [finding for path in files(names or CHECKED) for finding in findings(path)]
     print("\n".join(found), end="\n" if found else "")
-    spelling = subprocess.run([sys.executable, "-m", "codespell_lib", "--quiet-level", "3", "--ignore-words-list", SPELLED, "--skip", SKIPPED,
-                               *(names or SPELLING)], cwd=ROOT)  # fmt: skip
+    spelling = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "codespell_lib",
+            "--quiet-level",
+            "3",
+            "--ignore-words-list",
+            SPELLED,
+            "--skip",
+            SKIPPED,
+            *(names or SPELLING),
+        ],
+        cwd=ROOT,
+    )
     return 1 if found or spelling.returncode else 0
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import runpy
 import sys
 import textwrap
 from pathlib import Path
@@ -97,7 +98,7 @@ from mjsense.core.sensor_data import SensorData, make_data
 
 # Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).
 SIGNATURES = {
-    "tasks/recording.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "scene", "out"), {}),
+    "tasks/recording.py": ("RecordJobCfg", {}, {}, ("task", "robot", "policy", "scene", "out"), {}),
     "tasks/vector.py": (
         "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False", "seed": "None"}, ("task", "robot", "policy", "scene"),
         {"seed": " None: a random seed, so that every environment has other episodes."},
@@ -105,7 +106,13 @@ SIGNATURES = {
 }  # fmt: skip
 
 # Options of the program: its structs, with the parameters that have another name in Python. Names that options accept are listed too.
-OPTIONS = {"RecordJobCfg": {"num_worlds": "worlds"}, "RolloutCfg": {"num_worlds": "worlds"}, "LidarSensorCfg": {}, "SpinningScanCfg": {}, "TableScanCfg": {}}
+OPTIONS = {
+    "RecordJobCfg": {"num_worlds": "worlds"},
+    "RolloutCfg": {"num_worlds": "worlds"},
+    "LidarSensorCfg": {},
+    "SpinningScanCfg": {},
+    "TableScanCfg": {},
+}
 TABLE = '''# SPDX-License-Identifier: Apache-2.0
 """Options of the program that are fields of configurations, and the names that they accept. The program shows its help and checks its
 arguments before it loads the library.
@@ -339,7 +346,9 @@ class Generator:
             emit(name)
         text = MODULES[module] % NOTE + "\n\n" + "\n\n".join(parts)
         if module == "configs":
-            text = text.replace("import dataclasses\n", "import dataclasses\n" + ("import math\n" if "math." in "".join(parts) else ""))
+            text = text.replace(
+                "import dataclasses\n", "import dataclasses\n" + ("import math\n" if "math." in "".join(parts) else "")
+            )
         for choice, alternatives in sorted(self.choices("" if module == "configs" else module).items()):
             text += f"\n\n{choice} = " + " | ".join(alternatives) + "\n"
         if module == "configs":
@@ -356,7 +365,7 @@ class Generator:
             body = textwrap.indent(doc(s["doc"]) + "\n\n" + members, "    ")
             text += f"\n\n@dataclass(slots=True, repr=False, frozen=True)\nclass {name}(SensorData):\n{body}\n"
         kinds = "".join(f"    {quoted(k)}: {v},\n" for k, v in self.data_of_kind.items())
-        text += f"\n\nDATA_OF_KIND: dict[str, type] = {{\n{kinds}}}\n\"\"\"By a sensor's kind; others return an array.\"\"\"\n"
+        text += f'\n\nDATA_OF_KIND: dict[str, type] = {{\n{kinds}}}\n"""By a sensor\'s kind; others return an array."""\n'
         text += "\n" + exported(["DATA_OF_KIND", "SensorData", "make_data", *self.data])
         return text + "\nshow_field_docs(__name__)\n"
 
@@ -382,10 +391,22 @@ class Generator:
     def tables(self, text: str) -> str:
         def table(match: re.Match[str]) -> str:
             what, name = match[2], match[3]
-            make = {"fields": self.field_table, "data": self.data_table, "options": self.option_table}[what]
+            make = {
+                "fields": self.field_table,
+                "data": self.data_table,
+                "options": self.option_table,
+                "export": self.format_table,
+            }[what]
             return match[1] + "\n" + make(name) + match[4]
 
-        return re.sub(r"(<!-- (fields|data|options) (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
+        return re.sub(r"(<!-- (fields|data|options|export) (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
+
+    def format_table(self, _: str) -> str:
+        formats = runpy.run_path(str(PACKAGE / "exporting" / "formats.py"))["FORMATS"]
+        rows = [
+            f"| `{name}` | {format.about} | {format.readers} | `mjsense[{format.extra}]` |\n" for name, format in formats.items()
+        ]
+        return "| format | output | programs that read it | package |\n| --- | --- | --- | --- |\n" + "".join(rows)
 
     def field_table(self, name: str) -> str:
         s = self.structs[name]
@@ -433,9 +454,11 @@ class Generator:
     def program_table(self) -> str:
         structs = ""
         for struct, renamed in OPTIONS.items():
-            rows = [self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.structs[struct]["fields"] if "type" in f]
+            rows = [
+                self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.structs[struct]["fields"] if "type" in f
+            ]
             structs += f"    {quoted(struct)}: [\n" + "".join(row for row in rows if row) + "    ],\n"
-        names = {**self.names, "formats": export_formats()}
+        names = self.names
         return TABLE % (NOTE, structs, "".join(f"    {quoted(kind)}: {json.dumps(known)},\n" for kind, known in names.items()))
 
     def program_option(self, f: dict[str, Any], parameter: str) -> str:
@@ -451,10 +474,14 @@ class Generator:
         if kind == "bool" and f["default"] and not f["hidden"]:
             text = f"Do not {text[0].lower()}{text[1:]}"
         default = f["default"]
-        shown = "" if default is None or kind == "bool" else ",".join(map(short, default)) or "none" if is_list else short(default)
+        shown = (
+            "" if default is None or kind == "bool" else ",".join(map(short, default)) or "none" if is_list else short(default)
+        )
         more = {"words": f["words"] or t.get("words") or [], "default": shown, "is_list": is_list, "is_on": default is True, "hidden": f["hidden"],
                 "low": f.get("low"), "high": f.get("high"), "above_low": f["above_low"]}  # fmt: skip
-        given = "".join(f", {name}={value!r}" for name, value in more.items() if not (value is None or value is False or value in ("", [])))
+        given = "".join(
+            f", {name}={value!r}" for name, value in more.items() if not (value is None or value is False or value in ("", []))
+        )
         return f"        Field({parameter!r}, {f['option']!r}, {f['flag']!r}, {kind!r}, {text!r}{given}),\n"
 
     def files(self) -> dict[Path, str]:
@@ -464,7 +491,11 @@ class Generator:
         for name in SIGNATURES:
             path = PACKAGE / name
             out[path] = self.signature(path.read_text(), name)
-        for page in [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "src").rglob("page.md")), *sorted((ROOT / "models").rglob("page.md"))]:
+        for page in [
+            *sorted((ROOT / "docs").glob("*.md")),
+            *sorted((ROOT / "src").rglob("page.md")),
+            *sorted((ROOT / "models").rglob("page.md")),
+        ]:
             old = page.read_text()
             if "<!-- end -->" in old:
                 out[page] = self.tables(old)
@@ -477,12 +508,6 @@ class Generator:
             out[ROOT / f"src/{library}/{library}.h"] = UMBRELLA % (purpose, includes, names, namespace, using, namespace)
         out[ROOT / "cmake/PublicHeaders.cmake"] = PUBLIC_HEADERS % "\n".join(f"  {header}" for header in headers)
         return out
-
-
-def export_formats() -> dict[str, str]:
-    """``FORMATS`` of mjsense.exporting."""
-    tree = ast.parse((PACKAGE / "exporting" / "__init__.py").read_text())
-    return next(ast.literal_eval(node.value) for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FORMATS")
 
 
 def short(value: Any) -> str:
@@ -531,7 +556,11 @@ def wrapped_code(line: str) -> str:
         return line
     name, rest = line.split(": ", 1)
     annotation, _, default = rest.partition(" = ")
-    inner = annotation.replace("Literal[", "Literal[\n        ").replace("]", "\n    ]", 1) if "Literal[" in annotation else annotation
+    inner = (
+        annotation.replace("Literal[", "Literal[\n        ").replace("]", "\n    ]", 1)
+        if "Literal[" in annotation
+        else annotation
+    )
     return f"{name}: {inner}" + (f" = {default}" if default else "")
 
 

@@ -274,9 +274,10 @@ def main() -> int:
     versions = f"mujoco_warp {mjw.__version__}, Warp {wp.__version__}, MuJoCo {mujoco.__version__}"
     scenes = sum(key.startswith(ALONE) for key in results)
     lines = report(
-        results, failed,
+        results,
+        failed,
         f"Device `{device}` ({name}), {versions}: {arguments.worlds} worlds, {arguments.steps} control steps in each of {scenes} scenes.",
-    )  # fmt: skip
+    )
     print("\n".join(lines))
     if arguments.write:
         page = PAGE.read_text()

@@ -28,18 +28,34 @@ PAIRS = [(task, robot) for task, robot, scene in CASES if not scene]
 
 def check(task: str, robot: str, episodes: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as out:
-        mjs.record(task, robot, out=out, episodes=episodes, max_attempts=episodes, keep_failures=True, worlds=2, width=32, height=24, depth=True)
+        mjs.record(
+            task,
+            robot,
+            out=out,
+            episodes=episodes,
+            max_attempts=episodes,
+            keep_failures=True,
+            num_worlds=2,
+            width=32,
+            height=24,
+            depth=True,
+        )
         report = mjs.check_replay(out, states=True)
     checks = [episode.sensors for episode in report.episodes if episode.sensors]
     equal = {name for check in checks for name in check.equal}
     different = {found.field for check in checks for found in check.deviations}
     return {
-        "task": task, "robot": robot, "episodes": len(report.episodes), "steps": sum(episode.steps for episode in report.episodes),
+        "task": task,
+        "robot": robot,
+        "episodes": len(report.episodes),
+        "steps": sum(episode.steps for episode in report.episodes),
         "stepwise": sum(episode.stepwise is None for episode in report.episodes),
         "open_loop": sum(episode.open_loop is None for episode in report.episodes),
-        "streams": len(equal | different), "equal": len(equal - different), "different": sorted(different),
+        "streams": len(equal | different),
+        "equal": len(equal - different),
+        "different": sorted(different),
         "deviations": [str(found) for episode in report.episodes for found in episode.deviations.values()],
-    }  # fmt: skip
+    }
 
 
 def row(results: list[dict[str, Any]]) -> str:
@@ -53,7 +69,10 @@ def row(results: list[dict[str, Any]]) -> str:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    head = ["| task | robots | episodes | steps | stepwise | open loop | streams |", "| --- | --- | ---: | ---: | ---: | ---: | ---: |"]
+    head = [
+        "| task | robots | episodes | steps | stepwise | open loop | streams |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
+    ]
     return "\n".join([*head, *(row(list(group)) for _, group in itertools.groupby(results, lambda r: r["task"]))])
 
 

@@ -26,7 +26,7 @@ class View(NamedTuple):
     scene: str
     robot: str = "franka"
     steps: int = 45
-    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # m, camera; None: the robot's camera_follower
+    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # m, camera; None: the robot's head_camera
     target: tuple[float, float, float] = (0.7, 0.0, 0.6)
     seed: int = 3
 
@@ -43,7 +43,9 @@ VIEWS = {
     "scene_shelf": View("pick", "shelf", pos=(-1.1, -1.1, 1.6), target=(0.6, 0.0, 0.85)),
     "scene_kitchen": in_kitchen("open"),
     "scene_kitchen_1": View("close", "kitchen:1", pos=(-1.9, 0.9, 1.6), target=(0.3, 0.0, 0.95)),
-    "scene_room_with_door": View("door_opening", "room_with_door", "rby1", steps=3, pos=(-3.1, 1.3, 1.75), target=(0.0, -0.15, 0.95), seed=4),
+    "scene_room_with_door": View(
+        "door_opening", "room_with_door", "rby1", steps=3, pos=(-3.1, 1.3, 1.75), target=(0.0, -0.15, 0.95), seed=4
+    ),
     "scene_floor": View("nav_to_obj", "floor", "rby1", steps=3, pos=(0.4, 0.4, 2.4), target=(4.0, 3.5, 0.3)),
     "scene_libero_kitchen": View("pick", "libero/kitchen", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
     "scene_libero_table": View("pick", "libero/table", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
@@ -60,28 +62,58 @@ VIEWS = {
     "task_close": in_kitchen("close", steps=75),
     "task_door_opening": View("door_opening", "room_with_door", "rby1", steps=165, pos=None),
     "task_multi_task": in_kitchen("open+pick", steps=60),
-    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=40, pos=None, seed=4),
-}  # fmt: skip
+    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=70, pos=None, seed=4),
+}
 
 
 def write_jpeg(path: Path, pixels: np.ndarray) -> None:
     height, width, _ = pixels.shape
     subprocess.run(
-        ["ffmpeg", "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24",
-         "-video_size", f"{width}x{height}", "-i", "-", "-frames:v", "1", "-q:v", "5", str(path)],
-        input=np.ascontiguousarray(pixels).tobytes(), check=True)  # fmt: skip
+        [
+            "ffmpeg",
+            "-nostdin",
+            "-hide_banner",
+            "-loglevel",
+            "error",
+            "-y",
+            "-f",
+            "rawvideo",
+            "-pixel_format",
+            "rgb24",
+            "-video_size",
+            f"{width}x{height}",
+            "-i",
+            "-",
+            "-frames:v",
+            "1",
+            "-q:v",
+            "5",
+            str(path),
+        ],
+        input=np.ascontiguousarray(pixels).tobytes(),
+        check=True,
+    )
 
 
 def picture(view: View) -> np.ndarray:
     """Two episodes side by side, [H, 2 W, 3]."""
-    where = 'mount = "mjcf"\ncamera = "camera_follower"\n'
+    where = 'mount = "mjcf"\ncamera = "head_camera"\n'
     if view.pos is not None:
         where = f'mount = "fixed"\npos = {list(view.pos)}\ntarget = {list(view.target)}\nfovy = 62\n'
     with tempfile.TemporaryDirectory() as folder:
         cameras = Path(folder, "cameras.toml")
         cameras.write_text(f'width = {WIDTH}\nheight = {HEIGHT}\n[[cameras]]\nname = "view_camera"\n{where}')
-        env = mjs.make_vec(view.task, view.robot, scene=view.scene, num_envs=2, camera_system=str(cameras),
-                           observations=["view_camera"], samples=4, seed=view.seed, policy="planner")  # fmt: skip
+        env = mjs.make_vec(
+            view.task,
+            view.robot,
+            scene=view.scene,
+            num_envs=2,
+            camera_system=str(cameras),
+            observations=["view_camera"],
+            samples=4,
+            seed=view.seed,
+            policy="planner",
+        )
         env.reset()
         for _ in range(view.steps):
             observation = env.step(env.expert_action())[0]

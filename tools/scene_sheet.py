@@ -21,8 +21,16 @@ from libero.libero import get_libero_path  # pyright: ignore[reportMissingImport
 from libero.libero.envs import OffScreenRenderEnv  # pyright: ignore[reportMissingImports]
 from scene_pictures import HEIGHT, PICTURES, VIEWS, WIDTH, View, picture, write_jpeg
 
-OURS = ["scene_table", "scene_varied_table", "scene_tableware", "scene_clutter",
-        "scene_shelf", "scene_kitchen", "scene_room_with_door", "scene_floor"]  # fmt: skip
+OURS = [
+    "scene_table",
+    "scene_varied_table",
+    "scene_tableware",
+    "scene_clutter",
+    "scene_shelf",
+    "scene_kitchen",
+    "scene_room_with_door",
+    "scene_floor",
+]
 ROBOSUITE = ["Lift", "PickPlace", "NutAssembly", "Door"]
 TABLE = View("pick", "table", pos=(-1.3, -1.1, 1.65), target=(-0.1, 0.0, 0.85))  # as scene_table, in robosuite's coordinates
 LIBERO = {

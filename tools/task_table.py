@@ -101,8 +101,18 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
     parts, found = [], []
     for one in scenes:
         with tempfile.TemporaryDirectory() as out:
-            made = mjs.record(task, robot, out=out, scene=one, episodes=episodes, max_attempts=episodes, keep_failures=True,
-                              worlds=min(8, episodes), cameras=[], **options)  # fmt: skip
+            made = mjs.record(
+                task,
+                robot,
+                out=out,
+                scene=one,
+                episodes=episodes,
+                max_attempts=episodes,
+                keep_failures=True,
+                num_worlds=min(8, episodes),
+                cameras=[],
+                **options,
+            )
             found += episodes_of(made.path)
             parts.append(made)
     angles = approach_angles(found)
@@ -112,7 +122,9 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
         failures.update(made.failures)
     played = max(1, sum(made.succeeded + made.failed for made in parts))
     return {
-        "task": task, "robot": robot, "scene": scene,
+        "task": task,
+        "robot": robot,
+        "scene": scene,
         "episodes": played,
         "success": sum(made.succeeded for made in parts) / played,
         "length": float(np.median(lengths)) if lengths else 0.0,
@@ -121,7 +133,7 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
         "steps_per_second": sum(made.steps for made in parts) / sum(made.seconds for made in parts),
         "first_action_ms": 1000 * sum(made.times["reset"] for made in parts) / played,
         "failures": failures.most_common(3),
-    }  # fmt: skip
+    }
 
 
 def label(task: str, robot: str, scene: str) -> str:
@@ -135,13 +147,17 @@ def label(task: str, robot: str, scene: str) -> str:
 def row(r: dict[str, Any]) -> str:
     slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
-    return (f"{label(r['task'], r['robot'], r['scene'])} {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
-            f"{slanted} | {r['first_action_ms']:.0f} | {r['steps_per_second']:.0f} | {why} |")  # fmt: skip
+    return (
+        f"{label(r['task'], r['robot'], r['scene'])} {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
+        f"{slanted} | {r['first_action_ms']:.0f} | {r['steps_per_second']:.0f} | {why} |"
+    )
 
 
 def table(rows: list[str]) -> str:
-    head = ["| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | failures |",
-            "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |"]  # fmt: skip
+    head = [
+        "| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | failures |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |",
+    ]
     return "\n".join([*head, *rows])
 
 

@@ -32,9 +32,16 @@ import mjsense as mjs
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "variety"
 BEGIN, END = "<!-- variety -->", "<!-- end of variety -->"
 # (task, scene, robot, camera system, policy). Policy "": the task has no grasp, so no approach direction is measured.
-TABLES = tuple(("pick", scene, "franka", "randomized_droid", "planner") for scene in ("table", "varied_table", "tableware", "clutter", "shelf"))
-CASES = (*TABLES, ("open", "kitchen", "franka", "randomized_droid", "planner"),
-         ("door_opening", "room_with_door", "rby1", "gopro_d455", ""), ("nav_to_obj", "floor", "rby1", "gopro_d455", ""))  # fmt: skip
+TABLES = tuple(
+    ("pick", scene, "franka", "randomized_droid", "planner")
+    for scene in ("table", "varied_table", "tableware", "clutter", "shelf")
+)
+CASES = (
+    *TABLES,
+    ("open", "kitchen", "franka", "randomized_droid", "planner"),
+    ("door_opening", "room_with_door", "rby1", "gopro_d455", ""),
+    ("nav_to_obj", "floor", "rby1", "gopro_d455", ""),
+)
 AWAY = 50.0  # m; absent objects are farther from the origin
 
 
@@ -47,12 +54,22 @@ def size(model: Any, aabb: Any, body: int) -> float:
 def starts(task: str, scene: str, robot: str, system: str, policy: str, episodes: int) -> dict[str, list[Any]]:
     """The randomised quantities at the start of each episode, by name."""
     worlds = 10
-    found: dict[str, list[Any]] = {name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt", "factor", "furniture")}
-    env = mjs.make_vec(task, robot, scene=scene, num_envs=worlds, camera_system=system, width=32, height=24,
-                       policy=policy or None, observations=["grasp_pose"] if policy else ["qpos"])  # fmt: skip
+    found: dict[str, list[Any]] = {
+        name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt", "factor", "furniture")
+    }
+    env = mjs.make_vec(
+        task,
+        robot,
+        scene=scene,
+        num_envs=worlds,
+        camera_system=system,
+        width=32,
+        height=24,
+        policy=policy or None,
+        observations=["grasp_pose"] if policy else ["qpos"],
+    )
     model = env.sim.model
-    free = [int(b) for b in range(1, model.nbody)
-            if model.body_jntnum[b] == 1 and model.jnt_type[model.body_jntadr[b]] == 0]  # fmt: skip
+    free = [int(b) for b in range(1, model.nbody) if model.body_jntnum[b] == 1 and model.jnt_type[model.body_jntadr[b]] == 0]
     sizes = {b: size(model, model.geom_aabb, b) for b in free}
     still = [b for b in range(1, model.nbody) if model.body_treeid[b] < 0 and not model.body(b).name.startswith("robot_0/")]
     for first in range(0, episodes, worlds):
@@ -96,25 +113,43 @@ def measure(task: str, scene: str, robot: str, system: str, policy: str, episode
     retried: list[bool] = []
     if policy:
         with tempfile.TemporaryDirectory() as out:
-            made = mjs.record(task, robot, out=out, scene=scene, episodes=played, max_attempts=played, keep_failures=True, worlds=8,
-                              cameras=[], perturb=0.5, policy=policy)  # fmt: skip
+            made = mjs.record(
+                task,
+                robot,
+                out=out,
+                scene=scene,
+                episodes=played,
+                max_attempts=played,
+                keep_failures=True,
+                num_worlds=8,
+                cameras=[],
+                perturb=0.5,
+                policy=policy,
+            )
             retried = [e["retries"] > 0 for e in task_table.episodes_of(made.path)]
     colours, cameras = np.array(found["colour"]), np.array(found["camera"])
     furniture = np.array(found["furniture"])
     return {
-        "task": task, "scene": scene, "episodes": episodes, "played": len(retried),
-        "x": spread(found["x"], 2), "y": spread(found["y"], 2), "turn": float(np.std(found["turn"])) if found["turn"] else 0.0,
+        "task": task,
+        "scene": scene,
+        "episodes": episodes,
+        "played": len(retried),
+        "x": spread(found["x"], 2),
+        "y": spread(found["y"], 2),
+        "turn": float(np.std(found["turn"])) if found["turn"] else 0.0,
         "count": f"{min(found['count'])} to {max(found['count'])}",
         "size": spread([100 * s for s in found["size"]], 1),
         "factor": spread([100 * s for s in found["factor"]], 0),
         "furniture": int((furniture.std(0).reshape(-1, 3).max(1) > 1e-3).sum()),
         "moved": float(100 * furniture.std(0).max()) if furniture.size else 0.0,
         "light": spread(found["light"], 2),
-        "colours": int((colours.std(0).reshape(-1, 3).max(1) > 0.01).sum()), "materials": colours.shape[1] // 3,
+        "colours": int((colours.std(0).reshape(-1, 3).max(1) > 0.01).sum()),
+        "materials": colours.shape[1] // 3,
         "camera": float(100 * cameras.std(0).max()),
-        "tilt": spread(found["tilt"], 0), "slanted": float(np.mean(np.array(found["tilt"]) > 30)) if found["tilt"] else None,
+        "tilt": spread(found["tilt"], 0),
+        "slanted": float(np.mean(np.array(found["tilt"]) > 30)) if found["tilt"] else None,
         "retried": float(np.mean(retried)) if retried else 0.0,
-    }  # fmt: skip
+    }
 
 
 def table(results: list[dict[str, Any]]) -> str:

@@ -123,9 +123,24 @@ def pair(scene: SceneOfCheck, worlds: int, device: str, reference: bool = True, 
 
 
 DERIVED = (
-    "xpos", "xquat", "xmat", "xipos", "ximat", "geom_xpos", "geom_xmat", "site_xpos", "site_xmat", "cam_xpos", "cam_xmat",
-    "light_xpos", "light_xdir", "subtree_com", "cvel", "qacc", "sensordata",
-)  # fmt: skip
+    "xpos",
+    "xquat",
+    "xmat",
+    "xipos",
+    "ximat",
+    "geom_xpos",
+    "geom_xmat",
+    "site_xpos",
+    "site_xmat",
+    "cam_xpos",
+    "cam_xmat",
+    "light_xpos",
+    "light_xdir",
+    "subtree_com",
+    "cvel",
+    "qacc",
+    "sensordata",
+)
 
 
 Fields = dict[tuple[str, str], Field]

@@ -82,17 +82,33 @@ def quadruped_sensors() -> tuple[Any, ...]:
     base = mjs.ObjRef("site", "imu", "robot")
     return (
         mjs.ContactSensorCfg(
-            "feet", feet, ground, EVERY_FIELD, num_slots=2, track_air_time=True, history_length=3, track_events=True, latch=True,
-            friction_split=True, other_ids=True),
-        mjs.ContactSensorCfg("net", feet, ground, ("found", "force", "torque", "pos"), reduce="netforce", latch=True, other_ids=True),
+            "feet",
+            feet,
+            ground,
+            EVERY_FIELD,
+            num_slots=2,
+            track_air_time=True,
+            history_length=3,
+            track_events=True,
+            latch=True,
+            friction_split=True,
+            other_ids=True,
+        ),
+        mjs.ContactSensorCfg(
+            "net", feet, ground, ("found", "force", "torque", "pos"), reduce="netforce", latch=True, other_ids=True
+        ),
         mjs.ContactSensorCfg("deepest", feet, ground, ("found", "dist", "pos"), reduce="mindist", global_frame=False),
         mjs.ContactSensorCfg("legs", mjs.ContactMatch("subtree", ".*_hip", "robot"), None, EVERY_FIELD, global_frame=True),
         mjs.RayCastSensorCfg("scan", base, mjs.GridPatternCfg(size=(1.0, 0.6), resolution=0.1), ray_alignment="yaw"),
         mjs.TerrainHeightSensorCfg("height", base, mjs.GridPatternCfg(size=(0.2, 0.2), resolution=0.1)),
         mjs.LidarSensorCfg("lidar", base, scan=mjs.SpinningScanCfg(channels=4, samples=24), range_noise_std=0.01, dropout=0.05),
         mjs.ImuSensorCfg("imu", base, "mpu6050", orientation=True),
-        mjs.EffectSensorCfg("noisy", "imu", effects=(effects.EpisodeBias(effects.Gaussian(0.05)), effects.Noise(effects.Gaussian(0.1)), effects.Delay(0.02))),
-    )  # fmt: skip
+        mjs.EffectSensorCfg(
+            "noisy",
+            "imu",
+            effects=(effects.EpisodeBias(effects.Gaussian(0.05)), effects.Noise(effects.Gaussian(0.1)), effects.Delay(0.02)),
+        ),
+    )
 
 
 def plane() -> mjs.SceneCfg:
@@ -118,13 +134,17 @@ def objects() -> mjs.SceneCfg:
     things = {"robot": robot, "box": box, "ball": ball}
     every = mjs.ContactMatch("body", ("box/box", "ball/ball", "robot/trunk", "robot/left_wheel", "robot/arm"))
     return mjs.SceneCfg(
-        entities=things, terrain=mjs.TerrainCfg(), sensors=(
+        entities=things,
+        terrain=mjs.TerrainCfg(),
+        sensors=(
             mjs.ContactSensorCfg("contacts", every, None, EVERY_FIELD, num_slots=6, other_ids=True),
             mjs.ContactSensorCfg("pairs", every, every, ("found",), secondary_policy="each"),
-            mjs.ContactSensorCfg("any", mjs.ContactMatch("subtree", "trunk", "robot"), None, ("found", "dist"), reduce="none", num_slots=8),
-            mjs.CameraSensorCfg(
-                "eye", camera_name="robot/eye", width=32, height=24, data_types=("rgb", "depth", "segmentation")),
-        ))  # fmt: skip
+            mjs.ContactSensorCfg(
+                "any", mjs.ContactMatch("subtree", "trunk", "robot"), None, ("found", "dist"), reduce="none", num_slots=8
+            ),
+            mjs.CameraSensorCfg("eye", camera_name="robot/eye", width=32, height=24, data_types=("rgb", "depth", "segmentation")),
+        ),
+    )
 
 
 def on_tiles(kind: Any) -> SceneOfCheck:

@@ -28,8 +28,13 @@ def camera(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> mjrf.Camera
     view.type, view.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), model.cam(name).id
     c = mujoco.mjv_camera2GLCamera(model, data, view)
     return mjrf.Camera(
-        pos=c.pos, forward=c.forward, up=c.up, frustum_bottom=c.frustum_bottom, frustum_top=c.frustum_top,
-        frustum_near=c.frustum_near, frustum_far=c.frustum_far,
+        pos=c.pos,
+        forward=c.forward,
+        up=c.up,
+        frustum_bottom=c.frustum_bottom,
+        frustum_top=c.frustum_top,
+        frustum_near=c.frustum_near,
+        frustum_far=c.frustum_far,
     )
 
 

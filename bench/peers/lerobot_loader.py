@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Samples per second of LeRobot's loader, run by bench/export.py in LeRobot's environment.
 
-    python lerobot_loader.py DATA_SET sequential|random SECONDS
+python lerobot_loader.py DATA_SET sequential|random SECONDS
 """
 
 import sys

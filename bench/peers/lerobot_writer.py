@@ -18,7 +18,9 @@ frames = []
 for i in range(min(steps, len(dataset))):
     item = dataset[i]
     images = {key: np.rint(item[key].numpy() * 255).astype(np.uint8).transpose(1, 2, 0) for key in dataset.meta.camera_keys}
-    frames.append({"observation.state": item["observation.state"].numpy(), "action": item["action"].numpy(), "task": item["task"], **images})
+    frames.append(
+        {"observation.state": item["observation.state"].numpy(), "action": item["action"].numpy(), "task": item["task"], **images}
+    )
 names = ["observation.state", "action", *dataset.meta.camera_keys]
 features = {name: {key: dataset.features[name][key] for key in ("dtype", "shape", "names")} for name in names}
 
@@ -29,8 +31,15 @@ def cpu() -> float:
 
 
 begun = cpu()
-writer = LeRobotDataset.create("local/out", round(dataset.fps), features, root=out, image_writer_threads=0 if mode != "png" else 4,
-                               streaming_encoding=mode != "png", vcodec="h264" if mode == "h264" else "libsvtav1")  # fmt: skip
+writer = LeRobotDataset.create(
+    "local/out",
+    round(dataset.fps),
+    features,
+    root=out,
+    image_writer_threads=0 if mode != "png" else 4,
+    streaming_encoding=mode != "png",
+    vcodec="h264" if mode == "h264" else "libsvtav1",
+)
 for frame in frames:
     writer.add_frame(frame)
 writer.save_episode()

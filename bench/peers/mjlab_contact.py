@@ -39,7 +39,9 @@ def feet() -> ContactSensorCfg:
 class Case:
     def __init__(self, sensors: tuple) -> None:
         kinds = {kind: ROUGH_TERRAINS_CFG.sub_terrains[kind] for kind in KINDS}
-        tiles = TerrainGeneratorCfg(seed=0, size=(8.0, 8.0), border_width=5.0, num_rows=2, num_cols=4, curriculum=True, sub_terrains=kinds)
+        tiles = TerrainGeneratorCfg(
+            seed=0, size=(8.0, 8.0), border_width=5.0, num_rows=2, num_cols=4, curriculum=True, sub_terrains=kinds
+        )
         terrain = TerrainEntityCfg(terrain_type="generator", terrain_generator=tiles)
         cfg = SceneCfg(num_envs=WORLDS, terrain=terrain, entities={"robot": get_go1_robot_cfg()}, sensors=sensors)
         self.scene = Scene(cfg, "cpu")
@@ -88,12 +90,16 @@ def main() -> None:
             case.run()
     us = 1e6 / WORLDS / DECIMATION
     added = [b - a for a, b in zip(without.physics[WARMUP:], with_feet.physics[WARMUP:])]
-    print(json.dumps({
-        "physics": us * statistics.median(without.physics[WARMUP:]),
-        "sensors": us * statistics.median(added),
-        "torch": us * statistics.median(with_feet.torch[WARMUP:]),
-        "feet_in_contact": float((with_feet.scene["feet"].data.found > 0).float().mean()),
-    }))
+    print(
+        json.dumps(
+            {
+                "physics": us * statistics.median(without.physics[WARMUP:]),
+                "sensors": us * statistics.median(added),
+                "torch": us * statistics.median(with_feet.torch[WARMUP:]),
+                "feet_in_contact": float((with_feet.scene["feet"].data.found > 0).float().mean()),
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -34,8 +34,15 @@ def main() -> None:
     with wp.ScopedDevice("cpu"):
         m, d = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
         context = mjw.create_render_context(
-            model, nworld=worlds, cam_res=(width, height), render_rgb=True, render_depth=True, use_shadows=shadows,
-            render_skybox=skybox, enabled_geom_groups=list(camera_scenes.SHOWN_GROUPS), cam_active=[view.camera],
+            model,
+            nworld=worlds,
+            cam_res=(width, height),
+            render_rgb=True,
+            render_depth=True,
+            use_shadows=shadows,
+            render_skybox=skybox,
+            enabled_geom_groups=list(camera_scenes.SHOWN_GROUPS),
+            cam_active=[view.camera],
         )
         seconds = []
         for frame in range(RUNS + 1):

@@ -17,10 +17,17 @@ import warp as wp
 def lidar(model, data):
     """16 x 360 rays from the site "head", one world."""
     elevation, azimuth = np.meshgrid(np.radians(np.linspace(-15, 15, 16)), np.radians(np.arange(360.0)), indexing="ij")
-    local = np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], -1).reshape(-1, 3)
+    local = np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], -1).reshape(
+        -1, 3
+    )
     site = data.site("head")
     directions = local @ site.xmat.reshape(3, 3).T
-    return np.broadcast_to(site.xpos, directions.shape)[None], directions[None], int(model.site("head").bodyid[0]), [data.qpos.copy()]
+    return (
+        np.broadcast_to(site.xpos, directions.shape)[None],
+        directions[None],
+        int(model.site("head").bodyid[0]),
+        [data.qpos.copy()],
+    )
 
 
 def height(model, data):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws what train.py --curve has written.
 
-    pip install matplotlib
-    python examples/walk/curves.py rsl.json sb3.json --out curves.png
+pip install matplotlib
+python examples/walk/curves.py rsl.json sb3.json --out curves.png
 """
 
 import argparse
@@ -26,7 +26,9 @@ def main():
     figure, axes = plt.subplots(figsize=(6, 3), dpi=100)
     for run in runs:
         points = run["curve"]
-        axes.plot([p["cpu"] for p in points], [p["reward"] for p in points], label=f"{NAMES[run['trainer']]}, {run['worlds']} worlds")
+        axes.plot(
+            [p["cpu"] for p in points], [p["reward"] for p in points], label=f"{NAMES[run['trainer']]}, {run['worlds']} worlds"
+        )
     for name, style in (("standing", "--"), ("random", ":")):
         axes.axhline(runs[0]["results"][name][0], color="gray", linestyle=style, linewidth=1, label=name)
     axes.set(xlabel="CPU time of learning, s", ylabel="reward of 10 s", xlim=(0, None), ylim=(0, None))

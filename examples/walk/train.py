@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learns to walk, then says how it compares with chance.
 
-    pip install mjsense rsl-rl-lib              # or stable-baselines3
-    python examples/walk/train.py --trainer rsl --iterations 60
+pip install mjsense rsl-rl-lib              # or stable-baselines3
+python examples/walk/train.py --trainer rsl --iterations 60
 """
 
 import argparse
@@ -42,14 +42,33 @@ def with_rsl(task, env):
     torch.manual_seed(0)
     net = {"class_name": "MLPModel", "hidden_dims": (256, 128, 64), "activation": "elu", "obs_normalization": True}
     worlds = RslRlVecEnv(env, action_mean=task.stand, action_scale=SCALE)
-    runner = OnPolicyRunner(worlds, {
-        "num_steps_per_env": 24, "save_interval": 10**9, "logger": "tensorboard", "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
-        "actor": {**net, "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 0.5, "std_type": "scalar"}}, "critic": net,
-        "algorithm": {
-            "class_name": "PPO", "learning_rate": 1e-3, "schedule": "adaptive", "desired_kl": 0.01, "gamma": 0.99, "lam": 0.95,
-            "entropy_coef": 0.005, "num_learning_epochs": 5, "num_mini_batches": 4, "clip_param": 0.2, "value_loss_coef": 1.0,
-            "use_clipped_value_loss": True, "max_grad_norm": 1.0},
-    }, device="cpu")  # fmt: skip
+    runner = OnPolicyRunner(
+        worlds,
+        {
+            "num_steps_per_env": 24,
+            "save_interval": 10**9,
+            "logger": "tensorboard",
+            "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
+            "actor": {**net, "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 0.5, "std_type": "scalar"}},
+            "critic": net,
+            "algorithm": {
+                "class_name": "PPO",
+                "learning_rate": 1e-3,
+                "schedule": "adaptive",
+                "desired_kl": 0.01,
+                "gamma": 0.99,
+                "lam": 0.95,
+                "entropy_coef": 0.005,
+                "num_learning_epochs": 5,
+                "num_mini_batches": 4,
+                "clip_param": 0.2,
+                "value_loss_coef": 1.0,
+                "use_clipped_value_loss": True,
+                "max_grad_norm": 1.0,
+            },
+        },
+        device="cpu",
+    )
 
     def act(observation):
         from tensordict import TensorDict
@@ -70,10 +89,21 @@ def with_sb3(task, env):
     from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     worlds = VecNormalize(SB3VecEnv(env, action_mean=task.stand, action_scale=SCALE), norm_reward=False)
-    worlds.action_space = type(worlds.action_space)(-10, 10, worlds.action_space.shape, np.float32)  # servos have limits of their own
+    worlds.action_space = type(worlds.action_space)(
+        -10, 10, worlds.action_space.shape, np.float32
+    )  # servos have limits of their own
     steps = 24 * env.num_envs
-    trainer = PPO("MlpPolicy", worlds, n_steps=24, batch_size=steps // 4, n_epochs=5, learning_rate=5e-4, seed=0, device="cpu",
-                  policy_kwargs={"net_arch": [256, 128, 64], "log_std_init": -0.7})  # fmt: skip
+    trainer = PPO(
+        "MlpPolicy",
+        worlds,
+        n_steps=24,
+        batch_size=steps // 4,
+        n_epochs=5,
+        learning_rate=5e-4,
+        seed=0,
+        device="cpu",
+        policy_kwargs={"net_arch": [256, 128, 64], "log_std_init": -0.7},
+    )
 
     def act(observation):
         return trainer.predict(worlds.normalize_obs(observation), deterministic=True)[0]
@@ -102,7 +132,9 @@ def main():
         before = time.process_time()
         learn(min(10, options.iterations - done))
         cpu += time.process_time() - before
-        curve.append({"iteration": min(done + 10, options.iterations), "cpu": cpu, "reward": judge(Walk(options.model), act, worlds=32)[0]})
+        curve.append(
+            {"iteration": min(done + 10, options.iterations), "cpu": cpu, "reward": judge(Walk(options.model), act, worlds=32)[0]}
+        )
         print("iteration {iteration:4} ({cpu:4.0f} s CPU): reward {reward:6.2f}".format(**curve[-1]), flush=True)
     env.close()
     results = {"random": chance, "standing": still, "learned": judge(Walk(options.model), act)}
@@ -110,7 +142,9 @@ def main():
         print(f"{name:9} reward {result[0]:6.2f}  steps {result[1]:5.0f} of 500  error of velocity {result[2]:.2f} m/s")
     print(f"{time.perf_counter() - start:.0f} s in all")
     if options.curve:
-        Path(options.curve).write_text(json.dumps({"trainer": options.trainer, "worlds": options.worlds, "results": results, "curve": curve}))
+        Path(options.curve).write_text(
+            json.dumps({"trainer": options.trainer, "worlds": options.worlds, "results": results, "curve": curve})
+        )
 
 
 if __name__ == "__main__":

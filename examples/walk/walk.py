@@ -41,20 +41,34 @@ class Walk(mjs.Task):
             "rough": mjs.SubTerrainCfg(kind="rough", amplitude=(0.0, 0.03), proportion=0.4),
             "waves": mjs.SubTerrainCfg(kind="waves", amplitude=(0.0, 0.06), proportion=0.3),
         }
-        ground = mjs.TerrainCfg(terrain_type="generator", sub_terrains=tiles, levels=4, types=6) if self.rough else mjs.TerrainCfg()
+        ground = (
+            mjs.TerrainCfg(terrain_type="generator", sub_terrains=tiles, levels=4, types=6) if self.rough else mjs.TerrainCfg()
+        )
         imu = mjs.ObjRef(type="site", name="imu", entity="robot")
         return mjs.SceneCfg(
-            terrain=ground, spec_fn=self.hide_from_scan, entities={"robot": robot}, options=mjs.MujocoCfg(iterations=10, ls_iterations=20),
+            terrain=ground,
+            spec_fn=self.hide_from_scan,
+            entities={"robot": robot},
+            options=mjs.MujocoCfg(iterations=10, ls_iterations=20),
             sensors=(
                 mjs.BuiltinSensorCfg(name="turn", sensor_type="gyro", obj=imu),
                 mjs.BuiltinSensorCfg(name="speed", sensor_type="velocimeter", obj=imu),
                 mjs.ContactSensorCfg(
-                    name="feet", primary=mjs.ContactMatch(mode="geom", pattern=".*_foot(_collision)?", entity="robot"), track_air_time=True,
-                    secondary=mjs.ContactMatch(mode="body", pattern="terrain")),
+                    name="feet",
+                    primary=mjs.ContactMatch(mode="geom", pattern=".*_foot(_collision)?", entity="robot"),
+                    track_air_time=True,
+                    secondary=mjs.ContactMatch(mode="body", pattern="terrain"),
+                ),
                 mjs.RayCastSensorCfg(
-                    name="scan", frame=mjs.ObjRef(type="body", name="trunk", entity="robot"), ray_alignment="yaw", max_distance=2,
-                    pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1), include_geom_groups=(0,)),
-            ))  # fmt: skip
+                    name="scan",
+                    frame=mjs.ObjRef(type="body", name="trunk", entity="robot"),
+                    ray_alignment="yaw",
+                    max_distance=2,
+                    pattern=mjs.GridPatternCfg(size=(1.6, 1.0), resolution=0.1),
+                    include_geom_groups=(0,),
+                ),
+            ),
+        )
 
     def hide_from_scan(self, spec):
         """Group 2 for the robot: cameras see it, the scan does not."""
@@ -74,7 +88,11 @@ class Walk(mjs.Task):
         world.qpos[3:7] = np.cos(turn / 2), 0, 0, np.sin(turn / 2)
         world.qpos[7:] += rng.uniform(-0.05, 0.05, 12)
         world.ctrl[:] = self.stand
-        self.command[world.id] = rng.uniform(0.3, 0.8), rng.uniform(-0.2, 0.2), rng.uniform(-0.5, 0.5)  # forwards, left, turn: m/s, rad/s
+        self.command[world.id] = (
+            rng.uniform(0.3, 0.8),
+            rng.uniform(-0.2, 0.2),
+            rng.uniform(-0.5, 0.5),
+        )  # forwards, left, turn: m/s, rad/s
 
     def begin(self, ids):
         self.before[ids] = self.stand
@@ -91,12 +109,22 @@ class Walk(mjs.Task):
         steps = sensors["feet"].compute_first_contact(0.02)
         air = (np.minimum(sensors["feet"].data.last_air_time - 0.15, 0.15) * steps).sum(1)
         good = 1.5 * np.exp(-error[0] / 0.25) + 0.75 * np.exp(-error[1] / 0.25) + 5 * air
-        bad = (1.0 * np.square(speed[:, 2]) + 2.0 * np.square(up[:, :2]).sum(1) + 0.02 * np.square(turn[:, :2]).sum(1)
-               + 0.03 * np.square(sim.ctrl - self.before).sum(1) + 0.02 * np.square(sim.qpos[:, 7:] - self.stand).sum(1))  # fmt: skip
+        bad = (
+            1.0 * np.square(speed[:, 2])
+            + 2.0 * np.square(up[:, :2]).sum(1)
+            + 0.02 * np.square(turn[:, :2]).sum(1)
+            + 0.03 * np.square(sim.ctrl - self.before).sum(1)
+            + 0.02 * np.square(sim.qpos[:, 7:] - self.stand).sum(1)
+        )
         reward = 0.02 * np.maximum(good - bad, 0)  # never below 0: to fall must not be a way out
         self.before[:] = sim.ctrl
         fallen = (up[:, 2] < 0.5) | (sim.qpos[:, 2] - self.places[:, 2] < -1)
-        return {"reward": reward, "success": (error[0] < 0.04) & ~fallen, "terminated": fallen, "info": {"error": np.sqrt(error[0])}}
+        return {
+            "reward": reward,
+            "success": (error[0] < 0.04) & ~fallen,
+            "terminated": fallen,
+            "info": {"error": np.sqrt(error[0])},
+        }
 
     def sensors(self):
         return [Feeling(self)]
@@ -115,7 +143,18 @@ class Feeling(mjs.Sensor):
     def compute(self, sim):
         scene, task = sim.scene, self.task
         scan = scene["scan"].data.distances
-        return np.concatenate([
-            scene["robot/speed"].data, 0.25 * scene["robot/turn"].data, task.up(sim), task.command,
-            sim.qpos[:, 7:] - task.stand, 0.05 * sim.qvel[:, 6:], sim.ctrl - task.stand,
-            scene["feet"].data.found > 0, 5 * (np.where(scan < 0, 0.5, scan) - 0.3)], axis=1, dtype=np.float32)  # fmt: skip
+        return np.concatenate(
+            [
+                scene["robot/speed"].data,
+                0.25 * scene["robot/turn"].data,
+                task.up(sim),
+                task.command,
+                sim.qpos[:, 7:] - task.stand,
+                0.05 * sim.qvel[:, 6:],
+                sim.ctrl - task.stand,
+                scene["feet"].data.found > 0,
+                5 * (np.where(scan < 0, 0.5, scan) - 0.3),
+            ],
+            axis=1,
+            dtype=np.float32,
+        )

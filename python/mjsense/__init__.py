@@ -25,17 +25,20 @@ Where to look (``help(mjs.Simulation)`` and so on):
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     editing recordings           delete_episodes, split_dataset, merge_datasets
-    files of other programs      export_lerobot, export_lerobot21, export_mcap, export_rerun, export_rlds, export_robomimic,
-                                 export_zarr; import_lerobot, import_robomimic
+    files of other programs      export; import_lerobot, import_robomimic
     in the browser               view: live worlds, tasks, recordings
     plots of streams             plot
     names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
-    robot learning               mjsense.tasks: the names above that are about tasks, robots and policies
+    more about sensors           mjsense.sensors: their classes, data and parts; mjsense.scene, mjsense.sim
+    more about recordings        mjsense.recording, mjsense.dataset, mjsense.exporting
+    robot learning               mjsense.tasks: tasks, robots, policies, environments; mjsense.viewer
     trainers                     mjsense.tasks.rl.sb3, mjsense.tasks.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
 
 ``python -m mjsense --help`` is the program.
 """
+
+import typing
 
 from mjsense.commands import start
 
@@ -49,92 +52,80 @@ from mjsense import _core
 
 _core.leave_no_log_file()
 
-from mjsense._core import SensorSpec, embedded_models, robot_names
+from mjsense import dataset as dataset
+from mjsense import exporting as exporting
+from mjsense import recording as recording
+from mjsense import scene as scene
+from mjsense import sensors as sensors
+from mjsense import sim as sim
+from mjsense import tasks as tasks
+from mjsense import viewer as viewer
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
+from mjsense._core import embedded_models, robot_names
 from mjsense.core import installed_files, later_rooms, old_names
 from mjsense.core.errors import UnknownNameError
-from mjsense.dataset import (
-    Dataset,
-    Deviation,
-    Episode,
-    EpisodeCheck,
-    EpisodeQuality,
-    RenderProgress,
-    RenderSummary,
-    ReplayReport,
-    SensorCheck,
-    Stream,
-    Video,
-    check_replay,
-    render,
-    replay,
-)
+from mjsense.dataset import Dataset, check_replay, render, replay
 from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
 from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
-from mjsense.exporting import (
-    export_lerobot,
-    export_lerobot21,
-    export_mcap,
-    export_rerun,
-    export_rlds,
-    export_robomimic,
-    export_zarr,
+from mjsense.exporting import export
+from mjsense.recording import RecordEpisodes, Recorder
+from mjsense.rendering import Renderer
+from mjsense.scene import Scene
+from mjsense.sensors import (
+    BuiltinSensorCfg,
+    CameraIntrinsics,
+    CameraSensorCfg,
+    ContactMatch,
+    ContactSensorCfg,
+    EffectSensorCfg,
+    EntityCfg,
+    GridPatternCfg,
+    ImuSensorCfg,
+    LensDistortion,
+    LidarSensorCfg,
+    MujocoCfg,
+    ObjRef,
+    PinholeCameraPatternCfg,
+    RayCastSensorCfg,
+    RingPatternCfg,
+    SceneCfg,
+    SceneFileCfg,
+    Sensor,
+    SensorError,
+    SensorSuite,
+    SpinningScanCfg,
+    SubTerrainCfg,
+    TableScanCfg,
+    TerrainCfg,
+    TerrainHeightSensorCfg,
+    UserPatternCfg,
+    effects,
+    observations,
 )
-from mjsense.recording.record_episodes import RecordEpisodes, RecordVectorEpisodes
-from mjsense.recording.recorder import Recorder
-from mjsense.rendering.renderer import Renderer
-from mjsense.scene.scene import Entity, Scene
-from mjsense.sensors import configs, effects, observations
-from mjsense.sensors.configs import *  # noqa: F403
-from mjsense.sensors.contact import ContactSensor
-from mjsense.sensors.core_sensors import (
-    CameraImageSensor,
-    CameraParameterSensor,
-    EnvStatesSensor,
-    FunctionSensor,
-    GraspStateSensor,
-    ImagePointsSensor,
-    JointPositionSensor,
-    JointVelocitySensor,
-    PoseSensor,
-    RobotBasePoseSensor,
-    TcpPoseSensor,
-)
-from mjsense.sensors.data import CameraData, ContactData, ImuData, RayCastData, SensorData
-from mjsense.sensors.drawing import DebugShapes
-from mjsense.sensors.imu import ImuSensor
-from mjsense.sensors.native_sensor import BuiltinSensor, NativeSensor
-from mjsense.sensors.pipeline import ObservationPipeline
-from mjsense.sensors.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.sensors.sensor import Sensor
-from mjsense.sensors.suite import SensorSuite
-from mjsense.sensors.user_code import SensorError
-from mjsense.sim.attached import Attached, attach
-from mjsense.sim.simulation import Simulation
+from mjsense.sim import Simulation, attach
 from mjsense.tasks import gymnasium_registry
-from mjsense.tasks.env import TaskEnv, make
+from mjsense.tasks.env import make
 from mjsense.tasks.policy import Policy, policy_names, register_policy
-from mjsense.tasks.record_job import RecordProgress, RecordSummary
 from mjsense.tasks.recording import record
-from mjsense.tasks.robot import MoveGroup, Robot, RobotCamera
-from mjsense.tasks.task import Task, WorldState, register_task, task_names
-from mjsense.tasks.teleoperation import Teleoperation, play
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
-from mjsense.viewer import view
-from mjsense.viewer.plots import plot
-from mjsense.viewer.viewer import Viewer
+from mjsense.tasks.robot import Robot
+from mjsense.tasks.task import Task, register_task, task_names
+from mjsense.tasks.teleoperation import play
+from mjsense.tasks.vector import make_vec
+from mjsense.viewer import plot, view
 
-later_rooms.provide({
-    "env": "mjsense.compat.peer.env:PeerEnv",
-    "foreign_sensor": "mjsense.compat.peer.per_world:foreign_sensor",
-    "record_on_ray": "mjsense.cluster.recording:record_from_options",
-    "sensor_adapters": "mjsense.compat.sensor_adapters:ADAPTERS",
-    "task_names": "mjsense.tasks.task:task_names",
-    "task_source": "mjsense.tasks.viewer_source:task_source",
-    "warp_environment": "mjsense.warp.start:environment",
-    "warp_simulation": "mjsense.warp.start:simulation",
-})
+later_rooms.provide(
+    {
+        "env": "mjsense.compat.peer.env:PeerEnv",
+        "foreign_sensor": "mjsense.compat.peer.per_world:foreign_sensor",
+        "record_on_ray": "mjsense.cluster.recording:record_from_options",
+        "sensor_adapters": "mjsense.compat.sensor_adapters:ADAPTERS",
+        "task_names": "mjsense.tasks.task:task_names",
+        "task_source": "mjsense.tasks.viewer_source:task_source",
+        "warp_environment": "mjsense.warp.start:environment",
+        "warp_simulation": "mjsense.warp.start:simulation",
+    }
+)
 
 installed_files.name_package_folders()
 
@@ -142,21 +133,72 @@ gymnasium_registry.register_all()
 
 old_names.register()
 
-# fmt: off
 __all__ = [
-    *configs.__all__,
-    "Attached", "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
-    "ContactSensor", "Dataset", "DebugShapes", "Deviation", "Entity", "EnvStatesSensor", "Episode",
-    "EpisodeCheck", "EpisodeQuality", "FunctionSensor", "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor",
-    "JointPositionSensor", "JointVelocitySensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy",
-    "PoseSensor", "RayCastData", "RayCastSensor", "RecordEpisodes", "RecordProgress", "RecordSummary", "RecordVectorEpisodes",
-    "Recorder", "RenderProgress", "RenderSummary", "Renderer", "ReplayReport", "Robot", "RobotBasePoseSensor", "RobotCamera",
-    "Scene", "Sensor", "SensorCheck", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Stream", "Task",
-    "TaskEnv", "TaskVectorEnv", "TcpPoseSensor", "Teleoperation", "TerrainHeightSensor", "UnknownNameError", "Video", "Viewer",
-    "WorldState", "attach", "check_replay", "delete_episodes", "effects", "embedded_models", "export_lerobot", "export_lerobot21", "export_mcap",
-    "export_rerun", "export_rlds", "export_robomimic", "export_zarr", "import_lerobot", "import_robomimic", "make", "make_vec",
-    "merge_datasets", "observations",
-    "play", "plot", "policy_names", "record", "register_policy", "register_task", "render", "replay", "robot_names", "split_dataset", "task_names",
+    "BuiltinSensorCfg",
+    "CameraIntrinsics",
+    "CameraSensorCfg",
+    "ContactMatch",
+    "ContactSensorCfg",
+    "Dataset",
+    "EffectSensorCfg",
+    "EntityCfg",
+    "GridPatternCfg",
+    "ImuSensorCfg",
+    "LensDistortion",
+    "LidarSensorCfg",
+    "MujocoCfg",
+    "ObjRef",
+    "PinholeCameraPatternCfg",
+    "Policy",
+    "RayCastSensorCfg",
+    "RecordEpisodes",
+    "Recorder",
+    "Renderer",
+    "RingPatternCfg",
+    "Robot",
+    "Scene",
+    "SceneCfg",
+    "SceneFileCfg",
+    "Sensor",
+    "SensorError",
+    "SensorSuite",
+    "Simulation",
+    "SpinningScanCfg",
+    "SubTerrainCfg",
+    "TableScanCfg",
+    "Task",
+    "TerrainCfg",
+    "TerrainHeightSensorCfg",
+    "UnknownNameError",
+    "UserPatternCfg",
+    "attach",
+    "check_replay",
+    "delete_episodes",
+    "effects",
+    "embedded_models",
+    "export",
+    "import_lerobot",
+    "import_robomimic",
+    "make",
+    "make_vec",
+    "merge_datasets",
+    "observations",
+    "play",
+    "plot",
+    "policy_names",
+    "record",
+    "register_policy",
+    "register_task",
+    "render",
+    "replay",
+    "robot_names",
+    "split_dataset",
+    "task_names",
     "view",
     "__version__",
 ]
+
+if not typing.TYPE_CHECKING:  # a type checker would accept every name
+
+    def __getattr__(name):
+        return old_names.moved_name(name)

@@ -54,7 +54,7 @@ def pattern_of(raw: dict[str, Any]) -> Any:
     return mjs.PinholeCameraPatternCfg(**raw)
 
 
-def sensor_of(raw: dict[str, Any]) -> mjs.SensorCfg:
+def sensor_of(raw: dict[str, Any]) -> mjs.sensors.SensorCfg:
     raw = dict(raw)
     cls = KINDS[raw.pop("kind")]
     for key in ("obj", "ref"):
@@ -95,11 +95,11 @@ class Reader:
         self.sensed = False
 
     def traced(self, sensor: Any) -> bool:
-        return isinstance(sensor, (mjs.RayCastSensor, mjs.CameraSensor))
+        return isinstance(sensor, (mjs.sensors.RayCastSensor, mjs.sensors.CameraSensor))
 
     def read(self, key: str) -> Any:
         sensor = self.sim.scene[key]
-        if isinstance(sensor, mjs.ContactSensor):
+        if isinstance(sensor, mjs.sensors.ContactSensor):
             if key not in self.cache:
                 self.cache[key] = copy_of(sensor.data)
             return self.cache[key]
@@ -129,19 +129,19 @@ class Reader:
         place."""
         sensor = self.sim.scene[key]
         held = self.read(key)
-        if isinstance(sensor, mjs.BuiltinSensor):
+        if isinstance(sensor, mjs.sensors.BuiltinSensor):
             return lambda: sensor.data
         held = copy_of(held)
         live: tuple[str, ...] = ()
-        if isinstance(sensor, mjs.ContactSensor):
+        if isinstance(sensor, mjs.sensors.ContactSensor):
             live = ("current_air_time", "last_air_time", "current_contact_time", "last_contact_time")
-        elif isinstance(sensor, mjs.CameraSensor):
+        elif isinstance(sensor, mjs.sensors.CameraSensor):
             live = () if sensor_clones(self.sim.scene, key) else ("rgb", "depth", "segmentation")
         elif self.traced(sensor):
             live = ("distances", "normals_w")
 
         def later() -> Any:
-            now = sensor.data if isinstance(sensor, mjs.ContactSensor) else self.read(key)
+            now = sensor.data if isinstance(sensor, mjs.sensors.ContactSensor) else self.read(key)
             for name in live:
                 if getattr(held, name, None) is not None:
                     setattr(held, name, np.array(getattr(now, name)))
@@ -289,7 +289,7 @@ def run_case(case: dict[str, Any]) -> dict[str, Any]:
         frames = np.asarray(settings.pop("frames"), dtype=np.float32)
         if "delay" in settings:  # constant delay
             settings["delay_min_lag"] = settings["delay_max_lag"] = settings.pop("delay")
-        pipeline = ObservationPipeline(num_envs=frames.shape[1], **settings)
+        pipeline = ObservationPipeline(num_worlds=frames.shape[1], **settings)
         return {"out": {"data": encode(np.stack([pipeline(frame) for frame in frames]))}}
     return run_script(case)
 

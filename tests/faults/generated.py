@@ -457,7 +457,7 @@ def _readers(path: Path, out: Path, number: int) -> dict[str, Callable[[], Any]]
         "verify": lambda: _run(["verify", str(path)]),
         "dataset": lambda: _read(path),
         "replay": lambda: mjs.check_replay(path, states=number % 4 == 0, progress=False),
-        "render": lambda: mjs.render(path, out / "rendered", width=16, worlds=1, threads=1, progress=False),
+        "render": lambda: mjs.render(path, out / "rendered", width=16, num_worlds=1, threads=1, progress=False),
         "export": lambda: _run(["export", exports[number % 3], str(path), str(out / "exported"), "-q"]),
         "quality": lambda: _run(["quality", str(path)]),
         "inspect": lambda: _run(["inspect", str(path)]),
@@ -466,7 +466,7 @@ def _readers(path: Path, out: Path, number: int) -> dict[str, Callable[[], Any]]
     if number % 3 == 0:
         found["view"] = lambda: _view(path)
     if number % 7 == 0:
-        found["copies"] = lambda: mjs.render(path, out / "copied", worlds=1, threads=1, progress=False)
+        found["copies"] = lambda: mjs.render(path, out / "copied", num_worlds=1, threads=1, progress=False)
     return found
 
 

@@ -94,7 +94,7 @@ if order != "alone":
 
 task = CartWithModel()
 mjs.record("pick", out=folder + "/pick", episodes=1, horizon=5, keep_failures=True, width=32, height=24)
-done = mjs.record(task, policy=Driver(task), out=folder + "/cart", episodes=2, worlds=2, cameras=[], keep_failures=True)
+done = mjs.record(task, policy=Driver(task), out=folder + "/cart", episodes=2, num_worlds=2, cameras=[], keep_failures=True)
 assert len(done.lengths) == 2, done
 env = mjs.make_vec("pick", num_envs=2)
 observation, _ = env.reset(seed=0)

@@ -3,7 +3,8 @@
 
 The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
 another robosuite, build/mjlab, build/warp and build/programs. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,programs makes them.
-MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco and tonyzhaozh/act, whose programs are run.
+MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/dm_control, tonyzhaozh/act and
+kevinzakka/mink, whose programs are run.
 """
 
 import os
@@ -48,11 +49,15 @@ PACKAGES = {
         "gymnasium==1.4.0",
         "h5py",
         "ipython",
+        "loop-rate-limiters",
         "matplotlib",
+        "mink==0.0.5",
         "nanobind-backend>=1.0",
+        "osqp",
         "pygments",
         "PyOpenGL",
         "pyquaternion",
+        "qpsolvers[quadprog]",
         "scipy",
     ),
 }
@@ -156,7 +161,17 @@ def test_recorder_of_act(environment):
 @pytest.mark.parametrize("name", ["tutorial", "mjspec"])
 def test_notebooks_of_mujoco(environment, name):
     notebook = checkout(f"mujoco/python/{name}.ipynb")
-    run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", notebook, "30", notebook.parents[1])
+    run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", "mujoco", notebook, "30", notebook.parents[1])
+
+
+def test_notebook_of_dm_control(environment):
+    notebook = checkout("dm_control/tutorial.ipynb")
+    run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", "dm_control", notebook, "24")
+
+
+def test_examples_of_mink(environment):
+    folder = checkout("mink/examples/arm_iiwa.py").parents[1]
+    run(environment("programs"), Path(__file__).parent / "adapters/mink_examples.py", folder)
 
 
 def test_every_page_is_tested():

@@ -2,6 +2,7 @@
 """Wrong arguments of every public method, and misspelt attributes, raise errors of one sentence."""
 
 import inspect
+import sys
 import types
 
 import mujoco
@@ -10,20 +11,22 @@ import pytest
 from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
+from mjsense.core.old_names import MOVED
 
 # Users write the methods of the first three; environments have those of Gymnasium, see below. A viewer is made by a function.
-ENVS = (mjs.TaskVectorEnv, mjs.RecordEpisodes, mjs.RecordVectorEpisodes)
-SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.Viewer, *ENVS)
+ENVS = (mjs.tasks.TaskVectorEnv, mjs.RecordEpisodes, mjs.recording.RecordVectorEpisodes)
+SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.viewer.Viewer, *ENVS)
+PUBLIC = [*vars(mjs).values(), *(getattr(sys.modules[room], name) for room, names in MOVED.items() for name in names)]
 CLASSES = [
     value
-    for value in vars(mjs).values()
+    for value in PUBLIC
     if isinstance(value, type)
     and not issubclass(value, (Exception, *SKIPPED))
     and not hasattr(value, "__dataclass_fields__")
     and value.__module__.startswith("mjsense.")
-    and value is not mjs.SensorSpec
+    and value is not mjs.sensors.SensorSpec
 ]
-FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.render, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
+FUNCTIONS = [mjs.record, mjs.attach, mjs.make, mjs.make_vec, mjs.replay, mjs.check_replay, mjs.render, mjs.sensors.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
 
 
 def methods_of(cls):
@@ -42,10 +45,10 @@ def ids(function):
     return function.__qualname__
 
 
-NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # created by scenes only
-STATIC = {f.__qualname__: f for c in [*(c for c in CLASSES if c not in NATIVE), mjs.TaskVectorEnv] for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
+NATIVE = {mjs.sensors.NativeSensor, mjs.sensors.BuiltinSensor, mjs.scene.Entity}  # created by scenes only
+STATIC = {f.__qualname__: f for c in [*(c for c in CLASSES if c not in NATIVE), mjs.tasks.TaskVectorEnv] for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
 STATIC["RecordEpisodes.__init__"] = mjs.RecordEpisodes.__init__
-STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.replace and f.__name__ != "checked"}
+STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.sensors.replace and f.__name__ != "checked"}
 
 
 @pytest.mark.parametrize("function", [f for f in STATIC.values() if "NativeSensor.__init__" not in ids(f)], ids=ids)
@@ -76,10 +79,10 @@ def live(tmp_path_factory):
     )
     sim = mjs.Simulation(scene, num_worlds=2)
     objects = [scene, sim, *(scene[k] for k in ("touch", "scan", "lidar", "height", "eye", "imu", "ball/acc")), scene["ball"]]
-    objects += [mjs.SensorSuite([scene["scan"]]), mjs.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
-    objects += [mjs.Recorder(tmp_path_factory.mktemp("data"), sim, [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.WorldState(sim, 0, 0)]
+    objects += [mjs.SensorSuite([scene["scan"]]), mjs.sensors.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
+    objects += [mjs.Recorder(tmp_path_factory.mktemp("data"), sim, [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.tasks.WorldState(sim, 0, 0)]
     objects[-2].reset()
-    mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, worlds=1)
+    mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, num_worlds=1)
     dataset = mjs.Dataset(data)
     renderer = mjs.Renderer(scene.model, 4, 4)
     data = mujoco.MjData(scene.model)
@@ -87,9 +90,9 @@ def live(tmp_path_factory):
     renderer.update_scene(data)
     objects += [mjs.attach(scene.model, mujoco.MjData(scene.model)), renderer, dataset, dataset.episodes[0], dataset.episodes[0].video("wrist_camera")]
     objects += [
-        mjs.JointPositionSensor(), mjs.JointVelocitySensor(), mjs.PoseSensor("p", body="ball/ball"), mjs.TcpPoseSensor(),
-        mjs.RobotBasePoseSensor(), mjs.EnvStatesSensor(), mjs.CameraParameterSensor("eye"), mjs.CameraImageSensor("eye"),
-        mjs.ImagePointsSensor({}, []), mjs.GraspStateSensor("ball/ball"), mjs.Robot("franka"),
+        mjs.sensors.JointPositionSensor(), mjs.sensors.JointVelocitySensor(), mjs.sensors.PoseSensor("p", body="ball/ball"), mjs.sensors.TcpPoseSensor(),
+        mjs.sensors.RobotBasePoseSensor(), mjs.sensors.EnvStatesSensor(), mjs.sensors.CameraParameterSensor("eye"), mjs.sensors.CameraImageSensor("eye"),
+        mjs.sensors.ImagePointsSensor({}, []), mjs.sensors.GraspStateSensor("ball/ball"), mjs.Robot("franka"),
     ]  # fmt: skip
     return {type(o): o for o in objects}, sim
 
@@ -107,7 +110,7 @@ def test_argument_errors_do_not_mention_bindings(cls, live):
     objects, _sim = live
     if cls not in objects:
         core = cls.__module__ == "mjsense.sensors.core_sensors"  # NativeSensors, made of a simulation's robot
-        assert core or cls in (mjs.NativeSensor, mjs.BuiltinSensor), "give the fixture an object of it"
+        assert core or cls in (mjs.sensors.NativeSensor, mjs.sensors.BuiltinSensor), "give the fixture an object of it"
         return
     for function in methods_of(cls):
         if function.__name__ in ("__init__", "close", "reset_sensors"):
@@ -180,8 +183,8 @@ def test_misspelt_attributes():
         (mjs.TerrainCfg(), "level", "levels"),
         (mjs.CameraSensorCfg(name="a"), "with", "width"),
         (mjs.SensorSuite(), "sensor", "sensors"),
-        (mjs.ObservationPipeline(1), "num_env", "num_envs"),
-        (mjs.DebugShapes(), "mean_size", "meansize"),
+        (mjs.sensors.ObservationPipeline(1), "num_world", "num_worlds"),
+        (mjs.sensors.DebugShapes(), "mean_size", "meansize"),
     ]:
         with pytest.raises(AttributeError, match=f"has no attribute '{name}'; did you mean .*'{near}'"):
             setattr(owner, name, 3)
@@ -225,7 +228,7 @@ def test_measurements_are_read_only():
 
 def test_values_of_the_wrong_kind_are_named(live):
     objects, sim = live
-    dataset, env = objects[mjs.Dataset], objects[mjs.TaskEnv]
+    dataset, env = objects[mjs.Dataset], objects[mjs.tasks.TaskEnv]
     suite = mjs.SensorSuite([sim.scene["scan"]])
     for call, error, text in [
         (lambda: dataset.stats([1]), TypeError, r"Dataset.stats\(\): streams must be a sequence of str or None, not \[1\]"),
@@ -281,3 +284,23 @@ def test_texts_of_a_sensor_must_be_texts(attribute):
     own = type("Own", (Own,), {attribute: 3})()
     with pytest.raises(TypeError, match=f"Own.{attribute} must be a str, not 3"):
         mjs.Simulation(ball_scene()).add(own)
+
+
+def test_the_number_of_worlds_has_one_name(tmp_path):
+    data = tmp_path / "data"
+    mjs.record("pick", out=data, cameras=[], horizon=2, keep_failures=True, num_worlds=1)
+    for function, path in ((mjs.check_replay, data), (mjs.view, "pick")):
+        with pytest.raises(TypeError, match=r"\(\) got an unexpected keyword argument 'num_envs'; did you mean 'num_worlds'\?$"):
+            function(path, num_envs=2)
+    with pytest.raises(TypeError, match=r"make_vec\(\) got an unexpected keyword argument 'num_worlds'; did you mean 'num_envs'\?$"):
+        mjs.make_vec("pick", num_worlds=2)
+    with pytest.warns(DeprecationWarning, match=r"^check_replay\(\): the argument worlds is now num_worlds$") as caught:
+        assert mjs.check_replay(data, worlds=2)
+    assert caught[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match=r"^ObservationPipeline\(\): the argument num_envs is now num_worlds$") as caught:
+        pipeline = mjs.sensors.ObservationPipeline(num_envs=2)
+    assert caught[0].filename == __file__ and pipeline.num_worlds == 2
+    with pytest.warns(DeprecationWarning, match="^ObservationPipeline.num_envs is now num_worlds$"):
+        assert pipeline.num_envs == 2
+    with pytest.raises(TypeError, match=r"'worlds'; did you mean 'num_worlds'\?$"):
+        mjs.check_replay(data, worlds=2, num_worlds=2)

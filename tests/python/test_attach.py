@@ -348,7 +348,7 @@ def test_a_world_may_get_new_data_and_a_new_model():
 def test_suites_and_recorders_take_attached_sensors(tmp_path):
     model, datas = started(2)
     with mjs.attach(model, datas, sensors()) as attached:
-        suite = mjs.SensorSuite([attached["touch"], attached["acc"], attached.add(mjs.PoseSensor("pose", body="box"))])
+        suite = mjs.SensorSuite([attached["touch"], attached["acc"], attached.add(mjs.sensors.PoseSensor("pose", body="box"))])
         with mjs.Recorder(tmp_path, attached.simulation, suite, episodes=2) as recorder:
             for world in range(2):
                 recorder.begin_episode(world, world)

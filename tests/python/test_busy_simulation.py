@@ -44,7 +44,7 @@ def in_simulation(sensor, tmp_path):
 
 
 def in_recording(sensor, tmp_path):
-    mjs.record("pick", out=tmp_path / "out", worlds=2, horizon=3, max_attempts=1, cameras=[], sensors=[sensor], keep_failures=True)
+    mjs.record("pick", out=tmp_path / "out", num_worlds=2, horizon=3, max_attempts=1, cameras=[], sensors=[sensor], keep_failures=True)
 
 
 def in_environment(sensor, tmp_path):

@@ -161,7 +161,7 @@ def test_sizes_are_refused_before_they_are_allocated(given, why):
 
 
 def test_compiled_models_are_those_of_mujoco(tmp_path):
-    mjs.record("pick", out=tmp_path, worlds=1, episodes=1, keep_failures=True, horizon=2, cameras=[], seed=3)
+    mjs.record("pick", out=tmp_path, num_worlds=1, episodes=1, keep_failures=True, horizon=2, cameras=[], seed=3)
     path = next(tmp_path.glob("house_0/model_*.zip"))
     files = archive.read_archive(path)
     ours = compile_closed(files, str(path))

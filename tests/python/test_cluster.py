@@ -21,8 +21,9 @@ import mjsense as mjs
 from mjsense.cluster import Job, export_on_ray, exporting, record_on_ray, render_on_ray, tasks
 from mjsense.cluster import driver as driver_module
 from mjsense.cluster.job import Shard, ShardResult
+from mjsense.exporting import FORMATS
 
-ARGUMENTS = {"task": "pick", "horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5}
+ARGUMENTS = {"task": "pick", "horizon": 12, "keep_failures": True, "width": 32, "height": 24, "num_worlds": 2, "seed": 5}
 EPISODES, ATTEMPTS = 6, 2
 
 
@@ -134,16 +135,16 @@ class TestExport:
         yield data / "index.parquet"
         ray.shutdown()
 
-    @pytest.mark.parametrize(("format", "library"), (("lerobot", "av"), ("lerobot21", "av"), ("robomimic", "h5py"), ("rlds", "google_crc32c"), ("zarr", "zarr"),
-                                                     ("mcap", "mcap_protobuf"), ("rerun", "rerun_cli")))  # fmt: skip
-    def test_it_equals_that_of_one_process(self, format, library, index, tmp_path, monkeypatch):
-        pytest.importorskip(library, reason=f"needs {library}")
+    @pytest.mark.parametrize("format", FORMATS)
+    def test_it_equals_that_of_one_process(self, format, index, tmp_path, monkeypatch):
+        for library in ("av", FORMATS[format].library, *(["rerun_cli"] if format == "rerun" else [])):
+            pytest.importorskip(library, reason=f"needs {library}")
         monkeypatch.setattr(exporting, "_CHUNK", 2)  # three parts
         monkeypatch.setattr("mjsense.exporting.rlds._SHARD_BYTES", 50_000)
         shown = []
         (tmp_path / "ray").mkdir()
         ours = export_on_ray(format, index, tmp_path / "ray/data", progress=lambda *now: shown.append(now))
-        theirs = getattr(mjs, f"export_{format}")(index, tmp_path / "data")
+        theirs = mjs.export(index, tmp_path / "data", format=format)
         assert files_of(ours) == files_of(theirs) and shown[-1] == (5, 5)
         assert [path.name for path in (tmp_path / "ray").iterdir()] == ["data"]
         for file in ours.glob("*.rrd"):
@@ -269,7 +270,7 @@ def test_a_defect_that_ends_the_process_is_an_error(how, tmp_path, monkeypatch):
     (tmp_path / "crashing.py").write_text(CRASH.format(log=str(tmp_path / "log"), defect=DEFECTS[how]))
     monkeypatch.syspath_prepend(tmp_path)
     policy = __import__("crashing").Crash
-    job = Job(str(tmp_path / "out"), {**ARGUMENTS, "policy": policy, "worlds": 1})
+    job = Job(str(tmp_path / "out"), {**ARGUMENTS, "policy": policy, "num_worlds": 1})
     environment = {"env_vars": {"PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}}
     with pytest.raises(RuntimeError) as raised:
         record_on_ray(job, episodes=2, max_attempts=2, shard_attempts=2, runtime_env=environment)

@@ -70,12 +70,12 @@ RIGHT = {
     mjs.UserPatternCfg: {},
     mjs.TableScanCfg: dict(angles=((0.0, 0.0),)),
     mjs.effects.Rate: dict(rate_hz=10.0),
-    mjs.SceneEntityCfg: dict(name="mug", model="mug.xml"),
+    mjs.sensors.SceneEntityCfg: dict(name="mug", model="mug.xml"),
     mjs.SceneFileCfg: dict(name="bench"),
-    mjs.SceneObjectCfg: dict(body="mug/mug"),
-    mjs.SceneRegionCfg: dict(name="top", on="bench/top"),
-    mjs.SceneVaryCfg: dict(what="light", pattern=".*"),
-    mjs.SceneMoodCfg: dict(name="evening"),
+    mjs.tasks.SceneObjectCfg: dict(body="mug/mug"),
+    mjs.tasks.SceneRegionCfg: dict(name="top", on="bench/top"),
+    mjs.tasks.SceneVaryCfg: dict(what="light", pattern=".*"),
+    mjs.tasks.SceneMoodCfg: dict(name="evening"),
 }
 # Arguments that violate conditions other than the declared ranges, and the texts of some errors of declared ranges.
 WRONG = [
@@ -85,11 +85,11 @@ WRONG = [
     (mjs.ContactMatch, dict(exclude=("[",)), "ContactMatch"),
     (mjs.ContactSensorCfg, dict(num_slots=0), "num_slots is 0"),
     (mjs.ContactSensorCfg, dict(secondary=mjs.ContactMatch("geom", ("a", "b"))), "secondary: 2 patterns"),
-    (mjs.ContactSensorCfg, dict(viz=mjs.ContactVizCfg(), reduce="maxfroce"), "maxforce"),
-    (mjs.ContactVizCfg, dict(point_color=(2.0, 0, 0, 1)), "point_color"),
-    (mjs.ContactVizCfg, dict(axis_length=-1.0), "axis_length"),
-    (mjs.RayCastVizCfg, dict(hit_radius=-1.0), "hit_radius"),
-    (mjs.CameraVizCfg, dict(line_width=-1.0), "line_width"),
+    (mjs.ContactSensorCfg, dict(viz=mjs.sensors.ContactVizCfg(), reduce="maxfroce"), "maxforce"),
+    (mjs.sensors.ContactVizCfg, dict(point_color=(2.0, 0, 0, 1)), "point_color"),
+    (mjs.sensors.ContactVizCfg, dict(axis_length=-1.0), "axis_length"),
+    (mjs.sensors.RayCastVizCfg, dict(hit_radius=-1.0), "hit_radius"),
+    (mjs.sensors.CameraVizCfg, dict(line_width=-1.0), "line_width"),
     (mjs.GridPatternCfg, dict(resolution=0.0), "GridPatternCfg: resolution is 0"),
     (mjs.GridPatternCfg, dict(direction=(0, 0, 0)), "direction"),
     (mjs.PinholeCameraPatternCfg, dict(fovy=180.0), "fovy is 180"),
@@ -111,8 +111,8 @@ WRONG = [
     (mjs.CameraIntrinsics, dict(fx=0.0), "fx is 0: must be above 0"),
     (mjs.LensDistortion, dict(model="fisheye"), "takes 4 coefficients"),
     (mjs.LensDistortion, dict(model="fishey"), "did you mean 'fisheye'"),
-    (mjs.ImuAxis, dict(range=-1.0), "range is -1"),
-    (mjs.ImuAxis, dict(bias_drift=1.0), "bias_drift_time_s is 0"),
+    (mjs.sensors.ImuAxis, dict(range=-1.0), "range is -1"),
+    (mjs.sensors.ImuAxis, dict(bias_drift=1.0), "bias_drift_time_s is 0"),
     (mjs.ImuSensorCfg, dict(preset="mpu6500"), "mpu6050"),
     (mjs.ImuSensorCfg, dict(effects=(3,)), "effects must be one of Noise, .*, not 3"),
     (mjs.EffectSensorCfg, dict(sensor=""), "the sensor to read is missing"),
@@ -147,22 +147,22 @@ WRONG = [
     (mjs.SceneCfg, dict(extent=-1.0), "extent is -1"),
     (mjs.ObjRef, dict(name=3), "name must be a str"),
     (mjs.BuiltinSensorCfg, dict(interp="cubik"), "cubic"),
-    (mjs.SceneEntityCfg, dict(pos=(float("inf"), 0, 0)), "pos"),
+    (mjs.sensors.SceneEntityCfg, dict(pos=(float("inf"), 0, 0)), "pos"),
     (mjs.SceneFileCfg, dict(count=(3, 2)), "count is 3, 2"),
     (mjs.SceneFileCfg, dict(models=3), "models must be a function"),
-    (mjs.SceneObjectCfg, dict(rests=("sideways",)), "upright, side, end"),
-    (mjs.SceneRegionCfg, dict(area=(float("nan"), 0, 0, 0)), "area"),
-    (mjs.SceneRobotCfg, dict(yaw_spread=-1.0), "yaw_spread is -1"),
-    (mjs.SceneVaryCfg, dict(hue=200.0), "hue is 200"),
-    (mjs.SceneVaryCfg, dict(tint=(-1.0, 0, 0)), "tint"),
-    (mjs.SceneSkyCfg, dict(top=(2.0, 0, 0)), "top"),
-    (mjs.SceneHeadlightCfg, dict(ambient=2.0), "ambient is 2"),
+    (mjs.tasks.SceneObjectCfg, dict(rests=("sideways",)), "upright, side, end"),
+    (mjs.tasks.SceneRegionCfg, dict(area=(float("nan"), 0, 0, 0)), "area"),
+    (mjs.tasks.SceneRobotCfg, dict(yaw_spread=-1.0), "yaw_spread is -1"),
+    (mjs.tasks.SceneVaryCfg, dict(hue=200.0), "hue is 200"),
+    (mjs.tasks.SceneVaryCfg, dict(tint=(-1.0, 0, 0)), "tint"),
+    (mjs.tasks.SceneSkyCfg, dict(top=(2.0, 0, 0)), "top"),
+    (mjs.tasks.SceneHeadlightCfg, dict(ambient=2.0), "ambient is 2"),
 ]  # fmt: skip
 ALL: set[Any] = {
     value
     for module in (mjs, mjs.effects)
     for value in vars(module).values()
-    if dataclasses.is_dataclass(value) and hasattr(value, "__post_init__") and value is not mjs.SensorCfg
+    if dataclasses.is_dataclass(value) and hasattr(value, "__post_init__") and value is not mjs.sensors.SensorCfg
 } | {mjs.RingPatternCfg.Ring}
 
 

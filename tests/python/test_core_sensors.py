@@ -34,18 +34,18 @@ def room(*sensors):
 def test_in_a_suite_of_a_plain_simulation():
     sim = mjs.Simulation(room(), num_worlds=3)
     suite = mjs.SensorSuite([
-        mjs.JointPositionSensor({"arm": ["arm/shoulder", "arm/elbow"], "none": []}),
-        mjs.JointVelocitySensor(uuid="all_qvel"),
-        mjs.PoseSensor("top", site="room/top"),
-        mjs.PoseSensor("hand", site="arm/hand", reference_body="room/cube"),
-        mjs.EnvStatesSensor({"arm": ["arm/elbow"]}, articulation="peers", length=4, robot=""),
-        mjs.CameraParameterSensor("room/eye", 48, 32, uuid="camera"),
-        mjs.CameraImageSensor("front"),
-        mjs.CameraImageSensor("front", "depth"),
-        mjs.ImagePointsSensor({"cube": "room/cube"}, ["front"]),
-        mjs.GraspStateSensor("room/cube", {"arm": "arm/fore"}, uuid="held"),
-        mjs.FunctionSensor("elbow", lambda env, world: np.array([env.qpos[world, -1]]), gymnasium.spaces.Box(-9, 9, (1,), np.float64)),
-        mjs.FunctionSensor("words", lambda env, world: {"world": world}, is_dict=True, str_max_len=32),
+        mjs.sensors.JointPositionSensor({"arm": ["arm/shoulder", "arm/elbow"], "none": []}),
+        mjs.sensors.JointVelocitySensor(uuid="all_qvel"),
+        mjs.sensors.PoseSensor("top", site="room/top"),
+        mjs.sensors.PoseSensor("hand", site="arm/hand", reference_body="room/cube"),
+        mjs.sensors.EnvStatesSensor({"arm": ["arm/elbow"]}, articulation="peers", length=4, robot=""),
+        mjs.sensors.CameraParameterSensor("room/eye", 48, 32, uuid="camera"),
+        mjs.sensors.CameraImageSensor("front"),
+        mjs.sensors.CameraImageSensor("front", "depth"),
+        mjs.sensors.ImagePointsSensor({"cube": "room/cube"}, ["front"]),
+        mjs.sensors.GraspStateSensor("room/cube", {"arm": "arm/fore"}, uuid="held"),
+        mjs.sensors.FunctionSensor("elbow", lambda env, world: np.array([env.qpos[world, -1]]), gymnasium.spaces.Box(-9, 9, (1,), np.float64)),
+        mjs.sensors.FunctionSensor("words", lambda env, world: {"world": world}, is_dict=True, str_max_len=32),
     ])  # fmt: skip
     names = ["qpos", "all_qvel", "top", "hand", "env_states", "camera", "front", "front_depth", "object_image_points", "held", "elbow", "words"]
     rng = np.random.default_rng(0)
@@ -86,13 +86,13 @@ def test_in_a_suite_of_a_plain_simulation():
 
 def test_rows_in_an_environment_equal_the_suite():
     same = {
-        "qpos": mjs.JointPositionSensor(uuid="my_qpos"),
-        "qvel": mjs.JointVelocitySensor(uuid="my_qvel"),
-        "tcp_pose": mjs.TcpPoseSensor(uuid="my_tcp"),
-        "robot_base_pose": mjs.RobotBasePoseSensor("my_base"),
-        "sensor_param_wrist_camera": mjs.CameraParameterSensor("wrist_camera", 48, 32, uuid="my_camera"),
-        "wrist_camera": mjs.CameraImageSensor("wrist_camera", uuid="my_wrist"),
-        "env_states": mjs.EnvStatesSensor(articulation="panda", length=31, robot="franka", uuid="my_states"),
+        "qpos": mjs.sensors.JointPositionSensor(uuid="my_qpos"),
+        "qvel": mjs.sensors.JointVelocitySensor(uuid="my_qvel"),
+        "tcp_pose": mjs.sensors.TcpPoseSensor(uuid="my_tcp"),
+        "robot_base_pose": mjs.sensors.RobotBasePoseSensor("my_base"),
+        "sensor_param_wrist_camera": mjs.sensors.CameraParameterSensor("wrist_camera", 48, 32, uuid="my_camera"),
+        "wrist_camera": mjs.sensors.CameraImageSensor("wrist_camera", uuid="my_wrist"),
+        "env_states": mjs.sensors.EnvStatesSensor(articulation="panda", length=31, robot="franka", uuid="my_states"),
     }
     env = mjs.make_vec(
         num_envs=2, policy="planner", cameras=["wrist_camera"], width=48, height=32, seed=2, sensors=same.values(),
@@ -113,7 +113,7 @@ def test_rows_in_an_environment_equal_the_suite():
 def test_in_a_recording(tmp_path):
     summary = mjs.record(
         out=tmp_path, episodes=1, horizon=3, keep_failures=True, cameras=[], seed=2,
-        sensors=[mjs.PoseSensor("hand", site="robot_0/gripper/grasp_site"), mjs.GraspStateSensor("robot_0/base", uuid="touch")],
+        sensors=[mjs.sensors.PoseSensor("hand", site="robot_0/gripper/grasp_site"), mjs.sensors.GraspStateSensor("robot_0/base", uuid="touch")],
     )  # fmt: skip
     with h5py.File(next(summary.path.rglob("*.h5"))) as file:
         assert file["traj_0/obs/extra/hand"].shape == (4, 7)
@@ -123,20 +123,20 @@ def test_in_a_recording(tmp_path):
 def test_names_are_resolved_with_the_nearest():
     sim = mjs.Simulation(room(), num_worlds=1)
     for sensor, error, text in [
-        (mjs.JointPositionSensor({"arm": ["arm/shulder"]}), KeyError, "sensor 'qpos': group 'arm': no joint named 'arm/shulder'; did you mean 'arm/shoulder'"),
-        (mjs.PoseSensor("p", body="room/cub"), KeyError, "'p'.*did you mean 'room/cube'"),
-        (mjs.CameraParameterSensor("room/ey"), KeyError, "no camera named 'room/ey'; did you mean 'room/eye'"),
-        (mjs.CameraImageSensor("fromt"), KeyError, "no camera sensor named 'fromt'; did you mean 'front'"),
-        (mjs.CameraImageSensor("front", "rgbb"), KeyError, "did you mean 'rgb'"),
-        (mjs.TcpPoseSensor(), ValueError, "needs a robot"),
+        (mjs.sensors.JointPositionSensor({"arm": ["arm/shulder"]}), KeyError, "sensor 'qpos': group 'arm': no joint named 'arm/shulder'; did you mean 'arm/shoulder'"),
+        (mjs.sensors.PoseSensor("p", body="room/cub"), KeyError, "'p'.*did you mean 'room/cube'"),
+        (mjs.sensors.CameraParameterSensor("room/ey"), KeyError, "no camera named 'room/ey'; did you mean 'room/eye'"),
+        (mjs.sensors.CameraImageSensor("fromt"), KeyError, "no camera sensor named 'fromt'; did you mean 'front'"),
+        (mjs.sensors.CameraImageSensor("front", "rgbb"), KeyError, "did you mean 'rgb'"),
+        (mjs.sensors.TcpPoseSensor(), ValueError, "needs a robot"),
     ]:  # fmt: skip
         with pytest.raises(error, match=text):
             sim.add(sensor)
     with pytest.raises(ValueError, match="needs a body or a site"):
-        mjs.PoseSensor("p")
+        mjs.sensors.PoseSensor("p")
     with pytest.raises(ValueError, match="has no uuid"):
-        mjs.PoseSensor("", body="x")
-    pose = mjs.PoseSensor("p", body="room/cube")
+        mjs.sensors.PoseSensor("", body="x")
+    pose = mjs.sensors.PoseSensor("p", body="room/cube")
     with pytest.raises(RuntimeError, match="'p' has no data yet"):
         pose.data
     sim.add(pose)

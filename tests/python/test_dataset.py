@@ -19,7 +19,7 @@ from edited_recordings import changed
 import mjsense as mjs
 from mjsense.dataset import video
 
-SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
+SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -162,11 +162,11 @@ def test_every_frame_of_a_long_video(tmp_path, decoder, encoding):
     subprocess.run([*source, *codec, path], check=True)
     expected = decode(path, "rgb24", (24, 32, 3)) if rgb else decode(path, "gray16le", (24, 32)) * np.float32(0.0002)
     reader = video.FrameReader(Cache(150_000), Cache(150_000))
-    frames = mjs.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
+    frames = mjs.dataset.Video(video.VideoInfo(path, 400, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)
     for t in [*np.random.default_rng(0).permutation(400)[:16], 89, 90, 88, 179, 180, 399, 0, *range(200, 212)]:
         np.testing.assert_array_equal(frames[int(t)], expected[t], err_msg=str(t))
     with pytest.raises(RuntimeError, match="has no frame 400"):
-        mjs.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
+        mjs.dataset.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
 
 
 def test_a_recording_of_the_first_format(tmp_path):

@@ -16,6 +16,7 @@ import pytest
 
 import mjsense as mjs
 from mjsense import commands
+from mjsense.exporting.formats import FORMATS
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/**/page.md")),
@@ -23,7 +24,6 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Module that pages import -> names used of it. Modules that are not installed are replaced by stubs.
 OTHERS: dict[str, list[str]] = {"matplotlib": ["matplotlib.pyplot"], "rerun": [], "stable_baselines3": ["mjsense.tasks.rl.sb3"], "torch": []}
-EXPORT_LIBRARIES = {"lerobot": "pyarrow", "lerobot21": "pyarrow", "rlds": "google_crc32c", "zarr": "zarr", "rerun": "rerun", "mcap": "mcap_protobuf"}
 MISSING = [name for name in OTHERS if importlib.util.find_spec(name) is None]
 SHORT = ["--episodes", "1", "--horizon", "2", "--keep-failures", "--size", "64x48", "-q", "--no-sheet"]  # of recordings
 
@@ -87,9 +87,9 @@ def test_python(page, tmp_path, monkeypatch):
                 monkeypatch.setitem(sys.modules, module, MagicMock())
     if page.stem == "warp":
         pytest.importorskip("mujoco_warp")
-    for name, library in EXPORT_LIBRARIES.items():
-        if f"export_{name}(" in page.read_text():
-            pytest.importorskip(library)
+    for name, format in FORMATS.items():
+        if f"export_{name}(" in page.read_text() or f'format="{name}"' in page.read_text():
+            pytest.importorskip(format.library)
     monkeypatch.setattr(mjs, "view", MagicMock())  # waits for a browser
     if "matplotlib" in MISSING:
         monkeypatch.setattr(mjs, "plot", MagicMock())
@@ -156,7 +156,7 @@ def test_command_lines(page, tmp_path):
             words = [line[i] for i in range(len(line)) if "--episodes" not in line[max(0, i - 1) : i + 1]]
             run([*words, *SHORT], tmp_path)
         elif line[0] == "export":
-            if importlib.util.find_spec(EXPORT_LIBRARIES.get(line[1], "h5py")):
+            if importlib.util.find_spec(FORMATS[line[1]].library):
                 run([word for word in line if word != "--success"], tmp_path)
         else:
             run(line, tmp_path)

@@ -35,10 +35,10 @@ def sim():
     box = mjs.ObjRef("body", "box", "room")
     sensors = (
         mjs.RayCastSensorCfg(name="scan", frame=box, pattern=mjs.GridPatternCfg((0.6, 0), 0.3), debug_vis=True,
-                             viz=mjs.RayCastVizCfg(show_rays=True, show_normals=True)),
+                             viz=mjs.sensors.RayCastVizCfg(show_rays=True, show_normals=True)),
         mjs.ContactSensorCfg(name="touch", primary=mjs.ContactMatch("geom", "box", "room"), num_slots=4, debug_vis=True),
         mjs.CameraSensorCfg(name="eye", camera_name="room/eye", width=8, height=8, debug_vis=True,
-                            viz=mjs.CameraVizCfg(frustum_depth=0.5)),
+                            viz=mjs.sensors.CameraVizCfg(frustum_depth=0.5)),
         mjs.BuiltinSensorCfg(name="gyro", sensor_type="gyro", obj=mjs.ObjRef("site", "top", "room")),
         mjs.BuiltinSensorCfg(name="clock", sensor_type="clock"),
         Wind(),
@@ -132,7 +132,7 @@ def test_errors(sim):
     with pytest.raises(ValueError, match="no shape is a 'ball'"):
         sim.debug_shapes().of("ball")
     with pytest.raises(ValueError, match="r, g, b, a"):
-        mjs.DebugShapes().add_sphere((0, 0, 0), 1, (1, 1, 1))
+        mjs.sensors.DebugShapes().add_sphere((0, 0, 0), 1, (1, 1, 1))
 
     class Silent(mjs.Sensor):
         uuid = "silent"
@@ -145,7 +145,7 @@ def test_errors(sim):
 
 
 def test_a_frame_and_a_cylinder_of_mjlabs_visualizer():
-    shapes = mjs.DebugShapes()
+    shapes = mjs.sensors.DebugShapes()
     shapes.add_frame((1, 0, 0), np.eye(3), scale=2, label="f", alpha=0.5)
     shapes.add_cylinder((0, 0, 0), (0, 0, 1), 0.1, (1, 0, 0, 1))
     np.testing.assert_allclose(shapes.vectors[:3], 2 * np.eye(3))

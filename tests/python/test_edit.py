@@ -13,7 +13,7 @@ import pytest
 import mjsense as mjs
 from mjsense import commands
 
-RECORDING = dict(worlds=2, keep_failures=True, width=32, height=24, horizon=4, depth=True, cameras=["wrist_camera"])
+RECORDING = dict(num_worlds=2, keep_failures=True, width=32, height=24, horizon=4, depth=True, cameras=["wrist_camera"])
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_split_and_merge(root, tmp_path):
     mjs.merge_datasets([made["chosen"], root / "house_0"], tmp_path / "twice")
     assert_equal(tmp_path / "twice", episodes[0], episodes[6], *episodes[:5])
     assert sorted(path.name for path in (tmp_path / "twice").iterdir()) == ["house_0", "house_4", "house_5"]
-    mjs.export_lerobot(tmp_path / "twice", tmp_path / "lerobot")
+    mjs.exporting.export_lerobot(tmp_path / "twice", tmp_path / "lerobot")
     assert json.loads((tmp_path / "lerobot/meta/info.json").read_text())["total_episodes"] == 7
 
 

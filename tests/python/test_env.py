@@ -92,16 +92,36 @@ def test_same_step():
 
 def test_disabled():
     env = make(autoreset_mode=AutoresetMode.DISABLED)
-    steps = play(env, 6)
-    assert [s[3].any() for s in steps] == [False] * 3 + [True] + [False] * 2
-    np.testing.assert_array_equal(steps[3][0]["qpos"]["joints"], steps[5][0]["qpos"]["joints"])
+    steps = play(env, 4)
+    assert [s[3].any() for s in steps] == [False] * 3 + [True]
+    for call, actions in ((env.step, np.zeros((3, 1))), (env.step_chunk, np.zeros((3, 2, 1)))):
+        with pytest.raises(gymnasium.error.ResetNeeded, match=r"the episodes of all worlds have ended: call reset\(\) first"):
+            call(actions)
     mask = np.array([False, True, False])
     observation, _ = env.reset(options={"reset_mask": mask})
-    moved = (observation["qpos"]["joints"] != steps[5][0]["qpos"]["joints"])[:, 0]
+    moved = (observation["qpos"]["joints"] != steps[3][0]["qpos"]["joints"])[:, 0]
     np.testing.assert_array_equal(moved, mask)
-    _, _, _, truncated, infos = env.step(np.zeros((3, 1)))
-    assert infos["_success"].tolist() == [False, True, False] and not truncated.any()
+    for step in range(4):  # the others say that they have ended, and rest
+        observation, reward, terminated, truncated, infos = env.step(np.zeros((3, 1)))
+        assert infos["_success"].tolist() == [False, True, False] and not terminated.any()
+        assert truncated.tolist() == [True, step == 3, True] and not reward[~mask].any()
+        np.testing.assert_array_equal(observation["qpos"]["joints"][~mask], steps[3][0]["qpos"]["joints"][~mask])
+    env.reset()
+    assert not env.step(np.zeros((3, 1)))[3].any()
     env.close()
+
+
+def test_disabled_repeats_why_an_episode_has_ended():
+    env = make(autoreset_mode="disabled")
+    env.reset(seed=0)
+    done = np.array([True, False, False])
+    for step in range(4):
+        _, _, terminated, truncated, _ = env.step(np.zeros((3, 1)), done)
+        assert terminated.tolist() == done.tolist() and truncated.tolist() == [False, step == 3, step == 3]
+    env.close()
+
+
+def test_unknown_modes():
     with pytest.raises(ValueError, match="autoreset_mode must be one of next_step, same_step, disabled, not 'never'"):
         make(autoreset_mode="never")
 

@@ -11,6 +11,7 @@ import pytest
 from tasks import Cart
 
 import mjsense as mjs
+from mjsense.core import mujoco_names
 
 SMALL = dict(cameras=[], width=64, height=40, render_mode="rgb_array")
 
@@ -25,13 +26,35 @@ class Words(mjs.Sensor):
         return {"world": batch_index}
 
 
-@pytest.mark.parametrize("name", ["mjsense/Pick-v0", "mjsense/DoorOpening-v0"])
-def test_a_default_view_without_cameras(name):
-    env = gymnasium.make(name, **SMALL)
+def test_a_default_view_without_cameras():
+    env = gymnasium.make("mjsense/Pick-v0", **SMALL)
     observation, _ = env.reset(seed=3)
     assert not any(rows.ndim == 3 for rows in observation.values() if isinstance(rows, np.ndarray))
     picture = env.render()
     assert picture.shape == (40, 64, 3) and picture.std() > 10
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("task", "robot", "role"),
+    [("door_opening", "rby1", "door_handle"), ("door_opening", "mobile_franka", "door_handle"), ("pick", "franka", "pickup_obj")],
+)
+def test_the_default_view_shows_the_robot_and_its_target(task, robot, role):
+    """2 % of the pixels of the robot, and 0.03 % of the target: a handle, or a small object behind others."""
+    env = mjs.make_vec(task, robot, num_envs=20, **{**SMALL, "width": 320, "height": 240})
+    env.reset(seed=0)
+    model = env.sim.model
+    pixels = env.sim.scene["default_view"].data.segmentation
+    seen = 0
+    for world in range(20):
+        target = json.loads(env._rollout.obs_scene(world))["objects"][role]["body"]
+        shown = []
+        for root in (model.body("robot_0/base" if robot != "franka" else "robot_0/fr3_link0").id, model.body(target).id):
+            below = mujoco_names.bodies_below(model, root)
+            geoms = np.flatnonzero(below[model.geom_bodyid])
+            shown.append((np.isin(pixels[world, ..., 0], geoms) & (pixels[world, ..., 1] == 5)).mean())
+        seen += shown[0] > 0.02 and shown[1] > 0.0003
+    assert seen >= 19
     env.close()
 
 

@@ -24,7 +24,7 @@ from mjsense.exporting.mapping import _filled
 from mjsense.exporting.output import new_output
 from mjsense.exporting.remux import Concatenation
 
-SMALL = dict(worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
+SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=12, shadows=False, seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def root(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def v3(root, tmp_path_factory):
-    return mjs.export_lerobot(root, tmp_path_factory.mktemp("export") / "v3")
+    return mjs.exporting.export_lerobot(root, tmp_path_factory.mktemp("export") / "v3")
 
 
 def rows(folder):
@@ -110,7 +110,7 @@ def assert_frames_by_row(root, out):
 
 def test_frames_are_found_by_the_number_of_their_row(root, tmp_path):
     for exact in (False, True):
-        out = mjs.export_lerobot(root / "house_0", tmp_path / str(exact), exact_rate=exact)
+        out = mjs.exporting.export_lerobot(root / "house_0", tmp_path / str(exact), exact_rate=exact)
         assert_frames_by_row(root / "house_0", out)
         timestamps = rows(out / "data")["timestamp"]
         np.testing.assert_array_equal(timestamps[:12], (np.arange(12) * (0.066 if exact else 1 / 15)).astype(np.float32))
@@ -131,7 +131,7 @@ def test_videos_with_b_frames_also_have_one_frame_for_each_row(root, tmp_path):
         with h5py.File(path, "a") as file:
             for trajectory in file.values():
                 del trajectory["obs/sensor_data/wrist_camera"].attrs["crc32"]  # of the former video
-    out = mjs.export_lerobot(tmp_path / "house_0", tmp_path / "v3")
+    out = mjs.exporting.export_lerobot(tmp_path / "house_0", tmp_path / "v3")
     assert_frames_by_row(tmp_path / "house_0", out)
 
 
@@ -184,7 +184,7 @@ def test_files_are_limited_in_size(root, tmp_path, monkeypatch):
     monkeypatch.setattr(lerobot, "DATA_FILE_MB", 1e-4)
     monkeypatch.setattr(lerobot, "VIDEO_FILE_MB", 1e-4)
     monkeypatch.setattr(lerobot, "FILES_PER_CHUNK", 2)
-    mjs.export_lerobot(root, tmp_path / "out")
+    mjs.exporting.export_lerobot(root, tmp_path / "out")
     files = sorted(str(path.relative_to(tmp_path / "out")) for path in (tmp_path / "out").rglob("file-*"))
     places = ["chunk-000/file-000", "chunk-000/file-001", "chunk-001/file-000"]
     cameras = ["videos/observation.images.exo_camera_1", "videos/observation.images.wrist_camera"]
@@ -205,7 +205,7 @@ def test_a_long_file_ends_before_its_times_are_inexact():
 def test_depth_in_lerobot_form_with_the_exact_file(tmp_path):
     mjs.record("pick", out=tmp_path / "data", depth=True, cameras=["wrist_camera"], **{**SMALL, "episodes": 1})
     cameras = {"cameras": {"eye": "wrist_camera", "eye_depth": "wrist_camera_depth"}}
-    out = mjs.export_lerobot(tmp_path / "data", tmp_path / "out", map=cameras)
+    out = mjs.exporting.export_lerobot(tmp_path / "data", tmp_path / "out", map=cameras)
     video = mjs.Dataset(tmp_path / "data").episodes[0].video("wrist_camera_depth")
     assert (out / "extras/depth/eye_depth/episode_000000.mkv").read_bytes() == video.path.read_bytes()
     key = "observation.images.eye_depth"
@@ -219,11 +219,11 @@ def test_depth_in_lerobot_form_with_the_exact_file(tmp_path):
     np.testing.assert_allclose(stats["mean"], expected.mean().reshape(1, 1, 1), rtol=1e-3)
     np.testing.assert_allclose(np.ravel(stats["q50"]), np.median(expected), atol=2e-3)
     with pytest.raises(ValueError, match=r"LeRobot v2\.1 has no depth images; leave 'eye_depth' out"):
-        mjs.export_lerobot21(tmp_path / "data", tmp_path / "v21", map=cameras)
+        mjs.exporting.export_lerobot21(tmp_path / "data", tmp_path / "v21", map=cameras)
 
 
 def test_lerobot21(root, tmp_path):
-    out = mjs.export_lerobot21(root, tmp_path / "v21")
+    out = mjs.exporting.export_lerobot21(root, tmp_path / "v21")
     info = json.loads((out / "meta/info.json").read_text())
     assert (info["codebase_version"], info["total_videos"], info["total_frames"]) == ("v2.1", 6, 36)
     for position, episode in enumerate(mjs.Dataset(root).episodes):
@@ -249,7 +249,7 @@ def test_lerobot21(root, tmp_path):
 def test_groot_reads_the_statistics_and_the_columns_that_modality_names(root, tmp_path):
     """Its loader takes the numbers of a group out of every statistic: of N1 and N1.5 by position."""
     features = {"velocity": "obs/agent/qvel", "rel": "actions/joint_pos_rel", "next.phase": "obs/extra/policy_phase"}
-    out = mjs.export_lerobot21(root, tmp_path / "v21", map={"features": features, "cameras": {}}, episodes=[0])
+    out = mjs.exporting.export_lerobot21(root, tmp_path / "v21", map={"features": features, "cameras": {}}, episodes=[0])
     modality, found = (json.loads((out / f"meta/{name}.json").read_text()) for name in ("modality", "stats"))
     assert {name: part["original_key"] for name, part in modality["state"].items()} == {
         "arm": "observation.state", "gripper": "observation.state", "phase": "next.phase",
@@ -259,7 +259,7 @@ def test_groot_reads_the_statistics_and_the_columns_that_modality_names(root, tm
         for statistic in found[part["original_key"]].values():
             assert np.array(statistic)[np.arange(part["start"], part["end"])].size == part["end"] - part["start"]
     with pytest.raises(ValueError, match=r"the feature 'state' and the feature 'arm' have the same name in the export, 'state\.arm'"):
-        mjs.export_lerobot21(root, tmp_path / "two", map={"features": {"arm": "obs/agent/qvel/arm"}})
+        mjs.exporting.export_lerobot21(root, tmp_path / "two", map={"features": {"arm": "obs/agent/qvel/arm"}})
 
 
 @pytest.mark.parametrize(("format", "features", "cameras", "message"), (
@@ -360,7 +360,7 @@ def test_a_failed_export_leaves_nothing(root, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        mjs.export_lerobot(root, tmp_path / "out", progress=stop)
+        mjs.exporting.export_lerobot(root, tmp_path / "out", progress=stop)
     assert not list(tmp_path.iterdir())
     with contextlib.suppress(KeyboardInterrupt), new_output(tmp_path / "out") as part:
         part.mkdir()
@@ -368,7 +368,7 @@ def test_a_failed_export_leaves_nothing(root, tmp_path):
         shutil.copytree(tmp_path / "out.part", tmp_path / "killed")
         raise KeyboardInterrupt
     (tmp_path / "killed").rename(tmp_path / "out.part")
-    mjs.export_lerobot(root, tmp_path / "out", episodes=[0])
+    mjs.exporting.export_lerobot(root, tmp_path / "out", episodes=[0])
     assert [path.name for path in tmp_path.iterdir()] == ["out"] and not (tmp_path / "out/old").exists()
 
 
@@ -376,7 +376,7 @@ def test_an_export_deletes_nothing_that_it_has_not_made(root, tmp_path):
     (tmp_path / "poetry.lock").write_text("versions")
     (tmp_path / "poetry.part").mkdir()
     with pytest.raises(FileExistsError, match=r"poetry\.part exists, and no program of mjsense has made it: rename it, or choose another output"):
-        mjs.export_lerobot(root, tmp_path / "poetry", episodes=[0])
+        mjs.exporting.export_lerobot(root, tmp_path / "poetry", episodes=[0])
     (tmp_path / "poetry.part/thesis.txt").write_text("thesis")
     with pytest.raises(FileExistsError, match=r"poetry\.part exists"):
         mjs.record("pick", out=tmp_path / "poetry", format="lerobot", **SMALL)
@@ -386,7 +386,7 @@ def test_an_export_deletes_nothing_that_it_has_not_made(root, tmp_path):
         mjs.record("pick", out=tmp_path / "poetry", format="lerobot", resume=True, **SMALL)
     (tmp_path / "poetry").rename(tmp_path / "mine")
     (tmp_path / "poetry.recording").rename(tmp_path / "mine.recording")
-    mjs.export_lerobot(root, tmp_path / "poetry", episodes=[0])
+    mjs.exporting.export_lerobot(root, tmp_path / "poetry", episodes=[0])
     assert (tmp_path / "poetry.lock").read_text() == "versions" and (tmp_path / "mine/thesis.txt").read_text() == "thesis"
     assert {path.name for path in tmp_path.iterdir()} == {"poetry", "poetry.lock", "mine", "mine.recording"}
 
@@ -394,7 +394,7 @@ def test_an_export_deletes_nothing_that_it_has_not_made(root, tmp_path):
 def test_one_process_at_a_time_writes_an_output(root, tmp_path):
     with new_output(tmp_path / "out") as part:
         with pytest.raises(FileExistsError, match=r"another process writes .*out"):
-            mjs.export_lerobot(root, tmp_path / "out")
+            mjs.exporting.export_lerobot(root, tmp_path / "out")
         part.touch()
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 

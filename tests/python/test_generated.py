@@ -41,7 +41,7 @@ def test_enum_values_are_types_and_are_shown_by_help():
 
 def test_options_and_defaults_are_the_same_everywhere():
     record, make_vec = inspect.signature(mjs.record).parameters, inspect.signature(mjs.make_vec).parameters
-    assert {"crf", "preset", "ffmpeg", "molmospaces_depth", "worlds", "action_noise"} <= set(record)
+    assert {"crf", "preset", "ffmpeg", "molmospaces_depth", "num_worlds", "action_noise"} <= set(record)
     for name in set(record) & set(make_vec) - {"policy", "action_noise", "out", "seed"}:
         assert record[name].default == make_vec[name].default, name
     assert record["seed"].default == 0 and make_vec["seed"].default is None  # a recording is reproducible, an environment draws entropy

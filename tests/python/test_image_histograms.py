@@ -67,7 +67,7 @@ def test_every_raw_image_is_counted(root):
         np.testing.assert_array_equal(episode.image_histogram("view"), expected_histogram(number))
 
 
-@pytest.mark.parametrize("export", (mjs.export_lerobot, mjs.export_lerobot21))
+@pytest.mark.parametrize("export", (mjs.exporting.export_lerobot, mjs.exporting.export_lerobot21))
 def test_statistics_of_all_images_without_decoding(export, root, tmp_path, monkeypatch):
     monkeypatch.setattr(frame_statistics, "_decoded", None)
     out = export(root, tmp_path / "out")
@@ -77,7 +77,7 @@ def test_statistics_of_all_images_without_decoding(export, root, tmp_path, monke
         np.testing.assert_allclose(np.ravel(found[name]), value, atol=1e-9)
     for name, q in statistics.QUANTILES.items():
         np.testing.assert_allclose(np.ravel(found[name]), np.quantile(exact, q, axis=0), atol=1e-9)
-    assert found.get("count") == ([2 * LENGTH + 1] if export is mjs.export_lerobot else None)  # GR00T's loader expects one number for each of a column
+    assert found.get("count") == ([2 * LENGTH + 1] if export is mjs.exporting.export_lerobot else None)  # GR00T's loader expects one number for each of a column
     decoded = statistics.of_images(frame for episode in mjs.Dataset(root).episodes for frame in episode.video("view")[:])
     for name in decoded.keys() - {"count", "min", "max"}:
         np.testing.assert_allclose(found[name], decoded[name], atol=3 / 255, err_msg=name)

@@ -20,9 +20,9 @@ from mjsense import commands
 def made(tmp_path_factory):
     """A recording, and its export with depth."""
     folder = tmp_path_factory.mktemp("lerobot")
-    mjs.record("pick", out=folder / "data", worlds=2, episodes=2, keep_failures=True, depth=True, seed=3, width=32, height=24, horizon=8, shadows=False)
+    mjs.record("pick", out=folder / "data", num_worlds=2, episodes=2, keep_failures=True, depth=True, seed=3, width=32, height=24, horizon=8, shadows=False)
     cameras = {"wrist": "wrist_camera", "eye": "exo_camera_1", "eye_depth": "exo_camera_1_depth"}
-    mjs.export_lerobot(folder / "data", folder / "out", map={"state": "obs/agent/qpos/arm", "cameras": cameras, "features": {"tcp": "obs/extra/tcp_pose"}})
+    mjs.exporting.export_lerobot(folder / "data", folder / "out", map={"state": "obs/agent/qpos/arm", "cameras": cameras, "features": {"tcp": "obs/extra/tcp_pose"}})
     return folder
 
 

@@ -16,8 +16,8 @@ from mjsense.core.png import png_of as png
 
 def test_an_exported_recording_comes_back(tmp_path):
     size = dict(width=32, height=24, horizon=8, shadows=False)
-    mjs.record("pick", out=tmp_path / "data", worlds=2, episodes=2, keep_failures=True, depth=True, seed=3, **size)
-    mjs.export_robomimic(tmp_path / "data", tmp_path / "pick.hdf5")
+    mjs.record("pick", out=tmp_path / "data", num_worlds=2, episodes=2, keep_failures=True, depth=True, seed=3, **size)
+    mjs.exporting.export_robomimic(tmp_path / "data", tmp_path / "pick.hdf5")
     mjs.import_robomimic(tmp_path / "pick.hdf5", tmp_path / "back")
     ours, theirs = mjs.Dataset(tmp_path / "data"), mjs.Dataset(tmp_path / "back")
     assert theirs.fps == ours.fps and [e.length for e in theirs.episodes] == [8, 8]

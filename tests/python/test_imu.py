@@ -23,7 +23,7 @@ def test_specific_force_in_site_axes():
 
 
 def test_presets_user_defined_models_and_the_clean_value():
-    own = mjs.ImuModel(gyroscope=mjs.ImuAxis(noise_density=0.01))
+    own = mjs.sensors.ImuModel(gyroscope=mjs.sensors.ImuAxis(noise_density=0.01))
     for kwargs in ({"preset": "mpu6050"}, {"preset": "", "model": own}):
         s = scene(**kwargs)
         sim = mjs.Simulation(s, num_worlds=64)

@@ -24,7 +24,7 @@ from mjsense.cluster.storage import Storage
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.remote import resolved
 
-ARGUMENTS = {"task": "pick", "horizon": 4, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5}
+ARGUMENTS = {"task": "pick", "horizon": 4, "keep_failures": True, "width": 32, "height": 24, "num_worlds": 2, "seed": 5}
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_every_reader_takes_the_folder_the_index_and_an_address(recording, memor
         np.testing.assert_array_equal(dataset.episodes[4].states, states)
         assert dataset.episodes[4].video("wrist_camera")[4].shape == (24, 32, 3)
         assert mjs.check_replay(root, episodes=[0, 4]).ok
-        mjs.export_lerobot(root, tmp_path / f"lerobot_{n}")
+        mjs.exporting.export_lerobot(root, tmp_path / f"lerobot_{n}")
         assert tools.verify(str(root))["ok"]
     (first, *others) = [sorted((p.relative_to(f), p.read_bytes()) for p in f.rglob("*") if p.is_file()) for f in tmp_path.glob("lerobot_*")]
     assert len(others) == 4 and all(other == first for other in others)
@@ -107,12 +107,12 @@ def test_a_recording_without_an_index_or_without_a_shard(recording, tmp_path, ca
     """It is unfinished, or a shard was lost."""
     shutil.rmtree(recording / "shard_1")
     with pytest.raises(FileNotFoundError, match=r"shard_1/house_0/trajectories_batch_1_of_1.h5: no such file or directory"):
-        mjs.export_lerobot(recording, tmp_path / "out")
+        mjs.exporting.export_lerobot(recording, tmp_path / "out")
     (recording / "index.parquet").unlink()
     (recording / "shard_0/done.json").touch()
     (recording / "shard_2/done.json").unlink(missing_ok=True)
     capsys.readouterr()
-    mjs.export_lerobot(recording, tmp_path / "out")
+    mjs.exporting.export_lerobot(recording, tmp_path / "out")
     assert capsys.readouterr().err == f"{recording} is unfinished; the export has the episodes that are published\n"
     done = subprocess.run([sys.executable, "-m", "mjsense", "inspect", recording], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("no index.parquet: the recording is not complete")

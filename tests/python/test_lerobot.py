@@ -156,7 +156,7 @@ def test_lerobot_reads_every_row_and_frame(record, tmp_path, version, format, fp
 def test_lerobot_reads_episodes_without_idle_steps(tmp_path, version, format):
     """Each row has its own frame, although frames between them are left out; the frames are encoded again and differ slightly."""
     environment(version)
-    mjs.record("pick_and_place", policy=Waiting, out=tmp_path / "data", episodes=2, worlds=2, horizon=2 * MOVES + WAITS, keep_failures=True,
+    mjs.record("pick_and_place", policy=Waiting, out=tmp_path / "data", episodes=2, num_worlds=2, horizon=2 * MOVES + WAITS, keep_failures=True,
                width=64, height=48, cameras=["wrist_camera"], shadows=False)  # fmt: skip
     source = Source(tmp_path / "data", trim_idle=None)
     assert all(episode.trimmed_steps > 3 for episode in source.episodes)
@@ -174,7 +174,7 @@ def test_lerobot_streams_and_edits_an_export_at_the_default_rate(record, tmp_pat
     root = record(Fraction(500, 33), 200)
     map = map_of("")
     rows = expected_of(Source(root, map=map), tmp_path / "expected.npz")
-    out = mjs.export_lerobot(root, tmp_path / "out", map=map)
+    out = mjs.exporting.export_lerobot(root, tmp_path / "out", map=map)
     result = read(version, out, tmp_path / "expected.npz", 1, tolerance, mode)
     assert result["rows"] == (rows // 2 if mode == "delete" else rows) and result["wrong"] == 0, result
 
@@ -188,8 +188,8 @@ TRAIN = """--policy.type=act --policy.device=cpu --policy.push_to_hub=false --po
 def test_act_trains_on_an_exported_pick(tmp_path):
     """A small ACT, 200 steps: the loss falls, and LeRobot prints no warning. About a minute of CPU time."""
     python, _ = environment("0.4.4")
-    mjs.record("pick", out=tmp_path / "data", episodes=2, keep_failures=True, width=96, height=96, cameras=["wrist_camera"], worlds=2)
-    mjs.export_lerobot(tmp_path / "data", tmp_path / "lerobot")
+    mjs.record("pick", out=tmp_path / "data", episodes=2, keep_failures=True, width=96, height=96, cameras=["wrist_camera"], num_worlds=2)
+    mjs.exporting.export_lerobot(tmp_path / "data", tmp_path / "lerobot")
     words = [python.parent / "lerobot-train", *TRAIN.split(), f"--dataset.root={tmp_path}/lerobot", f"--output_dir={tmp_path}/act"]
     done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "HF_HOME": str(tmp_path / "hf"), "HF_HUB_OFFLINE": "1"})
     text = done.stdout + done.stderr

@@ -57,7 +57,7 @@ def assets(tmp_path_factory):
 def test_a_table_of_libero_is_recorded(assets, tmp_path):
     text = SCENE.format(assets=assets) + "".join(THING.format(assets=assets, path=t, name=t.split("/")[-1]) for t in THINGS)
     (tmp_path / "scene.toml").write_text(text)
-    made = mjs.record("pick", scene=str(tmp_path / "scene.toml"), out=tmp_path / "data", episodes=2, worlds=2, seed=1,
+    made = mjs.record("pick", scene=str(tmp_path / "scene.toml"), out=tmp_path / "data", episodes=2, num_worlds=2, seed=1,
                       width=96, height=64)  # fmt: skip
     assert made.kept == 2, made.failures
     subprocess.run([*PROGRAM, "verify", "--decode", tmp_path / "data"], check=True)
@@ -97,7 +97,7 @@ def test_libero_objects_start_without_collision(installed, scene):
 
 
 def test_libero_objects_are_picked(installed, tmp_path):
-    made = mjs.record("pick", "franka", scene="libero/kitchen", out=tmp_path / "data", episodes=4, max_attempts=4, keep_failures=True, worlds=4,
+    made = mjs.record("pick", "franka", scene="libero/kitchen", out=tmp_path / "data", episodes=4, max_attempts=4, keep_failures=True, num_worlds=4,
                       cameras=[])  # fmt: skip
     assert made.succeeded >= 3, made.failures
 

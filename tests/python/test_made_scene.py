@@ -18,7 +18,7 @@ BENCH = """
   </worldbody>
 </mujoco>"""
 THINGS = {"mug": "mug", "can": "soup_can", "cube": "blue_cube"}
-TOP = mjs.SceneRegionCfg(name="top", on="bench/top", area=(0.4, 0.75, -0.4, 0.4), target_area=(0.45, 0.62, -0.2, 0.2))
+TOP = mjs.tasks.SceneRegionCfg(name="top", on="bench/top", area=(0.4, 0.75, -0.4, 0.4), target_area=(0.45, 0.62, -0.2, 0.2))
 SMALL = dict(width=64, height=48)
 
 
@@ -33,7 +33,7 @@ def scene(**fields):
 
 
 def test_built_in_task_runs_in_the_scene(tmp_path):
-    made = mjs.record("pick", scene=scene(count=(2, 3)), out=tmp_path, episodes=2, worlds=2, **SMALL)
+    made = mjs.record("pick", scene=scene(count=(2, 3)), out=tmp_path, episodes=2, num_worlds=2, **SMALL)
     assert made.kept == 2, made.failures
     with h5py.File(made.path / "trajectories_batch_1_of_1.h5") as file:
         text = json.loads(file["traj_0/obs_scene"][()])["text"]
@@ -62,7 +62,7 @@ def test_scene_may_be_a_function(tmp_path):
         (3, "scene must be the name or file of a scene"),
         (lambda: 3, r"models\(\) must return a mjsense.SceneCfg, not 3"),
         (mjs.SceneFileCfg(name="both", models=bench, base="x.xml"), "scene 'both': a scene whose models are made by code"),
-        (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
+        (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.tasks.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
     ],
 )
 def test_errors_name_the_scene(what, message):
@@ -98,11 +98,11 @@ def camera_rows(path, key="traj_0"):
 
 
 def test_frozen_cameras_have_the_recorded_poses(tmp_path):
-    first = mjs.record("pick", camera_system="omni_purpose", out=tmp_path / "a", episodes=1, worlds=1, seed=5, **SMALL)
+    first = mjs.record("pick", camera_system="omni_purpose", out=tmp_path / "a", episodes=1, num_worlds=1, seed=5, **SMALL)
     rows, scene = camera_rows(first.path)
     frozen = tmp_path / "cameras.json"
     frozen.write_text(json.dumps(scene["cameras"]))
-    again = mjs.record("pick", camera_system=str(frozen), out=tmp_path / "b", episodes=1, worlds=1, seed=5, **SMALL)
+    again = mjs.record("pick", camera_system=str(frozen), out=tmp_path / "b", episodes=1, num_worlds=1, seed=5, **SMALL)
     same, _ = camera_rows(again.path)
     assert list(same) == list(rows) and len(rows) == 5
     for name in rows:
@@ -145,7 +145,7 @@ def test_split_is_a_part_of_a_named_scene(tmp_path):
     names = set(env.scene.entities)
     env.close()
     assert {"pear", "soup_can"} <= names and not {"mug", "marker"} & names
-    mjs.record("pick", out=tmp_path / "data", split="train", horizon=2, worlds=1, keep_failures=True, cameras=[])
+    mjs.record("pick", out=tmp_path / "data", split="train", horizon=2, num_worlds=1, keep_failures=True, cameras=[])
     assert mjs.Dataset(tmp_path / "data").episodes[0].settings["scene"] == "varied_table@train"
     with pytest.raises(ValueError, match="split is 'train', but the scene is an object"):
         mjs.make_vec("pick", scene=mjs.SceneFileCfg(name="made"), split="train")

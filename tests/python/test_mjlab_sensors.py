@@ -114,7 +114,7 @@ def test_user_defined_sensor_in_compat():
 
 
 def test_the_same_sensor_in_a_native_scene():
-    Cfg, PeakSpeed = sensor_classes(mjs.Sensor, mjs.SensorCfg)
+    Cfg, PeakSpeed = sensor_classes(mjs.Sensor, mjs.sensors.SensorCfg)
     cfg = Cfg("peak", scale=2.0)
     assert cfg.prefixed_name == "peak" and cfg == Cfg(name="peak", scale=2.0)
     scene = mjs.Scene(mjs.SceneCfg(entities={"box": mjs.EntityCfg(model=box())}, sensors=(cfg,)))

@@ -30,7 +30,7 @@ LAZY = {"mesh_face", "mesh_facenormal", "mesh_graph"}  # read again only after r
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     out = tmp_path_factory.mktemp("recorded")
-    mjs.record("pick", out=out, worlds=1, episodes=1, keep_failures=True, horizon=4, cameras=[], seed=3)
+    mjs.record("pick", out=out, num_worlds=1, episodes=1, keep_failures=True, horizon=4, cameras=[], seed=3)
     return out
 
 

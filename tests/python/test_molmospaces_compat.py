@@ -70,7 +70,7 @@ def test_the_task_of_the_page_on_its_own():
 
 def test_start_pose_and_grasp_are_those_of_the_core_suite(tmp_path):
     """The same episodes, with mjsense's own sensors and with those of the page."""
-    options = dict(out=tmp_path, cameras=[], episodes=2, worlds=2, keep_failures=True, seed=3, horizon=120)
+    options = dict(out=tmp_path, cameras=[], episodes=2, num_worlds=2, keep_failures=True, seed=3, horizon=120)
     ours, theirs = (mjs.record(task, **{**options, "out": tmp_path / name}) for task, name in (("pick", "ours"), (MyTask, "theirs")))
     for one, other in zip(sorted(ours.path.glob("*.h5")), sorted(theirs.path.glob("*.h5"))):
         with h5py.File(one) as a, h5py.File(other) as b:
@@ -85,9 +85,9 @@ def test_start_pose_and_grasp_are_those_of_the_core_suite(tmp_path):
 
 
 def test_a_name_in_use_is_an_assertion_error_as_in_molmospaces():
-    suite = SensorSuite([mjs.PoseSensor("a", body="x")])
+    suite = SensorSuite([mjs.sensors.PoseSensor("a", body="x")])
     with pytest.raises(AssertionError, match="'a' is a duplicated sensor uuid"):
-        suite.add(mjs.PoseSensor("a", body="y"))
+        suite.add(mjs.sensors.PoseSensor("a", body="y"))
     assert isinstance(suite, mjs.SensorSuite) and len(suite) == 1
 
 
@@ -98,7 +98,7 @@ def test_cameras_of_the_suite():
     assert cameras == ["wrist_camera", "exo_camera_1"] and not is_camera_sensor("qpos", suite) and not is_camera_sensor("x", suite)
     (observation,), _ = task.reset(seed=0)
     assert observation["wrist_camera"].shape == (36, 64, 3) and "object_image_points" in observation
-    assert is_camera_sensor("rgb", SensorSuite([mjs.CameraImageSensor("wrist_camera", uuid="rgb")]))
+    assert is_camera_sensor("rgb", SensorSuite([mjs.sensors.CameraImageSensor("wrist_camera", uuid="rgb")]))
     task.close()
 
 
@@ -136,7 +136,7 @@ class Reach(PlannerPolicy):
 def test_policy_written_for_one_world_runs_in_many(tmp_path):
     task = MyTask()
     task.register_policy(Reach())
-    summary = mjs.record(task, out=tmp_path, cameras=[], episodes=3, worlds=3, keep_failures=True)
+    summary = mjs.record(task, out=tmp_path, cameras=[], episodes=3, num_worlds=3, keep_failures=True)
     with h5py.File(next(summary.path.glob("*.h5"))) as file:
         trajectory = file["traj_0"]
         assert trajectory["obs/extra/policy_phase"][:].ravel().tolist() == [3, 3, 3, 5, 5, 5, 5]

@@ -13,13 +13,13 @@ def frames(n, worlds=2):
 
 
 def test_order_of_the_pipeline():
-    pipeline = mjs.ObservationPipeline(1, bias=1.0, clip=(0, 2), scale=10.0)
+    pipeline = mjs.sensors.ObservationPipeline(1, bias=1.0, clip=(0, 2), scale=10.0)
     assert pipeline([[0.5]]).tolist() == [[15.0]]
     assert pipeline([[7.0]]).tolist() == [[20.0]]
 
 
 def test_delay_and_partial_reset():
-    pipeline = mjs.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
+    pipeline = mjs.sensors.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
     out = [pipeline(f)[:, 0].tolist() for f in frames(3)]
     assert out == [[0, 10], [0, 10], [0, 10]]
     pipeline.reset([])  # no world
@@ -28,7 +28,7 @@ def test_delay_and_partial_reset():
 
 
 def test_reset_with_none_resets_all():
-    pipeline = mjs.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
+    pipeline = mjs.sensors.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
     for f in frames(3):
         pipeline(f)
     pipeline.reset()
@@ -36,7 +36,7 @@ def test_reset_with_none_resets_all():
 
 
 def test_history_is_oldest_first_and_backfilled():
-    pipeline = mjs.ObservationPipeline(2, history_length=3)
+    pipeline = mjs.sensors.ObservationPipeline(2, history_length=3)
     out = [pipeline(f).tolist() for f in frames(3)]
     assert out == [[[0, 0, 0], [10, 10, 10]], [[0, 0, 1], [10, 10, 11]], [[0, 1, 2], [10, 11, 12]]]
     pipeline.reset([0])
@@ -44,21 +44,21 @@ def test_history_is_oldest_first_and_backfilled():
 
 
 def test_noise_is_seeded():
-    a, b = (mjs.ObservationPipeline(2, noise=mjs.effects.Gaussian(1.0), seed=3) for _ in range(2))
+    a, b = (mjs.sensors.ObservationPipeline(2, noise=mjs.effects.Gaussian(1.0), seed=3) for _ in range(2))
     assert np.array_equal(a(frames(1)[0]), b(frames(1)[0]))
     with pytest.raises(ValueError, match="operation"):
-        mjs.ObservationPipeline(1, operation="mul")
+        mjs.sensors.ObservationPipeline(1, operation="mul")
 
 
 def test_biases_and_disabling_them():
     settings = dict(noise=0.25, bias=1.0, episode_bias=mjs.effects.EpisodeBias(mjs.effects.Constant(10.0)))
-    assert mjs.ObservationPipeline(1, **settings)([[0.5, 1.5]]).tolist() == [[11.75, 12.75]]
-    assert mjs.ObservationPipeline(1, enable_corruption=False, **settings)([[0.5, 1.5]]).tolist() == [[0.5, 1.5]]
+    assert mjs.sensors.ObservationPipeline(1, **settings)([[0.5, 1.5]]).tolist() == [[11.75, 12.75]]
+    assert mjs.sensors.ObservationPipeline(1, enable_corruption=False, **settings)([[0.5, 1.5]]).tolist() == [[0.5, 1.5]]
 
 
 def test_pipeline_errors():
     with pytest.raises(ValueError, match=r"shape \(3, 1\): expected \(2, D\)"):
-        mjs.ObservationPipeline(2)(np.zeros((3, 1)))
+        mjs.sensors.ObservationPipeline(2)(np.zeros((3, 1)))
     for wrong, text in [
         (dict(clip=(1, 0)), "low 1 is above high 0"),
         (dict(clip=(0, 1, 2)), "clip must be 2 numbers"),
@@ -70,14 +70,14 @@ def test_pipeline_errors():
         (dict(noise="much"), "noise must be"),
     ]:
         with pytest.raises((ValueError, TypeError), match=text):
-            mjs.ObservationPipeline(1, **wrong)
-    pipeline = mjs.ObservationPipeline(1)
+            mjs.sensors.ObservationPipeline(1, **wrong)
+    pipeline = mjs.sensors.ObservationPipeline(1)
     pipeline([[0.0]])
     with pytest.raises(ValueError, match=r"shape \(1, 2\): expected \(1, 1\)"):
         pipeline([[0.0, 0.0]])
     with pytest.raises(RuntimeError):
-        mjs.ObservationPipeline(1, nan_policy="error")([[float("nan")]])
-    assert mjs.ObservationPipeline(1, nan_policy="sanitize")([[float("nan")]]).tolist() == [[0.0]]
+        mjs.sensors.ObservationPipeline(1, nan_policy="error")([[float("nan")]])
+    assert mjs.sensors.ObservationPipeline(1, nan_policy="sanitize")([[float("nan")]]).tolist() == [[0.0]]
 
 
 def test_height_scan():

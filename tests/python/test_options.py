@@ -283,7 +283,7 @@ class Storm(Moon):
         return super().evaluate(sim)
 
 
-RECORDING = {"worlds": 2, "episodes": 3, "keep_failures": True, "cameras": [], "seed": 3, "horizon": 12}
+RECORDING = {"num_worlds": 2, "episodes": 3, "keep_failures": True, "cameras": [], "seed": 3, "horizon": 12}
 
 
 @pytest.fixture(scope="module")
@@ -348,12 +348,12 @@ class Light(mjs.Policy):
 
 
 def test_options_that_a_policy_sets_in_a_built_in_task(tmp_path):
-    mjs.record("pick", policy=Light(), out=tmp_path, **{**RECORDING, "worlds": 1})
+    mjs.record("pick", policy=Light(), out=tmp_path, **{**RECORDING, "num_worlds": 1})
     episodes = mjs.Dataset(tmp_path).episodes
     assert [episode.model().opt.gravity[2] for episode in episodes] == [-9.81, -5, -9.81]
     worlds = sensor_check._Rebuilt(episodes[0], 1, 1)
     for episode in episodes:  # the task is rebuilt without the policy
         worlds.begin(0, episode)
         assert worlds.sim.options.gravity[0, 2] == episode.model().opt.gravity[2]
-    report = mjs.check_replay(tmp_path, states=True, worlds=1)
+    report = mjs.check_replay(tmp_path, states=True, num_worlds=1)
     assert report.ok, report

@@ -155,7 +155,7 @@ def test_next_chunk_is_requested_when_one_ends(tmp_path):
             return np.tile(0.1 * k + 0.01 * np.arange(4)[None, :, None], (self.num_worlds, 1, 1))
 
     policy = Ramp()
-    summary = record(tmp_path, Cart(), policy=policy, episodes=2, worlds=2, horizon=6)
+    summary = record(tmp_path, Cart(), policy=policy, episodes=2, num_worlds=2, horizon=6)
     assert policy.asked == [[True, True], [True, True]]
     for rows in trajectories(summary):
         commands = [row["joints"][0] for row in json_rows(rows["actions/commanded_action"])[1:]]
@@ -192,7 +192,7 @@ def test_random_numbers_depend_on_the_episode(tmp_path):
         def act(self, obs):
             return np.array([[self.rng(w).uniform(-1, 1)] for w in range(self.num_worlds)])
 
-    runs = [trajectories(record(tmp_path / str(worlds), policy=Chance(), worlds=worlds, seed=3)) for worlds in (1, 3)]
+    runs = [trajectories(record(tmp_path / str(worlds), policy=Chance(), num_worlds=worlds, seed=3)) for worlds in (1, 3)]
     for one, other in zip(*runs, strict=True):
         np.testing.assert_array_equal(one["actions/commanded_action"], other["actions/commanded_action"])
     assert not np.array_equal(runs[0][0]["actions/commanded_action"], runs[0][1]["actions/commanded_action"])
@@ -294,7 +294,7 @@ def test_chunks_that_start_at_different_times_do_not_mix(tmp_path):
             over = (np.arange(sim.num_worlds) == 1) & (sim.time > 0.03)
             return {"reward": np.zeros(sim.num_worlds), "success": np.ones(sim.num_worlds, bool), "terminated": over}
 
-    summary = mjs.record(TwoGroups(), policy=Chunks(), out=tmp_path, episodes=4, worlds=2, cameras=[], keep_failures=True)
+    summary = mjs.record(TwoGroups(), policy=Chunks(), out=tmp_path, episodes=4, num_worlds=2, cameras=[], keep_failures=True)
     for rows in trajectories(summary):
         commands = json_rows(rows["actions/commanded_action"])[1:]
         for first in range(0, len(commands), 4):

@@ -19,7 +19,7 @@ def make(task=Cart, **kwargs):
 def record(out, task=None, **kwargs):
     task = task or Cart()
     kwargs.setdefault("policy", Driver(task))
-    return mjs.record(task, out=out, **{"episodes": 3, "worlds": 2, "cameras": [], "keep_failures": True, **kwargs})
+    return mjs.record(task, out=out, **{"episodes": 3, "num_worlds": 2, "cameras": [], "keep_failures": True, **kwargs})
 
 
 def trajectories(summary):
@@ -58,13 +58,13 @@ def test_recording_of_a_user_defined_task(tmp_path):
 def test_python_is_called_once_per_step_for_all_worlds(tmp_path):
     task = Cart()
     policy = Driver(task)
-    summary = record(tmp_path, task, policy=policy, episodes=4, worlds=4)
+    summary = record(tmp_path, task, policy=policy, episodes=4, num_worlds=4)
     assert summary.steps == 4 * 20
     assert policy.acts == 20 and task.calls == {"scene": 1, "sample": 4, "evaluate": 21} and task.began == [[0, 1, 2, 3]]
 
 
 def test_an_episode_does_not_depend_on_its_world(tmp_path):
-    runs = [trajectories(record(tmp_path / str(worlds), worlds=worlds, seed=7)) for worlds in (1, 2, 3)]
+    runs = [trajectories(record(tmp_path / str(worlds), num_worlds=worlds, seed=7)) for worlds in (1, 2, 3)]
     for run in runs[1:]:
         for one, other in zip(runs[0], run, strict=True):
             assert one.keys() == other.keys()
@@ -97,7 +97,7 @@ class OverAtOnce(Cart):
 
 @pytest.mark.parametrize("worlds", [1, 4])
 def test_episodes_without_steps_do_not_end_a_recording(tmp_path, worlds):
-    summary = record(tmp_path, OverAtOnce(), episodes=4, worlds=worlds, max_attempts=40)
+    summary = record(tmp_path, OverAtOnce(), episodes=4, num_worlds=worlds, max_attempts=40)
     assert summary.kept == 4 and summary.enough and not summary.interrupted
     assert summary.failures["no success"] >= 1, "the case that this is about"
 
@@ -221,7 +221,7 @@ def test_cpp_planner_on_a_python_task(tmp_path):
             height = sim.data.xpos[:, self.id, 2] - self.z
             return height, height > 0.01
 
-    summary = mjs.record(Lift(), policy="planner", out=tmp_path, episodes=2, worlds=2, cameras=[])
+    summary = mjs.record(Lift(), policy="planner", out=tmp_path, episodes=2, num_worlds=2, cameras=[])
     assert summary.kept == 2 and summary.succeeded == 2
     rows = trajectories(summary)[0]
     assert rows["success"][-1] and rows["obs/extra/policy_phase"][-1] == 5

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
+import importlib
 import inspect
 import pydoc
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 
 import mjsense as mjs
 from mjsense import _core
+from mjsense.core.old_names import MOVED
 
 
 def test_everything_public_is_exported():
@@ -19,14 +21,28 @@ def test_everything_public_is_exported():
         for name, value in vars(mjs).items()
         if not name.startswith("_") and not isinstance(value, types.ModuleType)
     }
-    assert public | {"effects", "observations", "__version__"} == set(mjs.__all__)
+    assert public | {"effects", "observations", "__version__"} == set(mjs.__all__) and len(mjs.__all__) <= 75
 
 
-def test_every_public_class_and_function_has_a_docstring():
-    for name in mjs.__all__:
-        value = getattr(mjs, name)
+@pytest.mark.parametrize("room", ["mjsense", *MOVED])
+def test_every_public_class_and_function_has_a_docstring(room):
+    module = importlib.import_module(room)
+    for name in module.__all__:
+        value = getattr(module, name)
         if isinstance(value, (type, types.FunctionType)):
             assert value.__doc__, name
+
+
+@pytest.mark.parametrize("room", MOVED)
+def test_names_that_were_at_the_top_are_in_their_room(room):
+    module = importlib.import_module(room)
+    for name in MOVED[room]:
+        assert name in module.__all__ and name not in mjs.__all__
+        with pytest.warns(DeprecationWarning, match=f"^mjsense.{name} is now {room}.{name}$") as caught:
+            assert getattr(mjs, name) is getattr(module, name)
+        assert caught[0].filename == __file__
+    with pytest.raises(AttributeError, match=r"^module 'mjsense' has no attribute 'Simulaton'; did you mean 'Simulation'\?$"):
+        _ = mjs.Simulaton
 
 
 def test_one_mujoco():
@@ -46,7 +62,7 @@ def test_help_shows_every_field():
     text = pydoc.plain(pydoc.render_doc(mjs.LidarSensorCfg))
     assert "Emit each ray from the pose that the frame had at that ray's moment of the sweep." in text  # its own
     assert "Maximum distance; more distant hits are misses. [m]" in text  # inherited
-    assert "uint8 [B, H, W, 3]" in pydoc.plain(pydoc.render_doc(mjs.CameraData))
+    assert "uint8 [B, H, W, 3]" in pydoc.plain(pydoc.render_doc(mjs.sensors.CameraData))
 
 
 def test_import_loads_nothing_heavy():
@@ -62,7 +78,7 @@ def test_methods_of_configurations_are_created_on_first_use():
     program = """
 import mjsense as mjs
 from mjsense.core.lazy_dataclass import _Method
-classes = [c for m in (mjs.configs, mjs.effects) for c in vars(m).values() if isinstance(c, type) and issubclass(c, mjs.SensorCfg)]
+classes = [c for m in (mjs.sensors.configs, mjs.effects) for c in vars(m).values() if isinstance(c, type) and issubclass(c, mjs.sensors.SensorCfg)]
 assert len(classes) > 5 and all(isinstance(vars(c)["__init__"], _Method) for c in classes), classes
 mjs.CameraSensorCfg(name="a")
 assert not any(isinstance(m, _Method) for m in vars(mjs.CameraSensorCfg).values())

@@ -171,7 +171,7 @@ def recorded(tmp_path_factory):
     for worlds in (1, 3, 8):
         path = tmp_path_factory.mktemp(f"data{worlds}")
         summary = mjs.record(
-            out=path, worlds=worlds, episodes=9, keep_failures=True, cameras=[], sensors=sensors(), **SMALL
+            out=path, num_worlds=worlds, episodes=9, keep_failures=True, cameras=[], sensors=sensors(), **SMALL
         )
         assert summary.kept == 9, summary
         out[worlds] = read(path)
@@ -313,7 +313,7 @@ def test_the_robot_view_agrees_with_the_suite():
         np.testing.assert_allclose(pose[:3, 3], env.rows["actions/ee_pose/arm"][w][:3], atol=1e-12)
         peer.current_batch_index = w
         camera = peer.camera_manager.registry["wrist_camera"]
-        sensor = mjs.CameraParameterSensor("wrist_camera", 48, 32, uuid=f"camera{w}")
+        sensor = mjs.sensors.CameraParameterSensor("wrist_camera", 48, 32, uuid=f"camera{w}")
         env.sim.add(sensor)
         np.testing.assert_allclose(camera.get_pose(), sensor.data["cam2world_gl"][w], atol=1e-12)
         np.testing.assert_array_equal(peer.render_rgb_frame("wrist_camera"), env.rows["wrist_camera"][w])
@@ -347,7 +347,7 @@ def test_with_a_task_written_in_python(tmp_path):
     for worlds in (1, 3):
         task = Marked()
         summary = mjs.record(
-            task, policy=Driver(task), out=tmp_path / str(worlds), worlds=worlds, episodes=3, keep_failures=True, cameras=[]
+            task, policy=Driver(task), out=tmp_path / str(worlds), num_worlds=worlds, episodes=3, keep_failures=True, cameras=[]
         )
         rows[worlds] = {}
         for path in summary.path.rglob("*.h5"):
@@ -412,7 +412,7 @@ def test_error_rejects_only_its_episode(tmp_path, recorded, how, text):
         sensor.how, sensor.victim = how, victim
         path = tmp_path / str(worlds)
         summary = mjs.record(
-            out=path, worlds=worlds, episodes=4, keep_failures=True, cameras=[], sensors=[sensor, *sensors()[1:]], **SMALL
+            out=path, num_worlds=worlds, episodes=4, keep_failures=True, cameras=[], sensors=[sensor, *sensors()[1:]], **SMALL
         )
         assert summary.kept == 4
         refused = [why for why in summary.failures if why.startswith("sensor")]
@@ -439,10 +439,10 @@ def test_recording_that_always_fails_ends(tmp_path):
     for worlds in (1, 2):
         for broken, text in ((Broken(), "ArithmeticError: no"), (Long(), "JSON text of 19 bytes, str_max_len is 8")):
             with pytest.raises(mjs.SensorError, match=f"sensor 'counter', world 0: .*{text}"):
-                mjs.record(out=tmp_path, worlds=worlds, episodes=2, cameras=[], sensors=[broken], **SMALL)
+                mjs.record(out=tmp_path, num_worlds=worlds, episodes=2, cameras=[], sensors=[broken], **SMALL)
             assert not list(tmp_path.rglob("*"))
     summary = mjs.record(
-        out=tmp_path, worlds=2, episodes=2, keep_failures=True, cameras=[], sensors=[Counter()], **SMALL
+        out=tmp_path, num_worlds=2, episodes=2, keep_failures=True, cameras=[], sensors=[Counter()], **SMALL
     )
     assert summary.kept == 2
 

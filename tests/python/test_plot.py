@@ -17,7 +17,7 @@ from mjsense.viewer.plots import _expand
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     out = tmp_path_factory.mktemp("pick")
-    mjs.record("pick", out=out, horizon=20, episodes=2, worlds=2, keep_failures=True, width=48, height=32, depth=True)
+    mjs.record("pick", out=out, horizon=20, episodes=2, num_worlds=2, keep_failures=True, width=48, height=32, depth=True)
     return out
 
 
@@ -81,7 +81,7 @@ class Terminal(io.StringIO):
 
 
 def test_progress_of_recordings(tmp_path, monkeypatch):
-    small = dict(out=tmp_path, horizon=3, keep_failures=True, cameras=[], worlds=1)
+    small = dict(out=tmp_path, horizon=3, keep_failures=True, cameras=[], num_worlds=1)
     monkeypatch.setattr(sys, "stderr", Terminal())
     mjs.record("pick", **small)
     lines = sys.stderr.getvalue()

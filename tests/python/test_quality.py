@@ -17,7 +17,7 @@ from mjsense.commands import run as run_command
 def waiting(tmp_path_factory):
     out = tmp_path_factory.mktemp("waiting")
     mjs.record(
-        "pick", policy=Waiting, out=out, horizon=2 * MOVES + WAITS, worlds=1, keep_failures=True, cameras=[], action_noise=False
+        "pick", policy=Waiting, out=out, horizon=2 * MOVES + WAITS, num_worlds=1, keep_failures=True, cameras=[], action_noise=False
     )
     return out
 
@@ -25,7 +25,7 @@ def waiting(tmp_path_factory):
 @pytest.fixture(scope="module")
 def picks(tmp_path_factory):
     out = tmp_path_factory.mktemp("picks")
-    mjs.record("pick", policy="top_down_planner", out=out, episodes=2, worlds=2, width=32, height=24, shadows=False)
+    mjs.record("pick", policy="top_down_planner", out=out, episodes=2, num_worlds=2, width=32, height=24, shadows=False)
     return out
 
 
@@ -91,7 +91,7 @@ def test_moving_objects_and_idle_steps_at_the_end_stay(tmp_path):
             return {"arm": arm, "gripper": np.zeros((self.num_worlds, 1))}
 
     mjs.record(
-        "pick", policy=Still, out=tmp_path / "data", horizon=20, worlds=1, keep_failures=True, cameras=[], action_noise=False
+        "pick", policy=Still, out=tmp_path / "data", horizon=20, num_worlds=1, keep_failures=True, cameras=[], action_noise=False
     )
     (episode,) = mjs.Dataset(tmp_path / "data").episodes
     assert episode.idle[-8:].all() and episode.trimmed().length >= 8

@@ -197,13 +197,13 @@ def test_exports_of_observations_that_are_no_vectors(space, size, tmp_path, caps
     pq = pytest.importorskip("pyarrow.parquet")
     with mjs.RecordEpisodes(env := Pixels(space), tmp_path / "data", episodes=2) as recorded:
         run(recorded)
-    mjs.export_lerobot(tmp_path / "data", tmp_path / "out")
+    mjs.exporting.export_lerobot(tmp_path / "data", tmp_path / "out")
     table = pq.read_table(tmp_path / "out/data/chunk-000/file-000.parquet").to_pydict()
     assert len(table["action"]) == 5 and ("observation.state" in table) == (size is not None)
     if size == 6:
         np.testing.assert_array_equal(table["observation.state"], [env.seen[i].ravel().astype(np.float32) for i in (0, 1, 2, 4, 5)])
     assert ("is recorded as an array and left out" in capsys.readouterr().err) == (len(space.shape or ()) == 3)
-    mjs.export_robomimic(tmp_path / "data", tmp_path / "robomimic.hdf5")
+    mjs.exporting.export_robomimic(tmp_path / "data", tmp_path / "robomimic.hdf5")
 
 
 def test_an_export_says_how_many_episodes_have_no_step(tmp_path, capsys):
@@ -211,7 +211,7 @@ def test_an_export_says_how_many_episodes_have_no_step(tmp_path, capsys):
         recorded.reset()
         run(recorded)
     assert sorted(e.length for e in mjs.Dataset(tmp_path / "data").episodes) == [1, 3, 4]
-    mjs.export_lerobot(tmp_path / "data", tmp_path / "out")
+    mjs.exporting.export_lerobot(tmp_path / "data", tmp_path / "out")
     assert "1 of 3 episodes have one observation and no step; they are left out" in capsys.readouterr().err
 
 
@@ -235,7 +235,7 @@ def test_vector_environments(tmp_path, kind, mode):
     env = kind([lambda n=n: Counter(n) for n in lengths], autoreset_mode=mode)
     cameras = {} if mode == AutoresetMode.SAME_STEP else {"view": "render"}
     env = mjs.RecordEpisodes(env, tmp_path, 6, cameras=cameras)
-    assert isinstance(env, mjs.RecordVectorEpisodes)
+    assert isinstance(env, mjs.recording.RecordVectorEpisodes)
     env.reset(seed=5)
     for step in range(100):
         if env.recording.complete:

@@ -17,7 +17,7 @@ import mjsense as mjs
 from mjsense.exporting.output import part_of
 from mjsense.exporting.record_lerobot import CompleteError
 
-ARGUMENTS = {"horizon": 12, "keep_failures": True, "width": 32, "height": 24, "worlds": 2, "seed": 5, "episodes": 6, "max_attempts": 6, "batches": 3}
+ARGUMENTS = {"horizon": 12, "keep_failures": True, "width": 32, "height": 24, "num_worlds": 2, "seed": 5, "episodes": 6, "max_attempts": 6, "batches": 3}
 WORDS = ["record", "pick", "--horizon", "12", "--keep-failures", "--size", "32x24", "--worlds", "2", "--seed", "5", "--episodes", "6",
          "--max-attempts", "6", "--batches", "3", "--format", "lerobot", "--resume", "-q"]  # fmt: skip
 KILLS = int(os.environ.get("MJSENSE_TEST_KILLS", "3"))
@@ -31,7 +31,7 @@ def tree(root):
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("exported")
     mjs.record("pick", out=folder / "recording", **ARGUMENTS)
-    return tree(mjs.export_lerobot(folder / "recording", folder / "out"))
+    return tree(mjs.exporting.export_lerobot(folder / "recording", folder / "out"))
 
 
 def test_it_equals_an_exported_recording(exported, tmp_path):
@@ -63,7 +63,7 @@ def test_another_process_that_writes_it_is_not_disturbed(tmp_path):
     with part_of(tmp_path / "out") as part:
         (part / "meta").mkdir()
         for write in (lambda: mjs.record("pick", out=tmp_path / "out", format="lerobot", resume=True, **ARGUMENTS),
-                      lambda: mjs.export_lerobot(tmp_path / "out.recording", tmp_path / "out")):  # fmt: skip
+                      lambda: mjs.exporting.export_lerobot(tmp_path / "out.recording", tmp_path / "out")):  # fmt: skip
             with pytest.raises(FileExistsError, match=r"another process writes .*/out$"):
                 write()
         assert (part / "meta").exists()

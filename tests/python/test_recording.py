@@ -10,7 +10,7 @@ import pytest
 import mjsense as mjs
 
 PROGRAM = [sys.executable, "-m", "mjsense"]
-SMALL = dict(worlds=2, width=48, height=32, shadows=False, seed=1)
+SMALL = dict(num_worlds=2, width=48, height=32, shadows=False, seed=1)
 
 
 class Hand(mjs.Sensor):
@@ -36,7 +36,7 @@ def recording(tmp_path_factory):
 def test_summary_and_progress(recording):
     summary, seen = recording
     assert summary.kept == 1 and summary.enough and not summary.interrupted
-    assert isinstance(seen[-1], mjs.RecordProgress) and seen[-1].kept == 1
+    assert isinstance(seen[-1], mjs.tasks.RecordProgress) and seen[-1].kept == 1
     assert summary.steps == sum(n - 1 for n in summary.lengths)
 
 
@@ -57,7 +57,7 @@ def test_bad_arguments(tmp_path):
         (dict(policy="x"), KeyError, "planner"),
         (dict(cameras=["wrist"]), KeyError, "wrist"),
         (dict(episodes=0), ValueError, "episodes is 0"),
-        (dict(worlds=0), ValueError, "worlds is 0"),
+        (dict(num_worlds=0), ValueError, "worlds is 0"),
         (dict(episodes="2"), TypeError, "episodes must be an int"),
         (dict(sensors=[3]), TypeError, "not a mjsense.Sensor"),
     ]:

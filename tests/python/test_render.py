@@ -21,7 +21,7 @@ from edited_recordings import changed, file_of
 import mjsense as mjs
 from mjsense.dataset import render_cameras
 
-RECORDING = dict(worlds=2, episodes=3, keep_failures=True, horizon=8, seed=5, width=48, height=32, depth=True)
+RECORDING = dict(num_worlds=2, episodes=3, keep_failures=True, horizon=8, seed=5, width=48, height=32, depth=True)
 TOP = {"pos": (0.5, 0, 1.6), "lookat": (0.5, 0, 0)}
 HAND = {"body": "robot_0/gripper/base", "pos": (0.1, 0, 0), "quat": (0, 1, 0, 0), "fovy": 70, "depth": True}
 
@@ -67,7 +67,7 @@ def videos(root):
 def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
     """Depth is bit-equal, and so is rgb before encoding, because the encoder makes equal files of equal images."""
     seen = []
-    made = mjs.render(recorded, tmp_path, copy=False, worlds=2, progress=seen.append)
+    made = mjs.render(recorded, tmp_path, copy=False, num_worlds=2, progress=seen.append)
     assert (made.finished, made.wanted, made.frames) == (3, 3, 3 * 9 * 4) and made.paths == [tmp_path / "house_0"]
     assert seen[-1].finished == 3
     assert "3 episodes" in verified(tmp_path)
@@ -108,7 +108,7 @@ def test_every_image_option_is_kept(option, tmp_path):
 )
 def test_other_tasks_and_robots(task, robot, tmp_path):
     """tools/replay_table.py checks all of them."""
-    mjs.record(task, robot, out=tmp_path / "data", max_attempts=1, **{**RECORDING, "episodes": 1, "worlds": 1, "horizon": 4})
+    mjs.record(task, robot, out=tmp_path / "data", max_attempts=1, **{**RECORDING, "episodes": 1, "num_worlds": 1, "horizon": 4})
     mjs.render(tmp_path / "data", tmp_path / "out", copy=False)
     assert videos(tmp_path / "out") == videos(tmp_path / "data") and numbers(tmp_path / "out") == numbers(tmp_path / "data")
     report = mjs.check_replay(tmp_path / "data", states=True)
@@ -116,8 +116,8 @@ def test_other_tasks_and_robots(task, robot, tmp_path):
 
 
 def test_files_do_not_depend_on_worlds_and_threads(recorded, tmp_path):
-    mjs.render(recorded, tmp_path / "a", cameras=[], add_cameras={"top": TOP}, worlds=1, threads=1)
-    mjs.render(recorded, tmp_path / "b", cameras=[], add_cameras={"top": TOP}, worlds=3, threads=2)
+    mjs.render(recorded, tmp_path / "a", cameras=[], add_cameras={"top": TOP}, num_worlds=1, threads=1)
+    mjs.render(recorded, tmp_path / "b", cameras=[], add_cameras={"top": TOP}, num_worlds=3, threads=2)
     a, b = ({p.relative_to(out): p.read_bytes() for p in out.rglob("*.*")} for out in (tmp_path / "a", tmp_path / "b"))
     assert a == b and len(a) == 5
 
@@ -225,7 +225,7 @@ def test_sensors(recorded, tmp_path):
         recorded,
         tmp_path / "out",
         cameras=[],
-        sensors=lambda: [*sensors_of(tmp_path / "sensors.toml"), Height(), mjs.PoseSensor("hand", body="robot_0/gripper/base")],
+        sensors=lambda: [*sensors_of(tmp_path / "sensors.toml"), Height(), mjs.sensors.PoseSensor("hand", body="robot_0/gripper/base")],
     )
     verified(tmp_path / "out")
     episode = mjs.Dataset(tmp_path / "out").episodes[0]
@@ -243,7 +243,7 @@ def test_resume_after_an_interruption(recorded, tmp_path):
         if now.finished >= 1:
             raise Stop
 
-    about = dict(cameras=[], add_cameras={"top": TOP}, worlds=1, batches=1)
+    about = dict(cameras=[], add_cameras={"top": TOP}, num_worlds=1, batches=1)
     mjs.render(recorded, tmp_path / "whole", **about)
     for _ in range(2):
         with pytest.raises(Stop):
@@ -363,7 +363,7 @@ def test_errors(recorded, tmp_path):
         (dict(add_cameras={"wrist_camera": TOP}), "two cameras are named 'wrist_camera'"),
         (dict(camera_system="droit"), "droid"),
         (dict(brightness=0.0), "brightness is 0.0: must be positive"),
-        (dict(worlds=0), "worlds is 0: must be at least 1"),
+        (dict(num_worlds=0), "worlds is 0: must be at least 1"),
         (dict(sensors=[mjs.ContactSensorCfg(name="c", primary=mjs.ContactMatch("body", "robot_0/base"), track_air_time=True)]),
          "sensor 'c' depends on the physics steps between observations"),
         (dict(edit=lambda spec: spec.worldbody.add_body(name="b", mass=1, inertia=[1, 1, 1]).add_freejoint()), "An edit must not add joints, actuators or bodies"),
@@ -403,7 +403,7 @@ def test_program(recorded, tmp_path):
 def test_a_task_in_python(tmp_path):
     """Its cameras are rendered and compared; its other sensors need the task."""
     task = tasks.Cart()
-    about = dict(episodes=2, keep_failures=True, horizon=5, worlds=2, width=32, height=24, depth=True)
+    about = dict(episodes=2, keep_failures=True, horizon=5, num_worlds=2, width=32, height=24, depth=True)
     mjs.record(task, policy=tasks.Driver(task), out=tmp_path / "data", **about)
     mjs.render(tmp_path / "data", tmp_path / "out", copy=False, add_cameras={"top": {"pos": (0, 0, 2), "lookat": (0, 0, 0)}})
     verified(tmp_path / "out")

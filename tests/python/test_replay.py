@@ -16,7 +16,7 @@ from edited_recordings import changed, file_of
 
 import mjsense as mjs
 
-SMALL = dict(worlds=2, episodes=2, keep_failures=True, cameras=[], seed=3)
+SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, cameras=[], seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_states_and_actions(pick):
     mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
     np.testing.assert_array_equal(state, episode.states[7])
     assert next(episode.replay(model=model, data=data))[1] is data
-    with pytest.raises(ValueError, match="from_ is 'ctrl'; it must be 'states' or 'actions'"):
+    with pytest.raises(ValueError, match="from_ is 'ctrl': must be one of states, actions"):
         episode.replay("ctrl")
 
 

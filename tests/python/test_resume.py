@@ -163,7 +163,7 @@ def options_of(lab):
     return dict(
         task="pick", robot=lab / "arm/robot.toml", scene=lab / "scene/scene.toml", policy=Still(), sensors=[Height()],
         camera_system=str(lab / "cameras.json"), width=32, height=24, horizon=3, keep_failures=True, episodes=40,
-        seed=3, worlds=1, threads=1, out=lab / "data",
+        seed=3, num_worlds=1, threads=1, out=lab / "data",
     )  # fmt: skip
 
 
@@ -261,7 +261,7 @@ def test_every_change_is_rejected_and_named(lab):
         attempt(name, change, expected)
     assert not wrong, "\n".join(wrong)
     # Without a change the recording resumes, also with a used policy, and with other numbers of worlds and threads.
-    done = mjs.record(**{**options, "resume": True, "worlds": 2, "threads": 2})
+    done = mjs.record(**{**options, "resume": True, "num_worlds": 2, "threads": 2})
     assert done.kept == 40 and done.enough and len(done.lengths) < 40
 
 
@@ -277,7 +277,7 @@ def test_settings_that_cannot_be_compared_are_named(tmp_path):
         def fingerprint(self):
             return "weights of Monday"
 
-    options = dict(task="pick", cameras=[], horizon=3, keep_failures=True, episodes=40, worlds=1)
+    options = dict(task="pick", cameras=[], horizon=3, keep_failures=True, episodes=40, num_worlds=1)
     interrupted(**options, policy=Locked(), out=tmp_path / "a")
     with pytest.raises(ValueError, match=r"attribute 'lock' of the policy has a _thread.lock.*method fingerprint\(\)"):
         mjs.record(**options, policy=Locked(), out=tmp_path / "a", resume=True)

@@ -34,7 +34,7 @@ def test_registered():
     env.close()
     other.close()
     worlds = gymnasium.make_vec("mjsense/Pick-v0", num_envs=2, vectorization_mode="vector_entry_point", **OPTIONS)
-    assert isinstance(worlds, mjs.TaskVectorEnv) and worlds.num_envs == 2
+    assert isinstance(worlds, mjs.tasks.TaskVectorEnv) and worlds.num_envs == 2
     worlds.close()
     for task in mjs.task_names():
         assert f"mjsense/{''.join(w.capitalize() for w in task.split('_'))}-v0" in gymnasium.registry

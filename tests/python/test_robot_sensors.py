@@ -101,7 +101,7 @@ class Count(mjs.Sensor):
 
 
 def test_sensors_of_an_object():
-    franka = mjs.Robot("franka", sensors=[Count("grippers"), mjs.TcpPoseSensor(uuid="tool")])
+    franka = mjs.Robot("franka", sensors=[Count("grippers"), mjs.sensors.TcpPoseSensor(uuid="tool")])
     env = mjs.make_vec("pick", franka, policy="planner", **TASK)
     observation, _ = env.reset()
     assert list(observation)[-6:] == ["tcp_pose", "grippers", "tool", "policy_phase", "policy_num_retries", "grasp_pose"]

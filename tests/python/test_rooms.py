@@ -133,7 +133,7 @@ def test_a_recording_is_the_same_in_one_world_and_in_three(task, tmp_path):
             out=out,
             episodes=3,
             max_attempts=3,
-            worlds=worlds,
+            num_worlds=worlds,
             threads=threads,
             cameras=[],
             horizon=6,
@@ -167,9 +167,9 @@ def test_any_of_several_tasks():
 
 
 def test_nav_and_pick_drives_and_then_picks(tmp_path):
-    made = mjs.record("nav_and_pick", out=tmp_path, first_attempt=1, num_attempts=1, worlds=1, cameras=[])
-    assert made.succeeded == 1, made.failures
-    (episode,) = mjs.Dataset(tmp_path).episodes
+    made = mjs.record("nav_and_pick", out=tmp_path, num_attempts=2, num_worlds=2, cameras=[])
+    assert made.succeeded == 2, made.failures
+    episode = mjs.Dataset(tmp_path).episodes[1]
     assert episode.settings["robot"] == "mobile_franka" and episode.task.endswith((" it", " it up", " it?", " it up?"))
     numbers = episode.obs_scene["policy_phases"]
     phases = episode["obs/extra/policy_phase"].ravel()

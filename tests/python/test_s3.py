@@ -88,7 +88,7 @@ def test_record_read_repair_and_export_at_an_address(run, cache, tmp_path):
     assert "4 episodes" in run("-m", "mjsense", "inspect", "s3://bucket/pick")
     assert run("-m", "mjsense", "verify", "s3://bucket/pick/index.parquet").startswith("intact: ")
     run("-m", "mjsense", "export", "lerobot", "s3://bucket/pick", tmp_path / "exported", "-q", "--ray", "local")
-    mjs.export_lerobot(tmp_path / "alone", tmp_path / "expected")
+    mjs.exporting.export_lerobot(tmp_path / "alone", tmp_path / "expected")
     assert tree(tmp_path / "exported") == tree(tmp_path / "expected")
     run("-m", "mjsense", "render", "s3://bucket/pick", "s3://bucket/large", "--width", "48", "--height", "32", "--ray", "local", "-q")
     assert run("-m", "mjsense", "verify", "s3://bucket/large").startswith("intact: ")

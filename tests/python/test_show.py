@@ -66,7 +66,7 @@ def test_help():
     assert "float32 [3, 1] m in world" in pydoc.render_doc(height, renderer=pydoc.plaintext)
     of_class = pydoc.render_doc(type(height), renderer=pydoc.plaintext)  # as of any class
     assert "get_observation" in of_class and "[3, 1]" not in of_class
-    assert mjs.ContactSensor.__doc__ and mjs.ContactSensor.__doc__.startswith("Contacts of its primaries")
+    assert mjs.sensors.ContactSensor.__doc__ and mjs.sensors.ContactSensor.__doc__.startswith("Contacts of its primaries")
 
 
 def test_html():

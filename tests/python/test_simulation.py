@@ -440,7 +440,7 @@ def test_a_mask_selects_worlds_everywhere(sim, tmp_path):
     sim.step()
     sim.reset(mask)
     assert (sim.time == 0).tolist() == mask
-    pipeline = mjs.ObservationPipeline(4, history_length=2)
+    pipeline = mjs.sensors.ObservationPipeline(4, history_length=2)
     for value in (1.0, 2.0):
         pipeline(np.full((4, 1), value))
     pipeline.reset(mask)

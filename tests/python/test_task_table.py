@@ -30,5 +30,5 @@ def test_every_built_in_task_and_robot_has_a_row():
 def test_planners_succeed(task, robot, scene):
     found = TABLE.play(task, robot, scene, 2)
     # Those of which the table says that they fail at times may fail once.
-    sometimes = "yam" in robot or scene == "shelf" or task == "nav_and_pick"
+    sometimes = "yam" in robot or scene == "shelf"
     assert found["episodes"] == 2 and found["success"] >= (0.5 if sometimes else 1), found

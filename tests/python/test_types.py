@@ -16,10 +16,10 @@ CAMERA = mjs.CameraSensorCfg(name="front", parent_body="ball/ball", width=8, hei
 def test_typed_access_to_sensors():
     scene = ball_scene(feet_cfg(fields=("found",)), CAMERA)
     sim = mjs.Simulation(scene, 2)
-    assert_type(scene.camera("front"), mjs.CameraSensor)
-    assert_type(scene.camera("front").data, mjs.CameraData)
-    assert_type(scene.contact("touch").data, mjs.ContactData)
-    assert_type(scene.entity("ball"), mjs.Entity)
+    assert_type(scene.camera("front"), mjs.sensors.CameraSensor)
+    assert_type(scene.camera("front").data, mjs.sensors.CameraData)
+    assert_type(scene.contact("touch").data, mjs.sensors.ContactData)
+    assert_type(scene.entity("ball"), mjs.scene.Entity)
     assert_type(sim.qpos, NDArray[np.float64])
     assert_type(sim.ctrl, NDArray[np.float64])
     sim.qpos = 0.5

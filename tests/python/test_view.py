@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import gymnasium
 import mujoco
@@ -40,7 +41,7 @@ def live(port):
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     out = tmp_path_factory.mktemp("pick")
-    mjs.record("pick", out=out, horizon=30, episodes=2, worlds=2, keep_failures=True, width=48, height=32, depth=True)
+    mjs.record("pick", out=out, horizon=30, episodes=2, num_worlds=2, keep_failures=True, width=48, height=32, depth=True)
     return out
 
 
@@ -99,7 +100,7 @@ def test_poses_in_frames_of_bodies():
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='b' pos='1 2 3' euler='0 0 90'><geom size='.1'/></body></worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    shapes = mjs.DebugShapes()
+    shapes = mjs.sensors.DebugShapes()
     PoseStream("p", "body b").draw(shapes, np.array([1.0, 0, 0, 1, 0, 0, 0]), model, data.xpos, data.xmat)
     np.testing.assert_allclose(shapes.positions[0], (1, 3, 3), atol=1e-9)
     np.testing.assert_allclose(shapes.vectors[0] / np.linalg.norm(shapes.vectors[0]), (0, 1, 0), atol=1e-9)
@@ -401,6 +402,14 @@ def test_export_to_rerun(recording, tmp_path):
     assert (done.returncode, done.stdout) == (0, "Wrote a.rrd.\n"), done.stderr
     written = (tmp_path / "a.rrd").read_bytes()
     assert written.startswith(b"RRF") and len(written) > 100_000
+    live = [*command[:4], "pick", "--seconds", "0.2", "--export", "b.rrd"]
+    assert subprocess.run(live, cwd=tmp_path, capture_output=True).returncode == 0
+    program = Path(pytest.importorskip("rerun_cli").__file__).parent / "rerun"
+    for name, features in (("a.rrd", ("actions/joint_pos/arm", "obs/agent/qpos/arm")), ("b.rrd", ("reward", "success"))):
+        shown = subprocess.run([program, "rrd", "print", name], cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "HOME": str(tmp_path)}).stdout
+        entities = {word for line in shown.splitlines() for word in line.split() if word.startswith("/")}
+        assert {f"/features/{feature}" for feature in features} <= entities, entities
+        assert "/world/cameras/wrist_camera/colour" in entities and any(one.startswith("/world/scene/") for one in entities), entities
 
 
 @needs_viser

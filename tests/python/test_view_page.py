@@ -142,7 +142,7 @@ def test_ctrl_c_while_a_page_plays(port):
 
 
 def test_the_page_of_a_recording(tmp_path, port):
-    mjs.record("pick", out=tmp_path, horizon=30, episodes=2, worlds=2, keep_failures=True, width=48, height=32, depth=True)
+    mjs.record("pick", out=tmp_path, horizon=30, episodes=2, num_worlds=2, keep_failures=True, width=48, height=32, depth=True)
     with Running(mjs.view(tmp_path, port=port, block=False, open_browser=False)) as running:
         viewer, page = running.viewer, running.page
         viewer._events[1] = lambda: viewer.seek(12)

@@ -34,7 +34,7 @@ HOSTILE = [
 def arm(tmp_path, port):
     """A viewer of two worlds with an actuator."""
     (tmp_path / "arm.xml").write_text(ARM.format("b"))
-    with mjs.view(tmp_path / "arm.xml", worlds=2, port=port, block=False, open_browser=False) as viewer:
+    with mjs.view(tmp_path / "arm.xml", num_worlds=2, port=port, block=False, open_browser=False) as viewer:
         yield viewer
 
 
@@ -542,7 +542,7 @@ def test_a_policy_knows_its_instructions(tmp_path):
                 seen[int(self._mjs_episodes[world])] = self.instructions[world]
             return {}
 
-    mjs.record("pick", policy=Asks, out=tmp_path, episodes=4, worlds=2, horizon=3, keep_failures=True, cameras=[])
+    mjs.record("pick", policy=Asks, out=tmp_path, episodes=4, num_worlds=2, horizon=3, keep_failures=True, cameras=[])
     recorded = [episode.task for episode in mjs.Dataset(tmp_path).episodes]
     assert len(set(recorded)) > 1 and sorted(recorded) == sorted(seen[k] for k in range(4))
 

@@ -59,7 +59,7 @@ def test_without_warp_the_error_names_the_extra():
 
 
 def test_options_of_warp_are_refused_on_the_cpu():
-    with pytest.raises(ValueError, match="backend must be 'cpu' or 'warp', not 'gpu'"):
+    with pytest.raises(ValueError, match="backend is 'gpu': must be one of cpu, warp"):
         simulation(backend="gpu")
     with pytest.raises(ValueError, match="njmax is for backend='warp'"):
         simulation(backend="cpu", njmax=3)

@@ -44,7 +44,7 @@ def noisy(task):
         def scene(self):
             velocity = mjs.BuiltinSensorCfg("speed", "jointvel", mjs.ObjRef("joint", "slide", "cart"))
             noise = mjs.EffectSensorCfg("noise", "cart/speed", effects=(mjs.effects.Noise(mjs.effects.Gaussian(0.1)),))
-            return mjs.replace(super().scene(), sensors=(velocity, noise))
+            return mjs.sensors.replace(super().scene(), sensors=(velocity, noise))
 
     return Noisy()
 

@@ -59,8 +59,14 @@ def alone(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Outcome:
         (folder / "call").write_bytes(ray.cloudpickle.dumps((function, arguments)))
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         program = "import sys; from mjsense.cluster import alone; alone.run_call(sys.argv[1])"
-        done = subprocess.run([sys.executable, "-X", "faulthandler", "-c", program, folder], env=environment, stdout=subprocess.DEVNULL,
-                              stderr=subprocess.PIPE, text=True, errors="replace")  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-X", "faulthandler", "-c", program, folder],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
         result = folder / "result"
         if not result.exists():
             frame = re.search(r'^Current thread .*\n  File "(.*)", line (\d+) in (.*)$', done.stderr, re.MULTILINE)

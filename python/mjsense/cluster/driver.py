@@ -82,9 +82,15 @@ class _Results:
 
     def progress(self, wanted: int, workers: int, seconds: float) -> dict[str, Any]:
         return {
-            "kept": self.kept, "wanted": wanted, "succeeded": self.succeeded, "failed": self.failed, "shards": len(self.done), "workers": workers,
-            "steps_per_second": (self.steps - self._old_steps) / seconds if seconds > 0 else 0.0, "seconds": seconds,
-        }  # fmt: skip
+            "kept": self.kept,
+            "wanted": wanted,
+            "succeeded": self.succeeded,
+            "failed": self.failed,
+            "shards": len(self.done),
+            "workers": workers,
+            "steps_per_second": (self.steps - self._old_steps) / seconds if seconds > 0 else 0.0,
+            "seconds": seconds,
+        }
 
 
 def _claim(storage: Storage, job: Any, more: dict[str, Any], resume: bool) -> None:
@@ -98,7 +104,9 @@ def _claim(storage: Storage, job: Any, more: dict[str, Any], resume: bool) -> No
         raise FileExistsError(f"{job.out} contains a recording: continue it with resume (--resume), or choose another directory")
     for name in sorted({*ours, *theirs}):
         if ours.get(name) != theirs.get(name):
-            raise ValueError(f"{job.out} contains a different recording: {name} is {theirs.get(name)!r} there, and {ours.get(name)!r} here")
+            raise ValueError(
+                f"{job.out} contains a different recording: {name} is {theirs.get(name)!r} there, and {ours.get(name)!r} here"
+            )
 
 
 def record_on_ray(
@@ -142,14 +150,23 @@ def record_on_ray(
         raise ValueError("record: format cannot be combined with a recording on Ray; export its index afterwards")
     check_pickle("record", job.arguments)
     attempts = max_attempts or 6 * episodes
-    shards = [Shard(n, n * shard_attempts, min(shard_attempts, attempts - n * shard_attempts)) for n in range(math.ceil(attempts / shard_attempts))]
+    shards = [
+        Shard(n, n * shard_attempts, min(shard_attempts, attempts - n * shard_attempts))
+        for n in range(math.ceil(attempts / shard_attempts))
+    ]
     return run_job(job, shards, episodes, {"shard_attempts": shard_attempts}, address, resume, runtime_env, progress)
 
 
 def run_job(
-    job: Any, shards: list[Shard], episodes: int, more: dict[str, Any], address: str, resume: bool, runtime_env: dict[str, Any] | None,
+    job: Any,
+    shards: list[Shard],
+    episodes: int,
+    more: dict[str, Any],
+    address: str,
+    resume: bool,
+    runtime_env: dict[str, Any] | None,
     progress: Callable[[ClusterProgress], None] | None,
-) -> ClusterSummary:  # fmt: skip
+) -> ClusterSummary:
     """Runs the shards of a job until ``episodes`` are there without a gap, and writes the index.
 
     Args:

@@ -20,10 +20,20 @@ def write_index(storage: Storage, results: Sequence[ShardResult], episodes: int)
     """
     pyarrow, parquet = (optional(module, "ray", "The index") for module in ("pyarrow", "pyarrow.parquet"))
     rows = [
-        {**row, "path": f"{result.shard.folder}/{row['path']}"} for result in results for row in sorted(result.episodes, key=lambda row: row["episode"])
+        {**row, "path": f"{result.shard.folder}/{row['path']}"}
+        for result in results
+        for row in sorted(result.episodes, key=lambda row: row["episode"])
     ]
-    kinds = {"episode": "int64", "path": "string", "trajectory": "string", "seed": "uint64", "length": "int64", "success": "bool_",
-             "outcome": "string", "task": "string"}  # fmt: skip
+    kinds = {
+        "episode": "int64",
+        "path": "string",
+        "trajectory": "string",
+        "seed": "uint64",
+        "length": "int64",
+        "success": "bool_",
+        "outcome": "string",
+        "task": "string",
+    }
     schema = pyarrow.schema([(name, getattr(pyarrow, kind)()) for name, kind in kinds.items()])
     table = pyarrow.Table.from_pylist(rows[:episodes], schema=schema)
     data = io.BytesIO()

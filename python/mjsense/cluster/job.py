@@ -23,8 +23,22 @@ from mjsense.tasks.record_job import PARTS, check_names, record_here
 
 _OF_RECORD = {"sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"}
 """Arguments of ``record`` that do not decide the data."""
-_FREE = _OF_RECORD | {"worlds", "threads", "episodes", "max_attempts", "first_attempt", "num_attempts", "shard", "resume", "append", "overwrite",
-                      "ffmpeg", "batches", "out"}  # fmt: skip
+_FREE = _OF_RECORD | {
+    "num_worlds",
+    "worlds",
+    "threads",
+    "episodes",
+    "max_attempts",
+    "first_attempt",
+    "num_attempts",
+    "shard",
+    "resume",
+    "append",
+    "overwrite",
+    "ffmpeg",
+    "batches",
+    "out",
+}
 """Arguments of ``record`` that do not change the episodes, or that the driver sets."""
 
 
@@ -68,7 +82,16 @@ class ShardResult:
             ValueError: The text is damaged, or was changed by someone: a value has another type, or a path leaves the shard.
         """
         values = bounded_json.parse_object(text, "done.json", SCENE_BYTES)
-        kinds = {"shard": dict, "fingerprint": str, "episodes": list, "succeeded": int, "failed": int, "steps": int, "failures": dict, "seconds": (int, float)}
+        kinds = {
+            "shard": dict,
+            "fingerprint": str,
+            "episodes": list,
+            "succeeded": int,
+            "failed": int,
+            "steps": int,
+            "failures": dict,
+            "seconds": (int, float),
+        }
         for name, value in values.items():
             if not isinstance(value, kinds.get(name, ())):
                 raise ValueError(f"done.json: {name} is {bounded_json.kind_of(value)}, which is never written")
@@ -121,8 +144,16 @@ def _kept_episodes(folder: Path) -> Iterable[dict[str, Any]]:
     entries, recordings = entries_of(folder)
     store = Store(recordings, 0)
     for e in (Episode(entry, i, store) for i, entry in enumerate(entries)):
-        yield {"episode": e.number, "path": str(e.path.relative_to(folder)), "trajectory": e.trajectory, "seed": e.seed, "length": e.length,
-               "success": e.success, "outcome": e.outcome, "task": e.task}  # fmt: skip
+        yield {
+            "episode": e.number,
+            "path": str(e.path.relative_to(folder)),
+            "trajectory": e.trajectory,
+            "seed": e.seed,
+            "length": e.length,
+            "success": e.success,
+            "outcome": e.outcome,
+            "task": e.task,
+        }
 
 
 def run_shard(job: Job, shard: Shard, fingerprint: str) -> ShardResult:
@@ -131,8 +162,15 @@ def run_shard(job: Job, shard: Shard, fingerprint: str) -> ShardResult:
     with scratch_folder() as folder:
         summary = job.record(folder, shard)
         result = ShardResult(
-            shard, fingerprint, list(_kept_episodes(folder)), summary["succeeded"], summary["failed"], summary["steps"], summary["failures"],
-            time.perf_counter() - began)  # fmt: skip
+            shard,
+            fingerprint,
+            list(_kept_episodes(folder)),
+            summary["succeeded"],
+            summary["failed"],
+            summary["steps"],
+            summary["failures"],
+            time.perf_counter() - began,
+        )
         storage = Storage(job.out)
         storage.put_folder(folder, shard.folder)
         storage.write(f"{shard.folder}/done.json", json.dumps(asdict(result)).encode())

@@ -14,7 +14,9 @@ from mjsense.core.progress_line import line_of
 from mjsense.tasks.record_job import RecordProgress, RecordSummary, of_recording
 
 
-def record_from_options(options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None) -> RecordSummary:
+def record_from_options(
+    options: dict[str, Any], address: str, progress: bool | Callable[[RecordProgress], None] | None
+) -> RecordSummary:
     """``mjsense.record(..., ray=address)``."""
     own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
     for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
@@ -23,8 +25,17 @@ def record_from_options(options: dict[str, Any], address: str, progress: bool | 
         del options["threads"]  # one per worker
 
     def counts(now: ClusterProgress) -> dict[str, Any]:
-        return {"kept": now.kept, "wanted": now.wanted, "running": now.workers, "succeeded": now.succeeded, "failed": now.failed,
-                "steps": round(now.steps_per_second * now.seconds), "physics_steps": 0, "frames": 0, "seconds": now.seconds}  # fmt: skip
+        return {
+            "kept": now.kept,
+            "wanted": now.wanted,
+            "running": now.workers,
+            "succeeded": now.succeeded,
+            "failed": now.failed,
+            "steps": round(now.steps_per_second * now.seconds),
+            "physics_steps": 0,
+            "frames": 0,
+            "seconds": now.seconds,
+        }
 
     line = line_of(progress)
 
@@ -35,7 +46,22 @@ def record_from_options(options: dict[str, Any], address: str, progress: bool | 
         elif line is not None:
             line.show(of_recording(about))
 
-    made = record_on_ray(Job(str(own["out"]), options), episodes=own["episodes"], max_attempts=own["max_attempts"], resume=own["resume"],
-                         address=address, progress=show)  # fmt: skip
-    return RecordSummary(**counts(made), seconds_left=0.0, interrupted=False, enough=made.enough, failures=made.failures, lengths=[], times={},
-                         published_bytes=0, path=Path(own["out"]))  # fmt: skip
+    made = record_on_ray(
+        Job(str(own["out"]), options),
+        episodes=own["episodes"],
+        max_attempts=own["max_attempts"],
+        resume=own["resume"],
+        address=address,
+        progress=show,
+    )
+    return RecordSummary(
+        **counts(made),
+        seconds_left=0.0,
+        interrupted=False,
+        enough=made.enough,
+        failures=made.failures,
+        lengths=[],
+        times={},
+        published_bytes=0,
+        path=Path(own["out"]),
+    )

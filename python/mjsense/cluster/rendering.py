@@ -15,6 +15,7 @@ from mjsense import _core
 from mjsense.cluster.driver import ClusterProgress, ClusterSummary, run_job
 from mjsense.cluster.job import Shard
 from mjsense.cluster.tasks import check_pickle
+from mjsense.core.old_names import old_argument
 from mjsense.dataset import Dataset, render
 from mjsense.dataset.remote import absolute
 
@@ -46,7 +47,12 @@ class _Rendering:
         render(self.root, folder, episodes=chosen, **{"threads": 1, **self.arguments, "progress": False})
         episodes = Dataset(folder).episodes
         succeeded = sum(episode.success for episode in episodes)
-        return {"succeeded": succeeded, "failed": len(episodes) - succeeded, "steps": sum(e.length for e in episodes), "failures": {}}
+        return {
+            "succeeded": succeeded,
+            "failed": len(episodes) - succeeded,
+            "steps": sum(e.length for e in episodes),
+            "failures": {},
+        }
 
 
 def _text(value: Any) -> str:
@@ -56,6 +62,7 @@ def _text(value: Any) -> str:
     return getattr(value, "__qualname__", None) or str(value)
 
 
+@old_argument("worlds", "num_worlds")
 def render_on_ray(
     root: str | Path,
     out: str | Path,
@@ -89,5 +96,8 @@ def render_on_ray(
     if invalid := [i for i in positions if not 0 <= i < count]:
         raise ValueError(f"episodes: {invalid[0]} is not in {root}, which has {count} episodes")
     job = _Rendering(absolute(root), absolute(out), positions, options)
-    shards = [Shard(n, first, min(shard_episodes, len(positions) - first)) for n, first in enumerate(range(0, len(positions), shard_episodes))]
+    shards = [
+        Shard(n, first, min(shard_episodes, len(positions) - first))
+        for n, first in enumerate(range(0, len(positions), shard_episodes))
+    ]
     return run_job(job, shards, len(positions), {"shard_episodes": shard_episodes}, address, resume, runtime_env, progress)

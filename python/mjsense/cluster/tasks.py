@@ -47,11 +47,18 @@ class Tasks:
     an error.
     """
 
-    def __init__(self, ray: Any, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]], describe: Callable[..., str]) -> None:
+    def __init__(
+        self, ray: Any, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]], describe: Callable[..., str]
+    ) -> None:
         self._ray, self._function, self._describe, self._waiting = ray, function, describe, iter(arguments)
         self._running: dict[Any, _Call] = {}
         self._crashed = (ray.exceptions.WorkerCrashedError, ray.exceptions.OutOfMemoryError)
-        self._lost = (*self._crashed, ray.exceptions.NodeDiedError, ray.exceptions.LocalRayletDiedError, ray.exceptions.ObjectLostError)
+        self._lost = (
+            *self._crashed,
+            ray.exceptions.NodeDiedError,
+            ray.exceptions.LocalRayletDiedError,
+            ray.exceptions.ObjectLostError,
+        )
 
     @property
     def count(self) -> int:
@@ -67,7 +74,9 @@ class Tasks:
         """Arguments and results of the tasks that have ended, after at most a second. Ended tasks are replaced by new ones first."""
         self._start_new()
         done = self._ray.wait(list(self._running), timeout=1.0)[0] if self._running else []
-        found = [(call.arguments, result) for ref in done for call in [self._running.pop(ref)] for result in self._result(ref, call)]
+        found = [
+            (call.arguments, result) for ref in done for call in [self._running.pop(ref)] for result in self._result(ref, call)
+        ]
         self._start_new()
         return found
 
@@ -96,8 +105,10 @@ class Tasks:
         except self._ray.exceptions.RayTaskError as error:
             if isinstance(error.cause, self._ray.exceptions.RaySystemError):
                 reason = str(error.cause).splitlines()[0].removeprefix("System error: ")
-                raise RuntimeError(f"The workers cannot load the arguments of the task {self._function.__name__}: {reason}. Send its folder with "
-                                   "working_dir (--ray-working-dir), or install its package with pip (--ray-pip)") from None  # fmt: skip
+                raise RuntimeError(
+                    f"The workers cannot load the arguments of the task {self._function.__name__}: {reason}. Send its folder with "
+                    "working_dir (--ray-working-dir), or install its package with pip (--ray-pip)"
+                ) from None
             raise (error.cause if isinstance(error.cause, Exception) else error) from None
         except self._ray.exceptions.RuntimeEnvSetupError as error:
             lines = [line.strip() for line in str(error).splitlines() if line.strip()]
@@ -123,7 +134,9 @@ class Tasks:
         """The message about a call that ends its process."""
         count, last = call.crashes + len(call.deaths), call.deaths[-1]
         machines = ", ".join(dict.fromkeys(death.machine for death in call.deaths))
-        text = f"{self._describe(*call.arguments)} ended its process {count} times, the last time with {last.how}, on {machines}. "
+        text = (
+            f"{self._describe(*call.arguments)} ended its process {count} times, the last time with {last.how}, on {machines}. "
+        )
         text += "Probably user-defined code, or a library that it calls, has a defect" + (f": {last.place}" if last.place else "")
         return text
 
@@ -145,7 +158,9 @@ class _Call:
 
 
 @contextlib.contextmanager
-def running(ray: Any, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]], describe: Callable[..., str]) -> Iterator[Tasks]:
+def running(
+    ray: Any, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]], describe: Callable[..., str]
+) -> Iterator[Tasks]:
     """Tasks, of which those that have not ended are cancelled at the end of the block.
 
     Args:
@@ -165,4 +180,6 @@ def check_pickle(context: str, arguments: dict[str, Any] | None) -> None:
         try:
             dumps(value)
         except Exception as error:
-            raise TypeError(f"{context}: {name} cannot be sent to the workers: {error}. Pass the class or a function that creates it") from error
+            raise TypeError(
+                f"{context}: {name} cannot be sent to the workers: {error}. Pass the class or a function that creates it"
+            ) from error

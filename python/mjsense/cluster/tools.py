@@ -49,16 +49,23 @@ def inspect(path: str) -> tuple[Path, str, str]:
         return local, text, as_json
     about = None
     if rows is not None:
-        about = {"episodes": len(rows), "successes": sum(row["success"] for row in rows), "observations": sum(row["length"] for row in rows),
-                 "files": len({row["path"] for row in rows}), "instructions": len({row["task"] for row in rows})}  # fmt: skip
+        about = {
+            "episodes": len(rows),
+            "successes": sum(row["success"] for row in rows),
+            "observations": sum(row["length"] for row in rows),
+            "files": len({row["path"] for row in rows}),
+            "instructions": len({row["task"] for row in rows}),
+        }
     return local, _summary_text(about) + text, json.dumps({"index": about, **json.loads(as_json)}, indent=2)
 
 
 def _summary_text(about: dict[str, Any] | None) -> str:
     if about is None:
         return f"no {INDEX}: the recording is not complete; the following counts the files that are there\n"
-    return (f"{INDEX}  {about['episodes']} episodes, {about['successes']} successes, {about['observations']} observations, "
-            f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n")  # fmt: skip
+    return (
+        f"{INDEX}  {about['episodes']} episodes, {about['successes']} successes, {about['observations']} observations, "
+        f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n"
+    )
 
 
 def verify(path: str, *, decode: bool = False, ffmpeg: str = "", progress: Callable[[str], None] | None = None) -> dict[str, Any]:
@@ -79,7 +86,9 @@ def verify(path: str, *, decode: bool = False, ffmpeg: str = "", progress: Calla
         return found | {"ok": not any(f["error"] for f in found["findings"]), "of_job": (local / "job.json").exists()}
     shards = {row["path"].split("/")[0] for row in rows}
     # A shard that no row names may be incomplete: its worker may have died while it copied the files.
-    findings = [f for f in found["findings"] if f["place"].split("/")[0].split(" ")[0] in shards or not f["place"].startswith("shard_")]
+    findings = [
+        f for f in found["findings"] if f["place"].split("/")[0].split(" ")[0] in shards or not f["place"].startswith("shard_")
+    ]
     findings += [{"error": True, "place": f"{INDEX} row {row}", "text": text} for row, text in _differences(local, rows)]
     return found | {"ok": not any(f["error"] for f in findings), "findings": findings, "indexed": len(rows)}
 
@@ -95,7 +104,13 @@ def verify_text(found: dict[str, Any]) -> str:
             lines.append(f"note: {f['place']} {f['text']}" + (f" (and {same - 1} more)" if same > 1 else ""))
     counts = f"{found['files']} files, {found['episodes']} episodes, {found['steps']} observations, {found['videos']} videos"
     counts += f", {found['unpublished']} episodes not published" if found["unpublished"] else ""
-    counts += f"; {found['indexed']} episodes in {INDEX}" if "indexed" in found else f"; no {INDEX}: the recording is not complete" if found.get("of_job") else ""
+    counts += (
+        f"; {found['indexed']} episodes in {INDEX}"
+        if "indexed" in found
+        else f"; no {INDEX}: the recording is not complete"
+        if found.get("of_job")
+        else ""
+    )
     return "\n".join([*lines, f"{'intact' if found['ok'] else 'NOT intact'}: {counts}"])
 
 
@@ -117,11 +132,16 @@ def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str
             found.append((number, f"{row['path']} has no {row['trajectory']}"))
         else:
             ours = row | {"number": row["episode"]}
-            found += [(number, f"{name} is {ours[name]!r}, but {getattr(entry, name)!r} in {row['path']} {row['trajectory']}")
-                      for name in _ATTRIBUTES if ours[name] != getattr(entry, name)]  # fmt: skip
+            found += [
+                (number, f"{name} is {ours[name]!r}, but {getattr(entry, name)!r} in {row['path']} {row['trajectory']}")
+                for name in _ATTRIBUTES
+                if ours[name] != getattr(entry, name)
+            ]
         house = Path(row["path"]).parent.name
         if row["episode"] <= before.get(house, -1):
-            found.append((number, f"episode {row['episode']} follows episode {before[house]}: the order is wrong, or one is there twice"))
+            found.append(
+                (number, f"episode {row['episode']} follows episode {before[house]}: the order is wrong, or one is there twice")
+            )
         before[house] = row["episode"]
     return found
 

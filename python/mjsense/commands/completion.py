@@ -7,7 +7,10 @@ import argparse
 from collections.abc import Sequence
 
 EXAMPLES = [
-    ("source <(mjsense completion bash)", "Enable completion in this shell; to enable it permanently, add the line to ~/.bashrc."),
+    (
+        "source <(mjsense completion bash)",
+        "Enable completion in this shell; to enable it permanently, add the line to ~/.bashrc.",
+    ),
     ("mjsense completion fish > ~/.config/fish/completions/mjsense.fish", "Enable completion in fish."),
 ]
 _SCRIPTS = {

@@ -20,8 +20,11 @@ _KINDS = {str: (str, "a str"), int: (int, "an int"), float: ((int, float), "a nu
 def files_of(words: Sequence[str]) -> list[str]:
     """The values of ``--config`` on a command line."""
     before_end = words[: words.index("--")] if "--" in words else words
-    return [next_ if word == "--config" else word.partition("=")[2]
-            for word, next_ in zip(before_end, [*before_end[1:], ""]) if word == "--config" or word.startswith("--config=")]  # fmt: skip
+    return [
+        next_ if word == "--config" else word.partition("=")[2]
+        for word, next_ in zip(before_end, [*before_end[1:], ""])
+        if word == "--config" or word.startswith("--config=")
+    ]
 
 
 def apply(parser: Parser, path: str) -> None:
@@ -51,7 +54,9 @@ def _text_of(path: str) -> str:
     try:
         mode = os.stat(path).st_mode
     except OSError as error:
-        raise ValueError(f"{path or repr(path)}: {'no such file' if isinstance(error, FileNotFoundError) else error.strerror}") from None
+        raise ValueError(
+            f"{path or repr(path)}: {'no such file' if isinstance(error, FileNotFoundError) else error.strerror}"
+        ) from None
     if not stat.S_ISREG(mode):
         kind = "folder" if stat.S_ISDIR(mode) else "pipe" if stat.S_ISFIFO(mode) else "device"
         raise ValueError(f"{path}: is a {kind}, expected a file")
@@ -86,6 +91,7 @@ def _keys_of(parser: Parser) -> dict[str, Callable[[Any, str], None]]:
             if option.startswith("--"):
                 keys[option[2:].replace("-", "_")] = _setter(parser, action, option.startswith("--no-"))
     for field in parser.fields:  # after the actions: a field states its type itself, and both forms of a flag are keys
+
         def put(value: Any, place: str, field: Any = field, opposite: bool = False) -> None:
             value = field.of_toml(value, place)
             parser.set_defaults(**{field.name: value != opposite if field.kind == "bool" else value})
@@ -106,7 +112,9 @@ def _setter(parser: Parser, action: argparse.Action, opposite: bool = False) -> 
         name = action.dest
         values = value if is_list and isinstance(value, list) else [value]
         if not all(isinstance(one, types) and isinstance(one, bool) == is_flag for one in values):
-            raise ValueError(f"{place}: the value of '{name}' has the wrong type: must be {'a list, each ' if is_list else ''}{kind}")
+            raise ValueError(
+                f"{place}: the value of '{name}' has the wrong type: must be {'a list, each ' if is_list else ''}{kind}"
+            )
         if is_flag:
             constant = getattr(action, "const", None)
             chosen = value != opposite if constant is None else constant if value else action.default
@@ -117,7 +125,9 @@ def _setter(parser: Parser, action: argparse.Action, opposite: bool = False) -> 
                 raise ValueError(f"{place}: {name}: {error}") from None
             if action.choices is not None and (wrong := [one for one in made if one not in action.choices]):
                 words = ", ".join(map(str, action.choices))
-                raise ValueError(f"{place}: {name} is '{wrong[0]}': must be one of {words}{suggestion(str(wrong[0]), map(str, action.choices))}")
+                raise ValueError(
+                    f"{place}: {name} is '{wrong[0]}': must be one of {words}{suggestion(str(wrong[0]), map(str, action.choices))}"
+                )
             chosen = made if is_list else made[0]
         parser.set_defaults(**{name: chosen})
         action.required = False

@@ -15,11 +15,21 @@ EXAMPLES = [
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("action", choices=["delete", "split", "merge"], help="delete: leave out episodes; split: write parts; merge: join recordings.")
-    parser.add_argument("paths", metavar="PATH", nargs="+", help="IN ... OUT: one recording, for merge several, and the output, which must not exist.")
+    parser.add_argument(
+        "action",
+        choices=["delete", "split", "merge"],
+        help="delete: leave out episodes; split: write parts; merge: join recordings.",
+    )
+    parser.add_argument(
+        "paths",
+        metavar="PATH",
+        nargs="+",
+        help="IN ... OUT: one recording, for merge several, and the output, which must not exist.",
+    )
     parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="delete: positions of the episodes to leave out.")
-    parser.add_argument("--parts", nargs="+", metavar="PART",
-                        help="split: NAME=0.8, a share of all episodes, or NAME=0-9,12, their positions.")  # fmt: skip
+    parser.add_argument(
+        "--parts", nargs="+", metavar="PART", help="split: NAME=0.8, a share of all episodes, or NAME=0-9,12, their positions."
+    )
 
 
 def _part(text: str) -> tuple[str, Any]:
@@ -43,7 +53,9 @@ def run(arguments: argparse.Namespace) -> int:
             raise ValueError(f"{arguments.action}: --{name} is {'missing' if name == needed else 'an option of another action'}")
     if not roots or (arguments.action != "merge" and len(roots) > 1):
         count = "at least one recording" if arguments.action == "merge" else "one recording"
-        raise ValueError(f"{arguments.action}: {len(roots)} recordings and the output '{out}' are given; {count} and the output are needed")
+        raise ValueError(
+            f"{arguments.action}: {len(roots)} recordings and the output '{out}' are given; {count} and the output are needed"
+        )
     if arguments.action == "delete":
         made = [delete_episodes(roots[0], out, arguments.episodes)]
     elif arguments.action == "split":

@@ -10,7 +10,14 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-_EXPECTED = {"bool": "a bool", "int": "an int", "unsigned": "an int from 0 on", "number": "a number", "text": "a str", "path": "a str"}
+_EXPECTED = {
+    "bool": "a bool",
+    "int": "an int",
+    "unsigned": "an int from 0 on",
+    "number": "a number",
+    "text": "a str",
+    "path": "a str",
+}
 _NUMBER = re.compile(r"-?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf|nan)", re.ASCII | re.IGNORECASE)
 
 
@@ -113,7 +120,11 @@ class Field(NamedTuple):
         if self.low is None or self.high is None:
             word = f"above {self.low:g}" if self.above_low else f"at least {self.low:g}" if self.low is not None else ""
             return f"must be {word or (f'at most {self.high:g}' if self.high is not None else 'finite')}"
-        return f"must be above {self.low:g}, at most {self.high:g}" if self.above_low else f"must be between {self.low:g} and {self.high:g}"
+        return (
+            f"must be above {self.low:g}, at most {self.high:g}"
+            if self.above_low
+            else f"must be between {self.low:g} and {self.high:g}"
+        )
 
 
 def find(fields: Sequence[Field], name: str) -> Field | None:
@@ -126,7 +137,9 @@ def read_size(fields: Sequence[Field], text: str) -> dict[str, int]:
     width, x, height = text.partition("x")
     try:
         if x:
-            return {name: of.of_text(part, "") for name, part in (("width", width), ("height", height)) if (of := find(fields, name))}
+            return {
+                name: of.of_text(part, "") for name, part in (("width", width), ("height", height)) if (of := find(fields, name))
+            }
     except ValueError:
         pass
     raise ValueError(f"size '{text}': expected WIDTHxHEIGHT, such as 640x368")

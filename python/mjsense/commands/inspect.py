@@ -18,7 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="Print JSON.")
     parser.add_argument("--sheet", metavar="FILE.png", help="Write a contact sheet of the videos.")
     parser.add_argument("--ffmpeg", default="", metavar="PATH", help="Path of the ffmpeg program.")
-    parser.add_argument("--quality", action="store_true", help="Show how each episode was performed too: idle share, jerk, approach, visibility.")
+    parser.add_argument(
+        "--quality", action="store_true", help="Show how each episode was performed too: idle share, jerk, approach, visibility."
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -24,7 +24,10 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[
 
     shown = [[printable(cell).replace("\n", "?") for cell in row] for row in (header, *rows)]
     widths = [max(map(len, column)) for column in zip(*shown)]
-    lines = ["  ".join(cell.rjust(width) if i in right else cell.ljust(width) for i, (cell, width) in enumerate(zip(row, widths))) for row in shown]
+    lines = [
+        "  ".join(cell.rjust(width) if i in right else cell.ljust(width) for i, (cell, width) in enumerate(zip(row, widths)))
+        for row in shown
+    ]
     return "\n".join(line.rstrip(" ") for line in lines)
 
 

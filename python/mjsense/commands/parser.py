@@ -79,11 +79,15 @@ class Parser(argparse.ArgumentParser):
                 continue
             flag = f"--{'no-' if field.is_on else ''}{field.flag.replace('_', '-')}"
             if field.kind == "bool":
-                self.add_argument(flag, dest=field.name, action="store_const", const=not field.is_on, default=argparse.SUPPRESS, help=field.help)
+                self.add_argument(
+                    flag, dest=field.name, action="store_const", const=not field.is_on, default=argparse.SUPPRESS, help=field.help
+                )
                 continue
             names = NAMES.get(_NAMED.get(field.flag, ""), ())
             listed = f" One of: {', '.join(names)}." if field.flag in _LISTED else ""
-            action = self.add_argument(flag, dest=field.name, default=argparse.SUPPRESS, metavar=field.metavar, help=field.help + listed)
+            action = self.add_argument(
+                flag, dest=field.name, default=argparse.SUPPRESS, metavar=field.metavar, help=field.help + listed
+            )
             setattr(action, "field", field)  # noqa: B010  # argparse declares no such attribute
             complete(action, names or field.words)
 
@@ -94,8 +98,14 @@ class Parser(argparse.ArgumentParser):
     def add_set_options(self) -> None:
         """Adds ``--size`` and ``--set``."""
         self.add_argument("--size", metavar="WxH", help="Width and height of the images.")
-        self.add_argument("--set", metavar="NAME=VALUE", action="append", default=[], dest="assignments",
-                          help="Set any field by its name, including fields without an option. May be repeated.")  # fmt: skip
+        self.add_argument(
+            "--set",
+            metavar="NAME=VALUE",
+            action="append",
+            default=[],
+            dest="assignments",
+            help="Set any field by its name, including fields without an option. May be repeated.",
+        )
 
     # Messages. argparse prints its own and exits.
 

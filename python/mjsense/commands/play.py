@@ -21,12 +21,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep-failures", action="store_true", help="Keep failed episodes too.")
     parser.add_argument("--append", action="store_true", help="Add episodes to a completed recording.")
     parser.add_argument("--resume", action="store_true", help="Continue an interrupted recording.")
-    parser.add_argument("--device", choices=("keyboard", "spacemouse"), default="keyboard", help="Input device, in addition to the handle on the page.")
+    parser.add_argument(
+        "--device",
+        choices=("keyboard", "spacemouse"),
+        default="keyboard",
+        help="Input device, in addition to the handle on the page.",
+    )
     parser.add_argument("--arm", default="arm", help="Move group that is driven; by default arm.")
     parser.add_argument("--gripper", default="gripper", help="Move group that is opened and closed; by default gripper.")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="Random seed of the starts.")
-    parser.add_argument("--host", default="127.0.0.1", help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every person on the network who has the printed address can watch and drive.")
-    parser.add_argument("--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one.")
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every person on the network who has the printed address can watch and drive.",
+    )
+    parser.add_argument(
+        "--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one."
+    )
     parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
 
 
@@ -34,7 +45,23 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.commands import FAILED
     from mjsense.tasks.teleoperation import play
 
-    given = {name: getattr(arguments, name) for name in ("out", "scene", "episodes", "keep_failures", "append", "resume", "device", "arm", "gripper", "seed", "host", "port")}
+    given = {
+        name: getattr(arguments, name)
+        for name in (
+            "out",
+            "scene",
+            "episodes",
+            "keep_failures",
+            "append",
+            "resume",
+            "device",
+            "arm",
+            "gripper",
+            "seed",
+            "host",
+            "port",
+        )
+    }
     summary = play(arguments.task, arguments.robot, open_browser=not arguments.no_open, **given)
     print(f"{summary.kept} of {summary.wanted} episodes are in {summary.path}.")
     return 0 if summary.enough else FAILED

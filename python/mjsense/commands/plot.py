@@ -7,15 +7,27 @@ import argparse
 
 EXAMPLES = [
     ("mjsense plot data --stream tcp_pose qpos/arm", "Draw two streams of the first episode."),
-    ("mjsense plot data --stream obj_start wrist_camera --episode 0 1 --out two.png", "Two episodes, with a film strip of a camera."),
+    (
+        "mjsense plot data --stream obj_start wrist_camera --episode 0 1 --out two.png",
+        "Two episodes, with a film strip of a camera.",
+    ),
     ("mjsense plot pick --stream tcp_pose --seconds 5", "Play a task for five seconds."),
 ]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", help="A recording, or a task, a scene or an MJCF that is stepped: its name or path.")
-    parser.add_argument("--stream", nargs="+", required=True, metavar="NAME", help="Streams by name, last part of a name, or pattern.")
-    parser.add_argument("--episode", type=int, nargs="+", default=[0], metavar="I", help="Positions of episodes in the recording; by default the first.")
+    parser.add_argument(
+        "--stream", nargs="+", required=True, metavar="NAME", help="Streams by name, last part of a name, or pattern."
+    )
+    parser.add_argument(
+        "--episode",
+        type=int,
+        nargs="+",
+        default=[0],
+        metavar="I",
+        help="Positions of episodes in the recording; by default the first.",
+    )
     parser.add_argument("--world", type=int, default=0, metavar="K", help="World to draw, of live worlds.")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="How long live worlds are stepped, s.")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="Seed of live worlds.")
@@ -29,7 +41,15 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.viewer.plots import plot
 
     options = options_of({"robot": arguments.robot, "scene": arguments.scene})
-    plot(arguments.what, arguments.stream, episodes=arguments.episode, world=arguments.world, seconds=arguments.seconds, seed=arguments.seed,
-         out=arguments.out, **options)  # fmt: skip
+    plot(
+        arguments.what,
+        arguments.stream,
+        episodes=arguments.episode,
+        world=arguments.world,
+        seconds=arguments.seconds,
+        seed=arguments.seed,
+        out=arguments.out,
+        **options,
+    )
     print(f"Wrote {arguments.out}.")
     return 0

@@ -32,7 +32,10 @@ def rows_of(path: str) -> list[dict[str, Any]]:
 
     from mjsense.dataset import Dataset
 
-    rows = [{"episode": e.index, "task": e.task, "outcome": e.outcome, **dataclasses.asdict(e.quality)} for e in Dataset(path).episodes]
+    rows = [
+        {"episode": e.index, "task": e.task, "outcome": e.outcome, **dataclasses.asdict(e.quality)}
+        for e in Dataset(path).episodes
+    ]
     # JSON has no NaN.
     return [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in row.items()} for row in rows]
 
@@ -41,7 +44,9 @@ def table_of(rows: list[dict[str, Any]]) -> str:
     """The figures as a table."""
     lines = ["episode   idle  longest wait  jerk, m/s^3  approach  least visible  instruction"]
     for row in rows:
-        idle, wait, jerk, approach = (math.nan if row[name] is None else row[name] for name in ("idle", "longest_wait", "jerk", "approach"))
+        idle, wait, jerk, approach = (
+            math.nan if row[name] is None else row[name] for name in ("idle", "longest_wait", "jerk", "approach")
+        )
         seen = [(share, f"{role} in {camera}") for camera, roles in row["visibility"].items() for role, share in roles.items()]
         least = "{:.0%} {}".format(*min(seen)) if seen else "-"
         lines.append(f"{row['episode']:7}  {idle:5.0%}  {wait:10.2f} s  {jerk:11.1f}  {approach:6.0f}°  {least}  {row['task']}")

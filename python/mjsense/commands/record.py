@@ -12,15 +12,18 @@ from typing import TYPE_CHECKING, Any
 from mjsense.commands._ray import add_ray, ray_options
 from mjsense.commands.output import bytes_below, bytes_text, tell, tree
 from mjsense.commands.parser import Parser, add_name, field_values
+from mjsense.exporting.formats import FORMATS
 
 if TYPE_CHECKING:
     from mjsense.cluster import ClusterProgress
 
 EXAMPLES = [
     ("mjsense record pick --episodes 8 --worlds 4 --out data", "Record eight episodes of the task pick, four at a time."),
-    ("mjsense record open --scene kitchen:7 --robot rby1 --depth --out data",
-     "Open something in kitchen number 7 with RB-Y1, and record depth too."),
-]  # fmt: skip
+    (
+        "mjsense record open --scene kitchen:7 --robot rby1 --depth --out data",
+        "Open something in kitchen number 7 with RB-Y1, and record depth too.",
+    ),
+]
 ENDS_AT_CTRL_C = True  # before the recording, which catches the signal
 _NOT_ON_RAY = ("shard", "append", "overwrite", "first_attempt", "num_attempts")
 _NOT_WITH_FORMAT = ("shard", "append", "overwrite")
@@ -32,12 +35,22 @@ def add_arguments(parser: Parser) -> None:
     parser.add_set_options()
     parser.add_argument("--no-sheet", dest="sheet", action="store_false", help="Do not write a contact sheet.")
     add_ray(parser, "Record")
-    parser.add_argument("--shard-attempts", type=int, metavar="N", help="With --ray: attempts of one task of the cluster; default 16.")
-    parser.add_argument("--format", choices=("mjsense", "lerobot"), default="mjsense", metavar="FORMAT",
-                        help="lerobot: write a LeRobot data set (v3.0) instead of HDF5.")  # fmt: skip
+    parser.add_argument(
+        "--shard-attempts", type=int, metavar="N", help="With --ray: attempts of one task of the cluster; default 16."
+    )
+    parser.add_argument(
+        "--format",
+        choices=("mjsense", *(name for name, format in FORMATS.items() if format.while_recording)),
+        default="mjsense",
+        metavar="FORMAT",
+        help="lerobot: write a LeRobot data set (v3.0) instead of HDF5.",
+    )
     parser.add_argument("--map", metavar="FILE", help="With --format: TOML file that chooses features and cameras.")
-    parser.add_argument("--trim-idle", action=argparse.BooleanOptionalAction,
-                        help="With --format: leave out the steps in which nothing moves; by default in episodes whose task places an object.")  # fmt: skip
+    parser.add_argument(
+        "--trim-idle",
+        action=argparse.BooleanOptionalAction,
+        help="With --format: leave out the steps in which nothing moves; by default in episodes whose task places an object.",
+    )
     parser.add_argument("--keep-recording", action="store_true", help="With --format: keep the recording itself too.")
     parser.add_argument("--json", action="store_true", help="Print the summary as JSON.")
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
@@ -54,11 +67,17 @@ def run(arguments: argparse.Namespace) -> int:
     if for_format and arguments.format == "mjsense":
         raise ValueError(f"--{for_format[0].replace('_', '-')} needs --format")
     if arguments.ray:
-        _refuse([*(name for name in _NOT_ON_RAY if options.get(name)), *(["json"] if arguments.json else []),
-                 *(["format"] if arguments.format != "mjsense" else [])], "--ray")  # fmt: skip
+        _refuse(
+            [
+                *(name for name in _NOT_ON_RAY if options.get(name)),
+                *(["json"] if arguments.json else []),
+                *(["format"] if arguments.format != "mjsense" else []),
+            ],
+            "--ray",
+        )
         return _record_on_ray(arguments, options)
-    if arguments.format == "lerobot":
-        _refuse([name for name in _NOT_WITH_FORMAT if options.get(name)], "--format lerobot")
+    if arguments.format != "mjsense":
+        _refuse([name for name in _NOT_WITH_FORMAT if options.get(name)], f"--format {arguments.format}")
         return _record_lerobot(arguments, options)
     return _record(arguments, options, sheet=arguments.sheet, shows_tree=True)
 
@@ -71,8 +90,8 @@ def _refuse(names: list[str], other: str) -> None:
 def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bool, shows_tree: bool) -> int:
     """Records on this machine, and prints the summary. Returns 0 if all wanted episodes are on disk, otherwise 1."""
     from mjsense import _core
-    from mjsense.core.progress_line import ProgressLine, of_recording
-    from mjsense.tasks.record_job import RecordProgress, job_result
+    from mjsense.core.progress_line import ProgressLine
+    from mjsense.tasks.record_job import RecordProgress, job_result, of_recording
 
     title, out = _title(options)
     line = None if arguments.quiet else ProgressLine()
@@ -107,7 +126,9 @@ def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bo
     for damage in made["work"]["damage"]:
         tell(f"mjsense: {damage}")
     if made["interrupted"]:
-        tell(f"interrupted: the finished episodes are safe. Continue with --resume, or finish with `mjsense repair {made['path']}`.")
+        tell(
+            f"interrupted: the finished episodes are safe. Continue with --resume, or finish with `mjsense repair {made['path']}`."
+        )
     elif not made["enough"]:
         tell(f"stopped after {made['succeeded'] + made['failed']} attempts; --max-attempts allows more")
     return 0 if made["enough"] else 1
@@ -128,7 +149,10 @@ def _title(options: dict[str, Any]) -> tuple[str, str]:
 def _time_split(made: dict[str, Any]) -> dict[str, float]:
     """Wall time (s) by stage; the last entry is the remainder."""
     times = made["times"]
-    split = {"policy": times["policy"] + times["reset"], **{name: times[name] for name in ("physics", "sensing", "rendering", "recording")}}
+    split = {
+        "policy": times["policy"] + times["reset"],
+        **{name: times[name] for name in ("physics", "sensing", "rendering", "recording")},
+    }
     return {**split, "rest": max(0.0, made["seconds"] - sum(split.values()))}
 
 
@@ -139,10 +163,14 @@ def _summary_text(made: dict[str, Any]) -> str:
     lines += [f"  {count} x {why}" for why, count in made["failures"].items()]
     if made["steps"]:
         rate = 1 / max(made["seconds"], 1e-9)
-        lines.append(f"{made['steps']} steps in {made['seconds']:.1f} s: {made['steps'] * rate:.1f} steps/s, "
-                     f"{made['physics_steps'] * rate:.0f} physics steps/s, {made['frames'] * rate:.1f} frames/s")  # fmt: skip
+        lines.append(
+            f"{made['steps']} steps in {made['seconds']:.1f} s: {made['steps'] * rate:.1f} steps/s, "
+            f"{made['physics_steps'] * rate:.0f} physics steps/s, {made['frames'] * rate:.1f} frames/s"
+        )
         split = "".join(f"  {name} {100 * seconds * rate:.0f} %" for name, seconds in _time_split(made).items())
-        lines.append(f"time:{split}  (in parallel: encoders {made['work']['encode_cpu_s']:.1f} s, files {made['work']['write_s']:.1f} s)")
+        lines.append(
+            f"time:{split}  (in parallel: encoders {made['work']['encode_cpu_s']:.1f} s, files {made['work']['write_s']:.1f} s)"
+        )
     return "\n".join(lines)
 
 
@@ -151,8 +179,14 @@ def _summary_json(made: dict[str, Any], sheet: str) -> str:
 
     same = ("kept", "wanted", "succeeded", "failed", "failures", "interrupted", "steps", "physics_steps", "frames", "seconds")
     work = {name: made["work"][name] for name in ("encode_cpu_s", "write_s", "raw_bytes")}
-    out = {**{name: made[name] for name in same}, **work, "attempts": made["succeeded"] + made["failed"], "observations": made["lengths"],
-           "path": str(made["path"]), "contact_sheet": sheet or None}  # fmt: skip
+    out = {
+        **{name: made[name] for name in same},
+        **work,
+        "attempts": made["succeeded"] + made["failed"],
+        "observations": made["lengths"],
+        "path": str(made["path"]),
+        "contact_sheet": sheet or None,
+    }
     if made["seconds"]:
         out["time"] = _time_split(made)
     return json.dumps(out, indent=2, sort_keys=True, ensure_ascii=False)
@@ -164,8 +198,15 @@ def _record_lerobot(arguments: argparse.Namespace, options: dict[str, Any]) -> i
 
     out = options["out"]
     try:
-        with converted(out, resume=options.get("resume", False), map=arguments.map, trim_idle=arguments.trim_idle,
-                       keep_recording=arguments.keep_recording, quiet=arguments.quiet) as folder:  # fmt: skip
+        with converted(
+            out,
+            format=arguments.format,
+            resume=options.get("resume", False),
+            map=arguments.map,
+            trim_idle=arguments.trim_idle,
+            keep_recording=arguments.keep_recording,
+            quiet=arguments.quiet,
+        ) as folder:
             code = _record(arguments, {**options, "out": str(folder)}, sheet=False, shows_tree=False)
             sys.stdout.flush()
     except CompleteError as error:
@@ -176,7 +217,7 @@ def _record_lerobot(arguments: argparse.Namespace, options: dict[str, Any]) -> i
             if os.path.exists(path):
                 print(f"\n{tree(path)}", flush=True)
     if not arguments.quiet and os.path.exists(out):
-        tell(f"The LeRobot data set is in {out}.")
+        tell(f"The {FORMATS[arguments.format].about} data set is in {out}.")
     return code
 
 
@@ -192,12 +233,20 @@ def _record_on_ray(arguments: argparse.Namespace, options: dict[str, Any]) -> in
         attempts = now.succeeded + now.failed
         rate = f"{now.succeeded / attempts:.0%} successful" if attempts else "no attempt yet"
         if line is not None:
-            line.show(f"{now.kept}/{now.wanted} episodes  {rate}  {now.shards} shards done  {now.workers} running  "
-                      f"{now.steps_per_second:.0f} steps/s  {now.seconds:.0f} s", now.shards)  # fmt: skip
+            line.show(
+                f"{now.kept}/{now.wanted} episodes  {rate}  {now.shards} shards done  {now.workers} running  "
+                f"{now.steps_per_second:.0f} steps/s  {now.seconds:.0f} s",
+                now.shards,
+            )
 
     own = {name: options.pop(name, default) for name, default in (("episodes", 1), ("max_attempts", 0), ("resume", False))}
-    summary = record_on_ray(Job(options.pop("out"), options), **own, shard_attempts=arguments.shard_attempts or 16, progress=show,
-                            **ray_options(arguments))  # fmt: skip
+    summary = record_on_ray(
+        Job(options.pop("out"), options),
+        **own,
+        shard_attempts=arguments.shard_attempts or 16,
+        progress=show,
+        **ray_options(arguments),
+    )
     if line is not None:
         line.end()
         for reason, count in sorted(summary.failures.items(), key=lambda item: -item[1]):

@@ -54,6 +54,8 @@ def parser_of(name: str) -> Parser:
     module = module_of(name)
     parser = Parser(name, COMMANDS[name], [(command.replace("{name}", name), why) for command, why in module.EXAMPLES])
     module.add_arguments(parser)
-    parser.add_argument("--config", metavar="FILE", help="TOML file with these options; options on the command line take precedence.")
+    parser.add_argument(
+        "--config", metavar="FILE", help="TOML file with these options; options on the command line take precedence."
+    )
     parser.set_defaults(command=name)
     return parser

@@ -9,13 +9,21 @@ from typing import Any
 from mjsense.commands._ray import add_ray, ray_options
 
 EXAMPLES = [
-    ('mjsense render data top --add-camera top="pos=0.5,0,1.6 lookat=0.5,0,0"', "Add a camera above the table; render the recorded ones again, too."),
-    ('mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.17,0,-0.02 lookat=0,0,0.2 fovy=70"',
-     "Only a new camera, mounted on the gripper."),
-    ("mjsense render data large --width 1280 --depth --segmentation", "The recorded cameras with larger images, depth and segmentation."),
+    (
+        'mjsense render data top --add-camera top="pos=0.5,0,1.6 lookat=0.5,0,0"',
+        "Add a camera above the table; render the recorded ones again, too.",
+    ),
+    (
+        'mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.17,0,-0.02 lookat=0,0,0.2 fovy=70"',
+        "Only a new camera, mounted on the gripper.",
+    ),
+    (
+        "mjsense render data large --width 1280 --depth --segmentation",
+        "The recorded cameras with larger images, depth and segmentation.",
+    ),
     ("mjsense render data droid --camera-system droid", "The cameras of another camera system of the robot."),
     ("mjsense render data more --cameras --sensors sensors.toml", "Add sensors, without images."),
-]  # fmt: skip
+]
 _VECTORS = ("pos", "lookat", "quat", "up")
 
 
@@ -47,26 +55,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     flag = argparse.BooleanOptionalAction
     parser.add_argument("path", help="A recording.")
     parser.add_argument("out", help="Output directory.")
-    parser.add_argument("--cameras", nargs="*", metavar="NAME", help="Recorded cameras to render; without a name none. By default all.")
-    parser.add_argument("--add-camera", type=_camera, action="append", default=[], metavar="NAME=...",
-                        help="A new camera: \"pos=X,Y,Z lookat=X,Y,Z\" or \"pos=X,Y,Z quat=W,X,Y,Z\", in metres; further keys are body, up, fovy, "
-                             "width, height, depth and segmentation. Can be repeated.")  # fmt: skip
-    parser.add_argument("--camera-system", default="", metavar="NAME", help="Name or file of a camera system of the robot, instead of the recorded cameras.")
+    parser.add_argument(
+        "--cameras", nargs="*", metavar="NAME", help="Recorded cameras to render; without a name none. By default all."
+    )
+    parser.add_argument(
+        "--add-camera",
+        type=_camera,
+        action="append",
+        default=[],
+        metavar="NAME=...",
+        help='A new camera: "pos=X,Y,Z lookat=X,Y,Z" or "pos=X,Y,Z quat=W,X,Y,Z", in metres; further keys are body, up, fovy, '
+        "width, height, depth and segmentation. Can be repeated.",
+    )
+    parser.add_argument(
+        "--camera-system",
+        default="",
+        metavar="NAME",
+        help="Name or file of a camera system of the robot, instead of the recorded cameras.",
+    )
     parser.add_argument("--width", type=int, metavar="N", help="Width of the images; by default as recorded.")
     parser.add_argument("--height", type=int, metavar="N", help="Height of the images; by default as recorded.")
     parser.add_argument("--depth", action=flag, help="Depth images of all cameras; by default as recorded.")
     parser.add_argument("--segmentation", action=flag, help="Segmentation images of all cameras; by default as recorded.")
     parser.add_argument("--shadows", action=flag, help="Shadows; by default as recorded.")
     parser.add_argument("--samples", type=int, metavar="N", help="Rays per pixel of rgb; by default as recorded.")
-    parser.add_argument("--shadow-samples", type=int, metavar="N", help="Points of each lamp at which shadows are computed; by default as recorded.")
+    parser.add_argument(
+        "--shadow-samples",
+        type=int,
+        metavar="N",
+        help="Points of each lamp at which shadows are computed; by default as recorded.",
+    )
     parser.add_argument("--brightness", type=float, metavar="X", help="Factor of all lights; by default as recorded.")
     parser.add_argument("--sensors", metavar="FILE", help="TOML file with [[sensors]] tables, as in a robot.toml.")
     parser.add_argument("--copy", action=flag, default=True, help="Copy the videos of recorded cameras that do not change.")
-    parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
-    parser.add_argument("--worlds", type=int, default=4, metavar="N", help="Number of episodes that are rendered in parallel.")
+    parser.add_argument(
+        "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
+    )
+    parser.add_argument(
+        "--worlds", dest="num_worlds", type=int, default=4, metavar="N", help="Number of episodes that are rendered in parallel."
+    )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="Number of threads; 0: one per available CPU.")
-    parser.add_argument("--batches", type=int, default=0, metavar="N", help="Number of HDF5 files of a house; 0: one per four episodes.")
-    parser.add_argument("--crf", type=int, metavar="N", help="Quality of the videos, from 0 (lossless) to 51 (worst); by default as recorded.")
+    parser.add_argument(
+        "--batches", type=int, default=0, metavar="N", help="Number of HDF5 files of a house; 0: one per four episodes."
+    )
+    parser.add_argument(
+        "--crf", type=int, metavar="N", help="Quality of the videos, from 0 (lossless) to 51 (worst); by default as recorded."
+    )
     parser.add_argument("--preset", metavar="NAME", help="Speed preset of the video encoder; by default as recorded.")
     parser.add_argument("--resume", action="store_true", help="Continue an interrupted rendering.")
     add_ray(parser)
@@ -82,15 +116,36 @@ def run(arguments: argparse.Namespace) -> int:
         if name in added:
             raise ValueError(f"--add-camera: '{name}' is given twice")
         added[name] = camera
-    same = ("cameras", "camera_system", "width", "height", "depth", "segmentation", "shadows", "samples", "shadow_samples", "brightness", "copy", "episodes",
-            "worlds", "threads", "batches", "crf", "preset", "resume")  # fmt: skip
+    same = (
+        "cameras",
+        "camera_system",
+        "width",
+        "height",
+        "depth",
+        "segmentation",
+        "shadows",
+        "samples",
+        "shadow_samples",
+        "brightness",
+        "copy",
+        "episodes",
+        "num_worlds",
+        "threads",
+        "batches",
+        "crf",
+        "preset",
+        "resume",
+    )
     if arguments.ray:
         return _on_ray(arguments, added, [name for name in same if name not in ("batches", "episodes", "resume")])
     made = render(
-        arguments.path, arguments.out, add_cameras=added, progress=False if arguments.quiet else None,
+        arguments.path,
+        arguments.out,
+        add_cameras=added,
+        progress=False if arguments.quiet else None,
         sensors=(lambda: sensors_of(arguments.sensors)) if arguments.sensors else (),
         **{name: getattr(arguments, name) for name in same},
-    )  # fmt: skip
+    )
     if not arguments.quiet:
         print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
     return 0

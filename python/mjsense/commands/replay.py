@@ -14,12 +14,21 @@ EXAMPLES = [
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", help="A recording.")
-    parser.add_argument("--from", dest="from_", choices=("actions", "states"), default="actions",
-                        help="actions: simulate with the recorded controls and compare the states. "
-                             "states: compute the sensors from the recorded states and compare them.")  # fmt: skip
+    parser.add_argument(
+        "--from",
+        dest="from_",
+        choices=("actions", "states"),
+        default="actions",
+        help="actions: simulate with the recorded controls and compare the states. "
+        "states: compute the sensors from the recorded states and compare them.",
+    )
     parser.add_argument("--verify", action="store_true", help="Do both.")
-    parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all.")
-    parser.add_argument("--worlds", type=int, default=4, metavar="N", help="Number of episodes whose sensors are computed in parallel.")
+    parser.add_argument(
+        "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
+    )
+    parser.add_argument(
+        "--worlds", type=int, default=4, metavar="N", help="Number of episodes whose sensors are computed in parallel."
+    )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="Number of threads; 0: one per available CPU.")
     parser.add_argument("--json", action="store_true", help="Print the report as JSON.")
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
@@ -32,9 +41,14 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.dataset import check_replay
 
     report = check_replay(
-        arguments.path, actions=arguments.verify or arguments.from_ == "actions", states=arguments.verify or arguments.from_ == "states",
-        episodes=arguments.episodes, worlds=arguments.worlds, threads=arguments.threads, progress=False if arguments.quiet else None,
-    )  # fmt: skip
+        arguments.path,
+        actions=arguments.verify or arguments.from_ == "actions",
+        states=arguments.verify or arguments.from_ == "states",
+        episodes=arguments.episodes,
+        num_worlds=arguments.worlds,
+        threads=arguments.threads,
+        progress=False if arguments.quiet else None,
+    )
     if arguments.json:
         print(json.dumps(report.to_dict(), indent=2))
     elif not (arguments.quiet and report.ok):

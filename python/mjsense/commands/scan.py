@@ -11,9 +11,11 @@ from mjsense.commands.sensors import names_model
 
 EXAMPLES = [
     ("mjsense scan embedded:scenes/table/room.xml --frame geom:table_top --out cloud.ply", "Scan a room from its table."),
-    ("mjsense scan scene.xml --frame site:lidar --channels 32 --samples 1024 --out cloud.pcd",
-     "Scan with 32 lasers and 1,024 firings per sweep."),
-]  # fmt: skip
+    (
+        "mjsense scan scene.xml --frame site:lidar --channels 32 --samples 1024 --out cloud.pcd",
+        "Scan with 32 lasers and 1,024 firings per sweep.",
+    ),
+]
 ENDS_AT_CTRL_C = True
 # The scene does not move, so the rate of a scan and motion distortion have no effect.
 _SKIPPED = ("rate_hz", "name", "any_frame", "debug_vis", "hit_ids", "motion_distortion")
@@ -21,7 +23,9 @@ _SKIPPED = ("rate_hz", "name", "any_frame", "debug_vis", "hit_ids", "motion_dist
 
 def add_arguments(parser: Parser) -> None:
     parser.add_argument("scene", metavar="SCENE.xml", help="An MJCF file, or embedded:FILE.")
-    parser.add_argument("--frame", required=True, metavar="TYPE:NAME", help="The frame that carries the lidar: site:NAME, body:NAME, ...")
+    parser.add_argument(
+        "--frame", required=True, metavar="TYPE:NAME", help="The frame that carries the lidar: site:NAME, body:NAME, ..."
+    )
     parser.add_argument("--out", required=True, metavar="FILE", help="Output file, .ply or .pcd.")
     parser.add_fields("TableScanCfg", skip=_SKIPPED)
     parser.option("--table").metavar = "FILE.npy"
@@ -46,8 +50,16 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError(f"--frame {arguments.frame}: expected a type and a name, such as site:head")
     if not names_model(arguments.scene, "an MJCF file"):
         raise ValueError(f"'{arguments.scene}': no such file")
-    returns, rays = _core.scan(arguments.scene, kind, name, field_values(arguments, "LidarSensorCfg"), table or spinning, arguments.out,
-                               arguments.steps, arguments.world)  # fmt: skip
+    returns, rays = _core.scan(
+        arguments.scene,
+        kind,
+        name,
+        field_values(arguments, "LidarSensorCfg"),
+        table or spinning,
+        arguments.out,
+        arguments.steps,
+        arguments.world,
+    )
     print(f"{arguments.out}: {returns} of {rays} rays returned")
     return 0
 

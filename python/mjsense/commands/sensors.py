@@ -61,8 +61,18 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _table(streams: list[dict[str, Any]]) -> str:
     costs = [stream["microseconds"] for stream in streams]
-    rows = [[s["name"], str(tuple(s["shape"])), "json" if s["is_dict"] else s["dtype"], s["unit"], s["frame"], str(s["bytes"]), _cost(cost)]
-            for s, cost in zip(streams, costs)]  # fmt: skip
+    rows = [
+        [
+            s["name"],
+            str(tuple(s["shape"])),
+            "json" if s["is_dict"] else s["dtype"],
+            s["unit"],
+            s["frame"],
+            str(s["bytes"]),
+            _cost(cost),
+        ]
+        for s, cost in zip(streams, costs)
+    ]
     total = sum(filter(None, costs))
     rows.append([f"{len(streams)} streams", "", "", "", "", str(sum(s["bytes"] for s in streams)), _cost(total or None)])
     return table(("name", "shape", "dtype", "unit", "frame", "bytes", "us/step"), rows, right=(5, 6))

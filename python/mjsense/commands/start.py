@@ -106,7 +106,12 @@ def prepare_process() -> None:
         except OSError:
             os.open(os.devnull, mode)  # the lowest free descriptor is this one
     # Names of files need not be UTF-8, and the output does not depend on the locale.
-    sys.stdout = _Stdout(io.BufferedWriter(io.FileIO(1, "w", closefd=False)), encoding="utf-8", errors="surrogateescape", line_buffering=os.isatty(1))
+    sys.stdout = _Stdout(
+        io.BufferedWriter(io.FileIO(1, "w", closefd=False)),
+        encoding="utf-8",
+        errors="surrogateescape",
+        line_buffering=os.isatty(1),
+    )
     sys.stderr = _Stderr(io.FileIO(2, "w", closefd=False), encoding="utf-8", errors="backslashreplace", write_through=True)  # pyright: ignore[reportArgumentType]
 
 
@@ -236,7 +241,9 @@ def _nearest_command(word: str) -> str:
     found = list(COMMANDS)
     for folder in os.get_exec_path():
         try:
-            names = [entry.name for entry in os.scandir(folder) if entry.name.startswith("mjsense-") and os.access(entry.path, os.X_OK)]
+            names = [
+                entry.name for entry in os.scandir(folder) if entry.name.startswith("mjsense-") and os.access(entry.path, os.X_OK)
+            ]
         except OSError:
             continue
         found += [name.removeprefix("mjsense-") for name in names]

@@ -38,7 +38,7 @@ FIELDS = {
         Field('perturb', 'perturb', 'perturb', 'number', 'Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.', default='0', low=0.0, high=1.0),
         Field('instructions', 'instructions', 'instructions', 'text', 'Instruction of each episode. varied: paraphrases that describe the objects by what distinguishes them in that episode; canonical: one sentence per task and object.', words=['varied', 'canonical'], default='varied'),
         Field('terminate_upon_success', 'terminate_upon_success', 'terminate_upon_success', 'bool', 'End an episode at its first success.'),
-        Field('max_penetration', 'max_penetration', 'max_penetration', 'number', 'Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: any depth. Pairs of geoms that are deeper at the start do not count. [m]', default='0.004', low=0.0),
+        Field('max_penetration', 'max_penetration', 'max_penetration', 'number', 'Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are deeper at the start do not count. [m]', low=0.0),
         Field('use_sensors', 'use_sensors', 'use_sensors', 'bool', 'Add the sensors of the task, of the robot and of the policy. False: only the sensors that are passed in.', is_on=True, hidden=True),
         Field('out', 'out', 'out', 'path', 'Output directory.'),
         Field('episodes', 'episodes', 'episodes', 'int', 'Number of episodes to keep.', default='1', low=1.0),
@@ -92,7 +92,7 @@ FIELDS = {
         Field('perturb', 'perturb', 'perturb', 'number', 'Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.', default='0', low=0.0, high=1.0),
         Field('instructions', 'instructions', 'instructions', 'text', 'Instruction of each episode. varied: paraphrases that describe the objects by what distinguishes them in that episode; canonical: one sentence per task and object.', words=['varied', 'canonical'], default='varied'),
         Field('terminate_upon_success', 'terminate_upon_success', 'terminate_upon_success', 'bool', 'End an episode at its first success.'),
-        Field('max_penetration', 'max_penetration', 'max_penetration', 'number', 'Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: any depth. Pairs of geoms that are deeper at the start do not count. [m]', default='0.004', low=0.0),
+        Field('max_penetration', 'max_penetration', 'max_penetration', 'number', 'Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are deeper at the start do not count. [m]', low=0.0),
         Field('use_sensors', 'use_sensors', 'use_sensors', 'bool', 'Add the sensors of the task, of the robot and of the policy. False: only the sensors that are passed in.', is_on=True, hidden=True),
     ],
     "LidarSensorCfg": [
@@ -133,5 +133,4 @@ NAMES: dict[str, Any] = {
     "robots": ["bimanual_yam", "floating_rum", "franka", "franka_hand", "i2rt_yam", "mobile_franka", "rby1"],
     "policies": ["planner", "top_down_planner"],
     "scenes": ["assorted", "clutter", "floor", "gymnasium_robotics/kitchen", "kitchen", "libero/coffee_table", "libero/kitchen", "libero/living_room", "libero/objects", "libero/study", "libero/table", "metaworld/objects", "rgb/objects", "robosuite/objects", "room_with_door", "scene_synthesizer/objects", "shelf", "table", "tableware", "varied_table", "ycb/objects"],
-    "formats": {"lerobot": "LeRobot v3.0", "lerobot21": "LeRobot v2.1 with meta/modality.json, as GR00T reads it", "robomimic": "one HDF5 file of robomimic, with simulator states and models", "rlds": "RLDS for tensorflow-datasets", "zarr": "Zarr 2, as Diffusion Policy reads it", "rerun": "files for the Rerun viewer, one for each episode", "mcap": "MCAP files with Foxglove's schemas, one for each episode"},
 }

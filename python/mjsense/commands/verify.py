@@ -28,10 +28,16 @@ def run(arguments: argparse.Namespace) -> int:
     use_installed_ffmpeg()
     line = ProgressLine() if interactive() and not arguments.quiet else None
     try:
-        found = tools.verify(arguments.path, decode=arguments.decode, ffmpeg=arguments.ffmpeg, progress=line.show if line else None)
+        found = tools.verify(
+            arguments.path, decode=arguments.decode, ffmpeg=arguments.ffmpeg, progress=line.show if line else None
+        )
     finally:
         if line is not None:
             line.clear()
     if arguments.json or not arguments.quiet or not found["ok"]:
-        print(json.dumps({key: value for key, value in found.items() if key != "of_job"}, indent=2) if arguments.json else tools.verify_text(found))
+        print(
+            json.dumps({key: value for key, value in found.items() if key != "of_job"}, indent=2)
+            if arguments.json
+            else tools.verify_text(found)
+        )
     return 0 if found["ok"] else FAILED

@@ -24,8 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--world", type=int, default=0, metavar="K", help="World to show first.")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="Seed of the first episode.")
     parser.add_argument("--episode", type=int, default=0, metavar="I", help="Position of the recording's episode to show first.")
-    parser.add_argument("--host", default="127.0.0.1", help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every person on the network who has the printed address can watch and drive.")
-    parser.add_argument("--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one.")
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every person on the network who has the printed address can watch and drive.",
+    )
+    parser.add_argument(
+        "--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one."
+    )
     parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
     parser.add_argument("--export", metavar="FILE", help="Write a .viser or .rrd file instead of showing a page.")
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
@@ -37,11 +43,19 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.viewer.open import options_of, source_of, viewer_of
 
     given = {name: getattr(arguments, name) for name in ("robot", "scene", "task", "policy")}
-    source = source_of(arguments.what, worlds=max(arguments.worlds, arguments.world + 1), seed=arguments.seed, **options_of(given))
+    source = source_of(
+        arguments.what, num_worlds=max(arguments.worlds, arguments.world + 1), seed=arguments.seed, **options_of(given)
+    )
     place = {"host": arguments.host, "port": arguments.port}
     if arguments.export:
-        export(source, arguments.export, world=arguments.world, episode=arguments.episode, seconds=arguments.seconds,
-               progress=False if arguments.quiet else None)  # fmt: skip
+        export(
+            source,
+            arguments.export,
+            world=arguments.world,
+            episode=arguments.episode,
+            seconds=arguments.seconds,
+            progress=False if arguments.quiet else None,
+        )
         if not arguments.quiet:
             print(f"Wrote {arguments.export}.")
         return 0

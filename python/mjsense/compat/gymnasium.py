@@ -89,7 +89,9 @@ def _drawn(env: Any) -> Any:
     for each in (inner, *(getattr(inner, name, None) for name in ("robot_env", "point_env", "ant_env"))):
         if isinstance(getattr(each, "mujoco_renderer", None), MujocoRenderer):
             return each
-    raise TypeError(f"mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}")
+    raise TypeError(
+        f"mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}"
+    )
 
 
 def renderer_of(env: Any) -> MujocoRenderer:

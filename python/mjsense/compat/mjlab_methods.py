@@ -34,7 +34,9 @@ class MjlabCalls(Calls):
     @classmethod
     def fits(cls, sensor: Sensor) -> bool:
         methods = len(required(sensor.edit_spec)) == 2 or len(required(sensor.initialize)) == 4
-        return hasattr(sensor, "_compute_data") or (methods and (sensor._mjs_overrides("compute") or not sensor._mjs_overrides("get_observation")))
+        return hasattr(sensor, "_compute_data") or (
+            methods and (sensor._mjs_overrides("compute") or not sensor._mjs_overrides("get_observation"))
+        )
 
     def edit_spec(self, scene: Any) -> None:
         edit_spec(self.sensor, scene)

@@ -7,6 +7,7 @@ once. A call then costs one test per given argument.
 
 from __future__ import annotations
 
+import ast
 import functools
 import inspect
 import re
@@ -68,9 +69,14 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Iterable[str]": (_is_iterable_of_str, "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),
-    "Tasks": (lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task") or hasattr(value, "_mjs_compose"), "a mjsense.Task or the name of one"),
+    "Tasks": (
+        lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task") or hasattr(value, "_mjs_compose"),
+        "a mjsense.Task or the name of one",
+    ),
     "Policies": (
-        lambda value: value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy") or hasattr(value, "_mjs_policy"),
+        lambda value: (
+            value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy") or hasattr(value, "_mjs_policy")
+        ),
         "a mjsense.Policy, a function, or the name of one",
     ),
     "Scenes": (
@@ -93,7 +99,7 @@ def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
     for name in (word, word.split("[")[0]):
         if name in _KINDS:
             return _KINDS[name]
-    if word.startswith("Literal["):  # C++ checks the word and suggests the nearest one
+    if word.startswith("Literal["):
         return _KINDS["str"]
     cls = word.split(".")[-1]
     return (lambda value: _is_a(value, cls)), f"a {word}"
@@ -109,10 +115,15 @@ def _check_of(context: str, name: str, annotation: Any) -> Callable[[Any], None]
         return None
     tests = [test for test, _ in known]
     words = " or ".join(text for _, text in known)
+    literal = re.fullmatch(r"Literal(\[.*\])", annotation)
+    choices = literal and ast.literal_eval(literal[1])
 
     def check(value: Any) -> None:
         for test in tests:
             if test(value):
+                if choices and value not in choices:
+                    listed = ", ".join(one or repr(one) for one in choices)
+                    raise ValueError(f"{context}: {name} is {value!r}: must be one of {listed}{did_you_mean(value, choices)}")
                 return
         out_of_range = "an int" in words and isinstance(value, Integral) and not isinstance(value, bool)
         raise (ValueError if out_of_range else TypeError)(f"{context}: {name} must be {words}, not {_short(value)}")

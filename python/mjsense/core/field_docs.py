@@ -50,8 +50,13 @@ def _fields(node: Any):
     import inspect
 
     for field, text in zip(node.body, node.body[1:]):
-        if (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)):  # fmt: skip
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+            and isinstance(text.value.value, str)
+        ):
             yield field.target.id, inspect.cleandoc(text.value.value)
 
 

@@ -56,7 +56,9 @@ def _write(cls: type, frozen: bool) -> type:
     """A dataclass with the same fields in the same order, including those of bases, whose methods can therefore be used."""
     fields = dataclasses.fields(cls)
     namespace: dict[str, Any] = {f.name: f for f in fields}
-    namespace.update(__annotations__={f.name: f.type for f in fields}, __module__=cls.__module__, __qualname__=cls.__qualname__, __doc__="-")
+    namespace.update(
+        __annotations__={f.name: f.type for f in fields}, __module__=cls.__module__, __qualname__=cls.__qualname__, __doc__="-"
+    )
     if hasattr(cls, "__post_init__"):
         namespace["__post_init__"] = None  # the generated __init__ then calls __post_init__
     written = dataclasses.dataclass(frozen=frozen)(type(cls.__name__, (), namespace))

@@ -111,7 +111,15 @@ def bodies_below(model: Any, root: int) -> np.ndarray:
     return below
 
 
-WARNINGS = ("mjWARN_INERTIA", "mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL", "mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL")
+WARNINGS = (
+    "mjWARN_INERTIA",
+    "mjWARN_CONTACTFULL",
+    "mjWARN_CNSTRFULL",
+    "mjWARN_BADQPOS",
+    "mjWARN_BADQVEL",
+    "mjWARN_BADQACC",
+    "mjWARN_BADCTRL",
+)
 """Names of mjtWarning."""
 
 
@@ -127,7 +135,12 @@ def source_of(spec: mujoco.MjSpec) -> tuple[str, Any]:
         return "spec", spec
     copy = spec.copy()
     compiler = getattr(copy, "compiler", copy)
-    for elements, folder in ((copy.meshes, "meshdir"), (copy.skins, "meshdir"), (copy.hfields, "meshdir"), (copy.textures, "texturedir")):
+    for elements, folder in (
+        (copy.meshes, "meshdir"),
+        (copy.skins, "meshdir"),
+        (copy.hfields, "meshdir"),
+        (copy.textures, "texturedir"),
+    ):
         for element in elements:
             inside = os.path.join(getattr(compiler, folder, ""), element.file)
             path = os.path.join(copy.modelfiledir, inside)

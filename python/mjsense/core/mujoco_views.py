@@ -88,14 +88,47 @@ class _Struct:
 
 
 _KINDS = {
-    "actuator": "actuator", "body": "body", "cam": "cam", "camera": "cam", "eq": "eq", "equality": "eq", "exclude": "exclude",
-    "flex": "flex", "geom": "geom", "hfield": "hfield", "jnt": "jnt", "joint": "jnt", "key": "key", "keyframe": "key",
-    "light": "light", "mat": "mat", "material": "mat", "mesh": "mesh", "numeric": "numeric", "pair": "pair", "sensor": "sensor",
-    "site": "site", "skin": "skin", "ten": "tendon", "tendon": "tendon", "tex": "tex", "texture": "tex", "tuple": "tuple",
-}  # fmt: skip
+    "actuator": "actuator",
+    "body": "body",
+    "cam": "cam",
+    "camera": "cam",
+    "eq": "eq",
+    "equality": "eq",
+    "exclude": "exclude",
+    "flex": "flex",
+    "geom": "geom",
+    "hfield": "hfield",
+    "jnt": "jnt",
+    "joint": "jnt",
+    "key": "key",
+    "keyframe": "key",
+    "light": "light",
+    "mat": "mat",
+    "material": "mat",
+    "mesh": "mesh",
+    "numeric": "numeric",
+    "pair": "pair",
+    "sensor": "sensor",
+    "site": "site",
+    "skin": "skin",
+    "ten": "tendon",
+    "tendon": "tendon",
+    "tex": "tex",
+    "texture": "tex",
+    "tuple": "tuple",
+}
 """Methods that give an element by name or id, with the prefix of the fields of mjModel."""
-_DATA_KINDS = {"actuator": "actuator", "body": "", "cam": "cam", "geom": "geom", "jnt": "", "light": "light", "sensor": "", "site": "site",
-               "tendon": "ten"}  # fmt: skip
+_DATA_KINDS = {
+    "actuator": "actuator",
+    "body": "",
+    "cam": "cam",
+    "geom": "geom",
+    "jnt": "",
+    "light": "light",
+    "sensor": "",
+    "site": "site",
+    "tendon": "ten",
+}
 """Kinds of elements that mjData knows, with the prefix of its fields."""
 
 _SHAPES = {"numeric": ("size",), "hfield": ("nrow", "ncol"), "tex": ("height", "width", "nchannel")}
@@ -114,9 +147,11 @@ class _Element:
         if self._kind == "jnt":
             return dict(zip(("nq", "nv"), rows_of_joint(m, i)))
         if self._kind == "actuator":
-            return {"nu": slice(first := int(m.actuator_ctrladr[i]), first + int(m.actuator_ctrlnum[i])),
-                    "nout": slice(first := int(m.actuator_outadr[i]), first + int(m.actuator_outnum[i])),
-                    "na": slice(first := max(0, int(m.actuator_actadr[i])), first + max(0, int(m.actuator_actnum[i])))}  # fmt: skip
+            return {
+                "nu": slice(first := int(m.actuator_ctrladr[i]), first + int(m.actuator_ctrlnum[i])),
+                "nout": slice(first := int(m.actuator_outadr[i]), first + int(m.actuator_outnum[i])),
+                "na": slice(first := max(0, int(m.actuator_actadr[i])), first + max(0, int(m.actuator_actnum[i]))),
+            }
         if self._kind == "sensor":
             return {"nsensordata": slice(first := int(m.sensor_adr[i]), first + int(m.sensor_dim[i]))}
         return {}
@@ -147,7 +182,9 @@ class _View(_Struct):
 
     def _missing(self, name: str) -> NoReturn:
         real = type(self).__name__.removesuffix("View")
-        raise AttributeError(f"{type(self).__name__} has no attribute '{name}', and mujoco.{real} of another version may: {libmujoco.explain()}")
+        raise AttributeError(
+            f"{type(self).__name__} has no attribute '{name}', and mujoco.{real} of another version may: {libmujoco.explain()}"
+        )
 
     def __getattr__(self, name: str) -> Any:
         if name in _KINDS and _KINDS[name] in self._element_kinds:
@@ -213,13 +250,47 @@ class MjModelView(_View):
 
 
 _BODY = frozenset(
-    ("xpos", "xquat", "xmat", "xipos", "xiquat", "ximat", "xfrc_applied", "subtree_com", "subtree_linvel", "subtree_angmom", "cinert",
-     "crb", "cvel", "cacc", "cfrc_int", "cfrc_ext")
-)  # fmt: skip
+    (
+        "xpos",
+        "xquat",
+        "xmat",
+        "xipos",
+        "xiquat",
+        "ximat",
+        "xfrc_applied",
+        "subtree_com",
+        "subtree_linvel",
+        "subtree_angmom",
+        "cinert",
+        "crb",
+        "cvel",
+        "cacc",
+        "cfrc_int",
+        "cfrc_ext",
+    )
+)
 _DOFS = frozenset(
-    ("qvel", "qacc", "qacc_warmstart", "qacc_smooth", "qfrc_applied", "qfrc_bias", "qfrc_passive", "qfrc_spring", "qfrc_damper",
-     "qfrc_gravcomp", "qfrc_fluid", "qfrc_actuator", "qfrc_smooth", "qfrc_constraint", "qfrc_inverse", "cdof", "cdof_dot", "qLDiagInv")
-)  # fmt: skip
+    (
+        "qvel",
+        "qacc",
+        "qacc_warmstart",
+        "qacc_smooth",
+        "qfrc_applied",
+        "qfrc_bias",
+        "qfrc_passive",
+        "qfrc_spring",
+        "qfrc_damper",
+        "qfrc_gravcomp",
+        "qfrc_fluid",
+        "qfrc_actuator",
+        "qfrc_smooth",
+        "qfrc_constraint",
+        "qfrc_inverse",
+        "cdof",
+        "cdof_dot",
+        "qLDiagInv",
+    )
+)
 
 
 class MjDataView(_View):
@@ -230,7 +301,9 @@ class MjDataView(_View):
     def __init__(self, model: MjModelView) -> None:
         owner = _core.OwnedData.make(model._address)
         super().__init__(owner, _core.data_fields(model._address, owner.address))
-        self.__dict__.update(_address=owner.address, _model=model, _arena=frozenset(_core.arena_fields(model._address, owner.address)))
+        self.__dict__.update(
+            _address=owner.address, _model=model, _arena=frozenset(_core.arena_fields(model._address, owner.address))
+        )
 
     @property
     def model(self) -> MjModelView:

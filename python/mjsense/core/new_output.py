@@ -44,7 +44,9 @@ def own_folder(path: Path, in_use: str) -> Iterator[Path]:
         mark.touch()
     except FileExistsError:
         if not mark.is_file():
-            raise FileExistsError(f"{path} exists, and no program of mjsense has made it: rename it, or choose another output") from None
+            raise FileExistsError(
+                f"{path} exists, and no program of mjsense has made it: rename it, or choose another output"
+            ) from None
     with _locked(mark, in_use):
         _empty(path)
         try:

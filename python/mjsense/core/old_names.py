@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Old names of modules. They work for one version, with a warning that gives the new name."""
+"""Old names: modules, names at the top of ``mjsense``, and arguments. They work for one version, with a warning that gives the new name."""
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 import warnings
+from collections.abc import Callable
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, cast
+
+from mjsense.core.errors import did_you_mean
+
+T = TypeVar("T", bound=Callable[..., Any])
 
 OLD_NAMES = {
     "mjsense.assets": "mjsense.tasks.assets",
@@ -22,6 +28,89 @@ OLD_NAMES = {
     "mjsense.rl.sb3": "mjsense.tasks.rl.sb3",
     "mjsense.teleoperation": "mjsense.tasks.teleoperation",
 }
+
+MOVED = {
+    "mjsense.dataset": (
+        "Deviation",
+        "Episode",
+        "EpisodeCheck",
+        "EpisodeQuality",
+        "RenderProgress",
+        "RenderSummary",
+        "ReplayReport",
+        "SensorCheck",
+        "Stream",
+        "Video",
+    ),
+    "mjsense.exporting": (
+        "export_lerobot",
+        "export_lerobot21",
+        "export_mcap",
+        "export_rerun",
+        "export_rlds",
+        "export_robomimic",
+        "export_zarr",
+    ),
+    "mjsense.recording": ("RecordVectorEpisodes",),
+    "mjsense.scene": ("Entity",),
+    "mjsense.sensors": (
+        "BuiltinSensor",
+        "CameraData",
+        "CameraImageSensor",
+        "CameraParameterSensor",
+        "CameraSensor",
+        "CameraVizCfg",
+        "ContactData",
+        "ContactSensor",
+        "ContactVizCfg",
+        "DebugShapes",
+        "EnvStatesSensor",
+        "FunctionSensor",
+        "GraspStateSensor",
+        "ImagePointsSensor",
+        "ImuAxis",
+        "ImuData",
+        "ImuModel",
+        "ImuSensor",
+        "JointPositionSensor",
+        "JointVelocitySensor",
+        "LidarSensor",
+        "NativeSensor",
+        "ObservationPipeline",
+        "PoseSensor",
+        "RayCastData",
+        "RayCastSensor",
+        "RayCastVizCfg",
+        "RobotBasePoseSensor",
+        "SceneEntityCfg",
+        "SensorCfg",
+        "SensorData",
+        "SensorSpec",
+        "TcpPoseSensor",
+        "TerrainHeightSensor",
+        "replace",
+    ),
+    "mjsense.sim": ("Attached",),
+    "mjsense.tasks": (
+        "MoveGroup",
+        "RecordProgress",
+        "RecordSummary",
+        "RobotCamera",
+        "SceneHeadlightCfg",
+        "SceneMoodCfg",
+        "SceneObjectCfg",
+        "SceneRegionCfg",
+        "SceneRobotCfg",
+        "SceneSkyCfg",
+        "SceneVaryCfg",
+        "TaskEnv",
+        "TaskVectorEnv",
+        "Teleoperation",
+        "WorldState",
+    ),
+    "mjsense.viewer": ("Viewer",),
+}
+"""Public names that were at the top of ``mjsense``, by the module that has them now."""
 
 
 class _OldModule(ModuleType):
@@ -44,3 +133,40 @@ def register() -> None:
         module = sys.modules.setdefault(old, _OldModule(old, new))
         package, _, name = old.rpartition(".")
         vars(sys.modules[package]).setdefault(name, module)
+
+
+def moved_name(name: str) -> Any:
+    """The value of an old public name of ``mjsense``, for its ``__getattr__``.
+
+    Raises:
+        AttributeError: There is no such name.
+    """
+    room = next((room for room, names in MOVED.items() if name in names), None)
+    if room is None:
+        near = "" if name.startswith("_") else did_you_mean(name, sys.modules["mjsense"].__all__)
+        raise AttributeError(f"module 'mjsense' has no attribute '{name}'{near}")
+    warnings.warn(f"mjsense.{name} is now {room}.{name}", DeprecationWarning, stacklevel=3)
+    return getattr(importlib.import_module(room), name)
+
+
+def old_argument(old: str, new: str) -> Callable[[T], T]:
+    """Decorates a function, or a class, whose keyword argument ``old`` is now ``new``."""
+
+    def decorate(target: T) -> T:
+        if isinstance(target, type):
+            cls: Any = target
+            cls.__init__ = decorate(cls.__init__)
+            return cast(T, cls)
+        function: Any = target
+        context = function.__qualname__.removesuffix(".__init__")
+
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            if old in kwargs and new not in kwargs:
+                warnings.warn(f"{context}(): the argument {old} is now {new}", DeprecationWarning, stacklevel=2)
+                kwargs[new] = kwargs.pop(old)
+            return function(*args, **kwargs)
+
+        return cast(T, call)
+
+    return decorate

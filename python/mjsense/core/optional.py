@@ -20,4 +20,6 @@ def optional(module: str, extra: str, user: str) -> Any:
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"{user} needs {module.split('.')[0]}: pip install 'mjsense[{extra}]' ({error})", name=error.name) from error
+        raise ModuleNotFoundError(
+            f"{user} needs {module.split('.')[0]}: pip install 'mjsense[{extra}]' ({error})", name=error.name
+        ) from error

@@ -88,6 +88,7 @@ def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
 
 def grid(header: tuple[str, ...], rows: Sequence[Sequence[Any]]) -> str:
     """An HTML table."""
+
     def line_of(tag: str, cells: Sequence[Any]) -> str:
         return "<tr>" + "".join(f"<{tag} style='text-align:left'>{escaped(cell)}</{tag}>" for cell in cells) + "</tr>"
 
@@ -105,7 +106,9 @@ def figures(images: Mapping[str, np.ndarray]) -> str:
 
 def block(head: str, content: str, folded: Mapping[str, str] | None = None) -> str:
     """HTML with a bold first line, its content, and parts that open at a click."""
-    parts = "".join(f"<details><summary>{escaped(name)}</summary>{inner}</details>" for name, inner in (folded or {}).items() if inner)
+    parts = "".join(
+        f"<details><summary>{escaped(name)}</summary>{inner}</details>" for name, inner in (folded or {}).items() if inner
+    )
     return f"<div><b>{escaped(head)}</b>{content}{parts}</div>"
 
 
@@ -122,8 +125,21 @@ def thumbnail(image: np.ndarray) -> str | None:
     return None if pixels is None else "data:image/png;base64," + base64.b64encode(png_of(pixels)).decode("ascii")
 
 
-_VIRIDIS = np.array([(68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121), (110, 206, 88),
-                     (181, 222, 43), (253, 231, 37)], np.float64)  # fmt: skip
+_VIRIDIS = np.array(
+    [
+        (68, 1, 84),
+        (72, 40, 120),
+        (62, 74, 137),
+        (49, 104, 142),
+        (38, 130, 142),
+        (31, 158, 137),
+        (53, 183, 121),
+        (110, 206, 88),
+        (181, 222, 43),
+        (253, 231, 37),
+    ],
+    np.float64,
+)
 """Samples of the colour map viridis at equal distances."""
 
 
@@ -136,7 +152,11 @@ def colour_map(values: np.ndarray) -> np.ndarray:
 def is_image(shape: tuple[int, ...], dtype: Any) -> bool:
     """Whether rows of this shape can be shown by :func:`coloured`."""
     kind = np.dtype(dtype).kind
-    return len(shape) == 3 and min(shape) > 0 and (shape[2] in (1, 3) if kind == "f" else shape[2] in (1, 2) if kind == "i" else shape[2] == 3)
+    return (
+        len(shape) == 3
+        and min(shape) > 0
+        and (shape[2] in (1, 3) if kind == "f" else shape[2] in (1, 2) if kind == "i" else shape[2] == 3)
+    )
 
 
 def coloured(image: np.ndarray) -> np.ndarray | None:

@@ -18,11 +18,27 @@ from mjsense.core.mujoco_names import Obj
 from mjsense.core.mujoco_views import array_of
 
 _LISTS = {
-    "bodies": Obj.BODY, "geoms": Obj.GEOM, "joints": Obj.JOINT, "sites": Obj.SITE, "cameras": Obj.CAMERA, "lights": Obj.LIGHT,
-    "frames": Obj.FRAME, "actuators": Obj.ACTUATOR, "sensors": Obj.SENSOR, "pairs": Obj.PAIR, "excludes": Obj.EXCLUDE,
-    "equalities": Obj.EQUALITY, "tendons": Obj.TENDON, "numerics": Obj.NUMERIC, "texts": Obj.TEXT, "keys": Obj.KEY, "meshes": Obj.MESH,
-    "hfields": Obj.HFIELD, "textures": Obj.TEXTURE, "materials": Obj.MATERIAL,
-}  # fmt: skip
+    "bodies": Obj.BODY,
+    "geoms": Obj.GEOM,
+    "joints": Obj.JOINT,
+    "sites": Obj.SITE,
+    "cameras": Obj.CAMERA,
+    "lights": Obj.LIGHT,
+    "frames": Obj.FRAME,
+    "actuators": Obj.ACTUATOR,
+    "sensors": Obj.SENSOR,
+    "pairs": Obj.PAIR,
+    "excludes": Obj.EXCLUDE,
+    "equalities": Obj.EQUALITY,
+    "tendons": Obj.TENDON,
+    "numerics": Obj.NUMERIC,
+    "texts": Obj.TEXT,
+    "keys": Obj.KEY,
+    "meshes": Obj.MESH,
+    "hfields": Obj.HFIELD,
+    "textures": Obj.TEXTURE,
+    "materials": Obj.MATERIAL,
+}
 _IN_BODIES = (Obj.BODY, Obj.GEOM, Obj.JOINT, Obj.SITE, Obj.CAMERA, Obj.LIGHT)
 RENUMBERED = {"mjEQ_DISTANCE": 7, "mjDYN_USER": 7, "mjGAIN_USER": 6, "mjBIAS_USER": 5}
 """Enumerators of mjSpec that had other values in an earlier version."""
@@ -98,6 +114,7 @@ class _Owner(_Fields):
             return [MjsView(self._spec, address) for address in self._elements(_LISTS[name])]
         kind = Obj.__members__.get(name.removeprefix("add_").upper()) if name.startswith("add_") else None
         if kind is not None and (kind in _IN_BODIES) == (self is not self._spec):
+
             def add(default: Any = None, **given: Any) -> MjsView:
                 return self._add(kind, default, given)
 

@@ -12,6 +12,18 @@ from mjsense.dataset.sensor_check import SensorCheck
 from mjsense.dataset.video import Video
 
 __all__ = [
-    "Dataset", "Deviation", "Episode", "EpisodeCheck", "EpisodeQuality", "RenderProgress", "RenderSummary", "ReplayReport", "SensorCheck", "Stream", "Video",
-    "check_replay", "render", "replay",
-]  # fmt: skip
+    "Dataset",
+    "Deviation",
+    "Episode",
+    "EpisodeCheck",
+    "EpisodeQuality",
+    "RenderProgress",
+    "RenderSummary",
+    "ReplayReport",
+    "SensorCheck",
+    "Stream",
+    "Video",
+    "check_replay",
+    "render",
+    "replay",
+]

@@ -42,7 +42,17 @@ def files_of(file: IO[bytes], about: object) -> dict[str, bytes]:
             members = archive.infolist()
             _check_members(members, file.seek(0, os.SEEK_END), about)
             files = {member.filename: archive.read(member) for member in members}
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, UnicodeError, struct.error, OverflowError) as error:
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        OSError,
+        UnicodeError,
+        struct.error,
+        OverflowError,
+    ) as error:
         raise _refusal(about, f"{error or type(error).__name__}; copy it from the original recording") from None
     if MODEL_FILE not in files:
         raise _refusal(about, f"it contains no {MODEL_FILE}")
@@ -108,10 +118,14 @@ def _check_members(members: list[zipfile.ZipInfo], size: int, about: object) -> 
         if member.flag_bits & 0x41:
             raise _refusal(about, f"{name!r} is encrypted")
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise _refusal(about, f"{name!r} is compressed with method {member.compress_type}, expected 0 (stored) or 8 (deflate)")
+            raise _refusal(
+                about, f"{name!r} is compressed with method {member.compress_type}, expected 0 (stored) or 8 (deflate)"
+            )
         packed = max(1, member.compress_size)
         if member.file_size > RATIO_FROM and member.file_size > MAX_RATIO * packed:
-            raise _refusal(about, f"{name!r} would grow from {packed} to {member.file_size} bytes, the limit is a factor of {MAX_RATIO}")
+            raise _refusal(
+                about, f"{name!r} would grow from {packed} to {member.file_size} bytes, the limit is a factor of {MAX_RATIO}"
+            )
     for name in names:
         for parent in Path(name).parents:
             if str(parent) in names:

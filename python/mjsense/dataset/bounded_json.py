@@ -37,7 +37,15 @@ def parse_object(text: str | bytes, what: str, max_bytes: int) -> dict[str, Any]
 
 def kind_of(value: Any) -> str:
     """JSON's word for the type of a value."""
-    kinds = {bool: "true or false", int: "a number", float: "a number", str: "a text", list: "a list", dict: "an object", type(None): "null"}
+    kinds = {
+        bool: "true or false",
+        int: "a number",
+        float: "a number",
+        str: "a text",
+        list: "a list",
+        dict: "an object",
+        type(None): "null",
+    }
     return kinds.get(type(value), type(value).__name__)
 
 

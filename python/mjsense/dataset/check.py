@@ -96,7 +96,9 @@ def _check_streams(episode: Episode) -> None:
             continue
         now = known[index].get(place)
         if now is not None and (now.dtype, now.shape) != (stream.dtype, stream.shape):
-            raise ValueError(f"{place} is {now.dtype} {list(now.shape)}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}")
+            raise ValueError(
+                f"{place} is {now.dtype} {list(now.shape)}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}"
+            )
         if stream.name not in streams and "streams" in episode._recording.provenance:
             raise ValueError(f"has no '{place}', which another episode of the recording has")
 
@@ -106,7 +108,9 @@ def _check_videos(episode: Episode) -> None:
         info = episode._video(name)
         episode.image_histogram(name)
         if have_av():
-            packets = Packets(info.path, info.fps, info.frames, (info.width, info.height), "")  # the program compares the checksum
+            packets = Packets(
+                info.path, info.fps, info.frames, (info.width, info.height), ""
+            )  # the program compares the checksum
             exact = packets.exact or info.path.suffix == ".mkv" or episode._recording.fps is None
             if not exact or sorted(packets.frames) != list(range(info.frames)):
                 raise ValueError(f"{info.path.name}: its times are not those of {info.frames} frames at {info.fps} per second")

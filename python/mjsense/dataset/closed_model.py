@@ -37,7 +37,15 @@ FILE_TAGS = {"mesh": "meshdir", "texture": "texturedir", "hfield": "assetdir", "
 SIDES = ("fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
 _MESHES = (".stl", ".obj", ".msh")
-_CONTENT = {"image/png", "image/ktx", "image/vnd.mujoco.texture", "image/vnd.mujoco.hfield", "model/stl", "model/obj", "model/vnd.mujoco.msh"}
+_CONTENT = {
+    "image/png",
+    "image/ktx",
+    "image/vnd.mujoco.texture",
+    "image/vnd.mujoco.hfield",
+    "model/stl",
+    "model/obj",
+    "model/vnd.mujoco.msh",
+}
 _CONVERSION = re.compile(r"%[-+ #0'*.$\dhlLqjztw]*[A-Za-z]")
 """MuJoCo 4.0.1 uses a name that it does not know as the format of a message: ``%n`` ends the process."""
 _ERRORS: tuple[type[Exception], ...] = (ValueError, RuntimeError, *((mujoco.FatalError,) if libmujoco.shared else ()))
@@ -61,7 +69,9 @@ def parsed(text: str | bytes, about: str) -> Element:
             raise ValueError(f"{about}: line {parser.CurrentLineNumber}: more than {limit} {what}, which is the limit")
         for key, value in attributes.items():
             if "%" in value and _CONVERSION.search(value):
-                raise ValueError(f"{about}: line {parser.CurrentLineNumber}: {key[:40]} of '{tag[:40]}' is {value[:60]!r}, which is a format of printf")
+                raise ValueError(
+                    f"{about}: line {parser.CurrentLineNumber}: {key[:40]} of '{tag[:40]}' is {value[:60]!r}, which is a format of printf"
+                )
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -93,14 +103,22 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
     """
     for element in root.iter():
         if element.tag in _REFUSED:
-            raise ValueError(f"{about}: the element '{element.tag}' {_REFUSED[element.tag]}, which the model of a recording must not")
+            raise ValueError(
+                f"{about}: the element '{element.tag}' {_REFUSED[element.tag]}, which the model of a recording must not"
+            )
         for key in element.attrib:
-            named = (key.startswith("file") and key != "file" and key not in SIDES) or (key == "file" and element.tag not in FILE_TAGS)
+            named = (key.startswith("file") and key != "file" and key not in SIDES) or (
+                key == "file" and element.tag not in FILE_TAGS
+            )
             if named or (key in SIDES and element.tag != "texture"):
-                raise ValueError(f"{about}: the element '{element.tag[:40]}' names a file ('{key[:40]}'), expected one of {', '.join(FILE_TAGS)}")
+                raise ValueError(
+                    f"{about}: the element '{element.tag[:40]}' names a file ('{key[:40]}'), expected one of {', '.join(FILE_TAGS)}"
+                )
         kind = element.get("content_type")
         if kind is not None and kind not in _CONTENT:
-            raise ValueError(f"{about}: the content_type {kind[:80]!r} of '{element.tag[:40]}' is unknown, expected one of {', '.join(sorted(_CONTENT))}")
+            raise ValueError(
+                f"{about}: the content_type {kind[:80]!r} of '{element.tag[:40]}' is unknown, expected one of {', '.join(sorted(_CONTENT))}"
+            )
         plugin = element.get("plugin")
         if plugin is not None and not re.fullmatch(r"mujoco\.[\w.]{1,80}", plugin):
             raise ValueError(f"{about}: the plugin {plugin[:80]!r} is not one of MuJoCo's own")
@@ -128,7 +146,9 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
                 continue
             file = element.attrib[key]
             if "name" not in element.attrib and key == "file" and element.tag != "skin":
-                element.set("name", posixpath.splitext(posixpath.basename(file.replace("\\", "/")))[0])  # the name that it has without one
+                element.set(
+                    "name", posixpath.splitext(posixpath.basename(file.replace("\\", "/")))[0]
+                )  # the name that it has without one
             folder = folders[FILE_TAGS[element.tag]] or folders["assetdir"]
             element.set(key, find(element, key, posixpath.basename(file) if strip else file, folder))
 
@@ -136,9 +156,13 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
 def check_member(element: Element, name: str, about: str) -> None:
     """Raises ValueError for a file of which MuJoCo could take the name or the kind for something else."""
     if fault := fault_of_name(name):
-        raise ValueError(f"{about}: the {element.tag} '{element.get('name', '')[:80]}' names the file {name[:80]!r}, which {fault}")
+        raise ValueError(
+            f"{about}: the {element.tag} '{element.get('name', '')[:80]}' names the file {name[:80]!r}, which {fault}"
+        )
     if element.tag == "mesh" and not name.lower().endswith(_MESHES):
-        raise ValueError(f"{about}: the mesh '{element.get('name', '')[:80]}' names the file {name[:80]!r}, expected one of {', '.join(_MESHES)}")
+        raise ValueError(
+            f"{about}: the mesh '{element.get('name', '')[:80]}' names the file {name[:80]!r}, expected one of {', '.join(_MESHES)}"
+        )
 
 
 def closed_model(text: str | bytes, members: Mapping[str, bytes], about: str) -> str:
@@ -161,7 +185,9 @@ def closed_model(text: str | bytes, members: Mapping[str, bytes], about: str) ->
             if name in members:
                 check_member(element, name, about)
                 return name
-        raise ValueError(f"{about}: the {element.tag} '{element.get('name', '')[:80]}' names the file {file[:120]!r}, which is not in the archive")
+        raise ValueError(
+            f"{about}: the {element.tag} '{element.get('name', '')[:80]}' names the file {file[:120]!r}, which is not in the archive"
+        )
 
     close_names(root, find, about)
     check_sizes(root, members, about)
@@ -213,4 +239,6 @@ def check_compiled(model: mujoco.MjModel, about: str) -> None:
         if size > MAX_ARENA:
             raise ValueError(f"{about}: the {what} of the model have {size} bytes, the limit is {MAX_ARENA}")
     if not 1e-9 < model.opt.timestep < 1e3:
-        raise ValueError(f"{about}: the timestep of the model is {model.opt.timestep} s, expected more than 1e-9 s and less than 1000 s")
+        raise ValueError(
+            f"{about}: the timestep of the model is {model.opt.timestep} s, expected more than 1e-9 s and less than 1000 s"
+        )

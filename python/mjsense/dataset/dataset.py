@@ -97,8 +97,10 @@ class Dataset:
         self._windows: dict[str, list[int]] = {}
         if not chosen:
             if delta_timestamps or streams:
-                raise ValueError(f"{self.root}: no episode matches; it has {len(entries)} episodes with the outcomes "
-                                 f"{sorted({entry.outcome for entry in entries})}")  # fmt: skip
+                raise ValueError(
+                    f"{self.root}: no episode matches; it has {len(entries)} episodes with the outcomes "
+                    f"{sorted({entry.outcome for entry in entries})}"
+                )
             return
         self._fps = self._common_fps()
         self._choose_streams(None if streams is None else list(streams), delta_timestamps or {}, tolerance_s)
@@ -106,7 +108,9 @@ class Dataset:
     def _choose_streams(self, names: list[str] | None, windows: Mapping[str, Sequence[float]], tolerance_s: float) -> None:
         """Determines the streams of a sample, their windows, and how each is read."""
         known = self._known_streams()
-        selected = {name for name in known if not name.startswith(REPLAY)} if names is None else set(self._expand_all(names, known))
+        selected = (
+            {name for name in known if not name.startswith(REPLAY)} if names is None else set(self._expand_all(names, known))
+        )
         if names is None or not set(names) <= known.keys():
             self._store.leaves = set(known)
         for name, seconds in windows.items():
@@ -150,11 +154,19 @@ class Dataset:
         if self._videos:
             places = [self._rows(name, episode, t) for name in self._videos]
             frames = episode._frames(self._videos, [[rows] if single else rows for rows, single in places])
-            sample |= {name: images[0] if single else np.stack(images) for name, images, (_, single) in zip(self._videos, frames, places)}
+            sample |= {
+                name: images[0] if single else np.stack(images) for name, images, (_, single) in zip(self._videos, frames, places)
+            }
         for name, steps in self._windows.items():
             if not is_mask(name):
                 sample[f"{name}_is_pad"] = np.array([not 0 <= t + step < episode.length for step in steps])
-        sample |= {"episode_index": episode.index, "frame_index": t, "index": i, "timestamp": float(t / self._fps), "task": episode.task}
+        sample |= {
+            "episode_index": episode.index,
+            "frame_index": t,
+            "index": i,
+            "timestamp": float(t / self._fps),
+            "task": episode.task,
+        }
         return sample
 
     def __repr__(self) -> str:
@@ -171,7 +183,9 @@ class Dataset:
         streams = [(s.name, s.dtype, list(s.shape), s.unit, s.frame, s.description) for s in self.streams.values()]
         folded = {f"{len(streams)} streams": representations.grid(("stream", "dtype", "shape", "unit", "frame", ""), streams)}
         first = self.episodes[0]._film() if self.episodes else ""
-        return representations.block(f"data set {self.root}: {len(self.episodes)} episodes, {len(self)} observations", table + first, folded)
+        return representations.block(
+            f"data set {self.root}: {len(self.episodes)} episodes, {len(self)} observations", table + first, folded
+        )
 
     def index_of(self, episode: int, frame: int = 0) -> int:
         """Number of an observation: ``frame`` of the episode at position ``episode`` in the recording."""
@@ -220,7 +234,9 @@ class Dataset:
         first = self.episodes[0]
         for episode in {episode._entry.recording: episode for episode in self.episodes}.values():
             if episode.fps != first.fps:
-                raise ValueError(f"{first.path} has {first.fps} observations per second, {episode.path} has {episode.fps}; choose houses with one rate")
+                raise ValueError(
+                    f"{first.path} has {first.fps} observations per second, {episode.path} has {episode.fps}; choose houses with one rate"
+                )
         return first.fps
 
     def _expand_all(self, names: Iterable[str], known: dict[str, Stream]) -> list[str]:
@@ -230,7 +246,9 @@ class Dataset:
             try:
                 result += _expand(name, known)
             except UnknownNameError:
-                leaf = next((e._streams[name] for e in self.episodes if name in e._streams and e._streams[name].kind == "json"), None)
+                leaf = next(
+                    (e._streams[name] for e in self.episodes if name in e._streams and e._streams[name].kind == "json"), None
+                )
                 if leaf is None:
                     raise
                 known[name] = leaf
@@ -271,9 +289,13 @@ class Dataset:
             if stream.kind != "json":
                 raise UnknownNameError(f"{self.root}: an episode has no stream '{name}'; leave it out with streams=")
             shape = stream.shape if isinstance(rows, int) else (len(rows), *stream.shape)
-            return "" if stream.dtype == object and not shape else np.full(shape, "" if stream.dtype == object else 0, stream.dtype)
+            return (
+                "" if stream.dtype == object and not shape else np.full(shape, "" if stream.dtype == object else 0, stream.dtype)
+            )
         if array.shape[1:] != stream.shape:
-            raise ValueError(f"{self.root}: '{name}' has the shape {list(array.shape[1:])} in one episode, {list(stream.shape)} in the first")
+            raise ValueError(
+                f"{self.root}: '{name}' has the shape {list(array.shape[1:])} in one episode, {list(stream.shape)} in the first"
+            )
         values = array[rows]
         return copy.deepcopy(values) if array.dtype == object else np.array(values)  # a copy: the array is in the cache
 
@@ -343,6 +365,8 @@ def _steps(name: str, seconds: Sequence[float], fps: Fraction, tolerance_s: floa
     off = [s for s, n in zip(seconds, steps) if abs(float(s) - n / float(fps)) > tolerance_s]
     if off:
         nearest = round(off[0] * float(fps)) or (1 if off[0] > 0 else -1)
-        raise ValueError(f"delta_timestamps['{name}']: {off[0]} s is not a multiple of 1/fps = {float(1 / fps):.6f} s within {tolerance_s} s; "
-                         f"use n / dataset.fps, such as {nearest} / dataset.fps = {float(nearest / fps):.6f} s")  # fmt: skip
+        raise ValueError(
+            f"delta_timestamps['{name}']: {off[0]} s is not a multiple of 1/fps = {float(1 / fps):.6f} s within {tolerance_s} s; "
+            f"use n / dataset.fps, such as {nearest} / dataset.fps = {float(nearest / fps):.6f} s"
+        )
     return steps

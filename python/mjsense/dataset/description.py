@@ -21,8 +21,22 @@ from mjsense.dataset.places import is_plain_name, printable
 _RATE = re.compile(rf"[0-9]{{1,{RATE_DIGITS}}}(/[0-9]{{1,{RATE_DIGITS}}})?")
 _PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow", "placebo")
 _TUNES = ("", "fastdecode", "zerolatency", "film", "animation", "grain", "stillimage", "psnr", "ssim")
-_PROVENANCE = ("batches", "episodes", "first_attempt", "first_batch", "format", "fps", "gzip", "house", "model", "model_archive", "num_attempts", "settings",
-               "streams", "versions")  # fmt: skip
+_PROVENANCE = (
+    "batches",
+    "episodes",
+    "first_attempt",
+    "first_batch",
+    "format",
+    "fps",
+    "gzip",
+    "house",
+    "model",
+    "model_archive",
+    "num_attempts",
+    "settings",
+    "streams",
+    "versions",
+)
 # A name of something that mjsense contains; a path has a dot, or begins with a slash.
 _KNOWN_THING = re.compile(r"[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*(@[a-z]+)?(:[0-9]{1,9})?")
 _OF_RECORD = "terminate_upon_success"  # a setting that mjs.record always writes
@@ -58,22 +72,48 @@ _BOOL: tuple[Check, str] = (lambda v: isinstance(v, bool), "true or false")
 _TEXT: tuple[Check, str] = (lambda v: isinstance(v, str) and len(v) <= TEXT_BYTES, f"a text of at most {TEXT_BYTES} characters")
 _NAME: tuple[Check, str] = (lambda v: isinstance(v, str) and is_plain_name(v), "a plain name, without a folder")
 # A camera's name may have the name of its robot in front: robot_0/wrist.
-_PARTS: tuple[Check, str] = (lambda v: isinstance(v, str) and all(map(is_plain_name, v.split("/"))), "a plain name, without .. and empty parts")
+_PARTS: tuple[Check, str] = (
+    lambda v: isinstance(v, str) and all(map(is_plain_name, v.split("/"))),
+    "a plain name, without .. and empty parts",
+)
 _TABLE: tuple[Check, str] = (lambda v: isinstance(v, dict), "an object")
 _LIST: tuple[Check, str] = (lambda v: isinstance(v, list), "a list")
 
 _VIDEO: dict[str, tuple[Check, str]] = {
-    "crf": _whole(0, 51), "preset": _word(_PRESETS), "tune": _word(_TUNES), "keyint": _whole(1, 100_000), "threads": _whole(1, 64),
-    "depth_unit": _between(0, 1000), "molmospaces_depth": _BOOL,
-}  # fmt: skip
+    "crf": _whole(0, 51),
+    "preset": _word(_PRESETS),
+    "tune": _word(_TUNES),
+    "keyint": _whole(1, 100_000),
+    "threads": _whole(1, 64),
+    "depth_unit": _between(0, 1000),
+    "molmospaces_depth": _BOOL,
+}
 _SETTINGS: dict[str, tuple[Check, str]] = {
-    "policy_dt_ms": _between(0, PERIOD_MS), "shadows": _BOOL, "samples": _whole(1, 4096), "shadow_samples": _whole(1, 4096), "meshes": _word(("shapes", "real", "auto")),
-    "robot": _TEXT, "task": _TEXT, "scene": _TEXT, "camera_system": _TEXT, "code": _TABLE, "render": _TABLE, "cameras": _LIST,
-}  # fmt: skip
+    "policy_dt_ms": _between(0, PERIOD_MS),
+    "shadows": _BOOL,
+    "samples": _whole(1, 4096),
+    "shadow_samples": _whole(1, 4096),
+    "meshes": _word(("shapes", "real", "auto")),
+    "robot": _TEXT,
+    "task": _TEXT,
+    "scene": _TEXT,
+    "camera_system": _TEXT,
+    "code": _TABLE,
+    "render": _TABLE,
+    "cameras": _LIST,
+}
 _CAMERA: dict[str, tuple[Check, str]] = {
-    "name": _PARTS, "width": _whole(1, IMAGE_SIDE), "height": _whole(1, IMAGE_SIDE), "depth": _BOOL, "segmentation": _BOOL, "camera": _TEXT, "body": _TEXT,
-    "pos": _vector(3), "quat": _vector(4), "fovy": _between(0, 180),
-}  # fmt: skip
+    "name": _PARTS,
+    "width": _whole(1, IMAGE_SIDE),
+    "height": _whole(1, IMAGE_SIDE),
+    "depth": _BOOL,
+    "segmentation": _BOOL,
+    "camera": _TEXT,
+    "body": _TEXT,
+    "pos": _vector(3),
+    "quat": _vector(4),
+    "fovy": _between(0, 180),
+}
 
 
 @dataclass(frozen=True)
@@ -135,7 +175,9 @@ def rate_of(value: Any, what: str) -> Fraction:
         if RATES[0] <= rate <= RATES[1]:
             return rate
     shown = printable(repr(value)[:60])
-    raise ValueError(f"{what} is {shown}; it must be a rate from {RATES[0]:g} to {RATES[1]:g} as '15' or '500/33', of at most {RATE_DIGITS} digits each")
+    raise ValueError(
+        f"{what} is {shown}; it must be a rate from {RATES[0]:g} to {RATES[1]:g} as '15' or '500/33', of at most {RATE_DIGITS} digits each"
+    )
 
 
 def image_size(width: Any, height: Any, what: str) -> tuple[int, int]:

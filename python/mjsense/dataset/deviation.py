@@ -25,5 +25,7 @@ class Deviation:
     def __str__(self) -> str:
         numbers = all(isinstance(value, (int, float)) for value in (self.recorded, self.replayed))
         difference = f"difference {self.replayed - self.recorded:.3g}; " if numbers else ""
-        return (f"step {self.step}: {self.field} of {self.element}: recorded {self.recorded!r}, replayed {self.replayed!r} "
-                f"({difference}{self.count} values differ at this step)")  # fmt: skip
+        return (
+            f"step {self.step}: {self.field} of {self.element}: recorded {self.recorded!r}, replayed {self.replayed!r} "
+            f"({difference}{self.count} values differ at this step)"
+        )

@@ -95,7 +95,11 @@ def merge_datasets(roots: Iterable[str | Path], out: str | Path) -> Path:
         raise ValueError("merge_datasets: at least one recording is needed")
     rates = {dataset.fps: dataset.root for dataset in read}
     if len(rates) > 1:
-        raise ValueError("merge_datasets: " + ", ".join(f"{root} has {fps}" for fps, root in rates.items()) + " observations per second; a data set has one rate")
+        raise ValueError(
+            "merge_datasets: "
+            + ", ".join(f"{root} has {fps}" for fps, root in rates.items())
+            + " observations per second; a data set has one rate"
+        )
     return _write([episode for dataset in read for episode in dataset.episodes], Path(out))
 
 

@@ -47,7 +47,9 @@ class Stream:
     """``json``: a leaf of JSON rows, decoded to numbers. ``video``: a frame of a video."""
 
     def __repr__(self) -> str:
-        about = " ".join(text for text in (f"[{self.unit}]" if self.unit else "", self.frame and f"in {self.frame}", self.description) if text)
+        about = " ".join(
+            text for text in (f"[{self.unit}]" if self.unit else "", self.frame and f"in {self.frame}", self.description) if text
+        )
         return f"{self.name}: {self.dtype} {list(self.shape)} {about}".rstrip()
 
 
@@ -114,7 +116,9 @@ def check_known(name: str, dataset: Rows) -> None:
         raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be one {word} for each observation")
     shape = _OF_CAMERAS.get(name.rpartition("/")[2]) if name.startswith("obs/sensor_param/") else None
     if shape and dataset.shape[1:] != shape:
-        raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be a matrix of {shape[0]} x {shape[1]} numbers for each observation")
+        raise ValueError(
+            f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be a matrix of {shape[0]} x {shape[1]} numbers for each observation"
+        )
 
 
 class Store:
@@ -229,7 +233,12 @@ class EpisodeRows:
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the episode's attributes, and images of its start, middle and end."""
-        facts = [("outcome", self.outcome), ("observations", f"{self.length}, {float(self.length / self.fps):.2f} s"), ("seed", self.seed), ("file", f"{self.path}, {self.trajectory}")]
+        facts = [
+            ("outcome", self.outcome),
+            ("observations", f"{self.length}, {float(self.length / self.fps):.2f} s"),
+            ("seed", self.seed),
+            ("file", f"{self.path}, {self.trajectory}"),
+        ]
         return representations.block(f"episode {self.index}: {self.task}", representations.grid(("", ""), facts) + self._film())
 
     def _film(self) -> str:
@@ -238,7 +247,10 @@ class EpisodeRows:
         for name in (name for name, stream in self.streams.items() if stream.kind == "video"):
             video = self.video(name)
             try:
-                images = {f"{name.removeprefix(VIDEOS)}, step {t}": video[t].reshape(*video.shape[1:3], -1) for t in (0, self.length // 2, self.length - 1)}
+                images = {
+                    f"{name.removeprefix(VIDEOS)}, step {t}": video[t].reshape(*video.shape[1:3], -1)
+                    for t in (0, self.length // 2, self.length - 1)
+                }
             except (OSError, RuntimeError):
                 continue
             strips.append(f"<div>{representations.figures(images)}</div>")
@@ -275,7 +287,9 @@ class EpisodeRows:
         with open_h5(self.path) as file:
             counts = file[self.trajectory][_video_name(camera)].attrs.get("histogram")
         if counts is not None and np.shape(counts) != (3, 256):
-            raise ValueError(f"{self.path} {self.trajectory}: the histogram of '{camera}' has the shape {list(np.shape(counts))}, not [3, 256]")
+            raise ValueError(
+                f"{self.path} {self.trajectory}: the histogram of '{camera}' has the shape {list(np.shape(counts))}, not [3, 256]"
+            )
         return None if counts is None else counts.astype(np.int64)
 
     # The next functions are for this package.
@@ -285,7 +299,9 @@ class EpisodeRows:
         info = videos.get(_video_name(camera))
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
-            raise UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no video '{camera}'; it has {cameras or 'no videos'}")
+            raise UnknownNameError(
+                f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no video '{camera}'; it has {cameras or 'no videos'}"
+            )
         return info
 
     def _frames(self, cameras: list[str], rows: list[list[int]]) -> list[list[np.ndarray]]:
@@ -310,12 +326,16 @@ class EpisodeRows:
             text = "{}" if dataset is None else text_of(dataset.read())
         scene = bounded_json.parse_object(text, f"{self.path} {self.trajectory}/obs_scene", SCENE_BYTES)
         if isinstance(scene.get("objects", {}), (bool, int, float, str, type(None))):
-            raise ValueError(f"{self.path} {self.trajectory}/obs_scene: objects is {bounded_json.kind_of(scene['objects'])}; it must be an object")
+            raise ValueError(
+                f"{self.path} {self.trajectory}/obs_scene: objects is {bounded_json.kind_of(scene['objects'])}; it must be an object"
+            )
         return scene, 16 * len(text)
 
     def _unknown(self, name: str) -> UnknownNameError:
         known = [*self.streams, *{stream.rsplit("/", 1)[0] for stream in self.streams}]
-        return UnknownNameError(f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no stream '{name}'{did_you_mean(name, known)}")
+        return UnknownNameError(
+            f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no stream '{name}'{did_you_mean(name, known)}"
+        )
 
     def _find_videos(self) -> tuple[dict[str, VideoInfo], int]:
         videos: dict[str, VideoInfo] = {}
@@ -329,15 +349,25 @@ class EpisodeRows:
                 plain_name(name, f"{dataset.where}: its video")
                 width, height = image_size(at.integer("width", 1, 2**31), at.integer("height", 1, 2**31), dataset.where)
                 if (encoding := at.text("encoding")) not in _ENCODINGS:
-                    raise ValueError(f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}")
+                    raise ValueError(
+                        f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}"
+                    )
                 rate = rate_of(at.text("fps"), f"{dataset.where}: fps")
                 if (stated := self._recording.fps) is not None and rate != stated:
                     raise ValueError(f"{dataset.where}: fps is {rate}; that of its recording is {stated}")
                 about = f"{encoding} {width} x {height}"
                 if (first := self._store.videos.setdefault((self._entry.recording, key), about)) != about:
                     raise ValueError(f"{dataset.where} is {about}; in another episode of the recording it is {first}")
-                videos[VIDEOS + key] = VideoInfo(self.path.parent / name, self._entry.length, width, height, encoding, at.number("metres_per_unit", 0.0),
-                                                 rate, at.text("crc32"))  # fmt: skip
+                videos[VIDEOS + key] = VideoInfo(
+                    self.path.parent / name,
+                    self._entry.length,
+                    width,
+                    height,
+                    encoding,
+                    at.number("metres_per_unit", 0.0),
+                    rate,
+                    at.text("crc32"),
+                )
         return videos, 500 * len(videos)
 
     def _find_streams(self) -> tuple[dict[str, Stream], int]:
@@ -374,9 +404,13 @@ class EpisodeRows:
                     return
                 for leaf, values in self._decode(name, dataset).items():
                     unit = _unit_of(about["unit"], leaf[len(name) + 1 :])
-                    streams[leaf] = Stream(leaf, values.dtype, values.shape[1:], unit, about["frame"], about["description"], "json")
+                    streams[leaf] = Stream(
+                        leaf, values.dtype, values.shape[1:], unit, about["frame"], about["description"], "json"
+                    )
                     if mask := given_name(leaf):
-                        streams[mask] = Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json")
+                        streams[mask] = Stream(
+                            mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json"
+                        )
             else:
                 if is_mask(name) and dataset.dtype != bool:
                     raise ValueError(f"{dataset.where} is {dataset.dtype}; it must be bool, whether each action is given")
@@ -400,8 +434,11 @@ class EpisodeRows:
                 self._store.rows.add((self.index, mask), given, given.nbytes)
         if self._store.leaves is not None and (new := result.keys() - self._store.leaves):
             self._store.leaves |= new
-            warnings.warn(f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first, the last and other examined episodes "
-                          "lack; samples leave it out unless streams= names it", stacklevel=2)  # fmt: skip
+            warnings.warn(
+                f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first, the last and other examined episodes "
+                "lack; samples leave it out unless streams= names it",
+                stacklevel=2,
+            )
         return result
 
     def _load(self, names: list[str]) -> dict[str, np.ndarray]:
@@ -442,7 +479,9 @@ class EpisodeRows:
         check_known(place, dataset)
         stream = self._store.known.get(self._entry.recording, {}).get(place)
         if stream is not None and (dataset.dtype, dataset.shape[1:]) != (stream.dtype, stream.shape):
-            raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}")
+            raise ValueError(
+                f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}"
+            )
         return dataset.rows_of(self._entry.length)
 
     def _large_rows(self, name: str, rows: list[int]) -> np.ndarray:

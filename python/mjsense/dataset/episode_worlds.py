@@ -24,9 +24,26 @@ if TYPE_CHECKING:
 
 _LIGHT = ("light_ambient", "light_diffuse", "light_specular")
 # Elements that sensors and edits may add to the archived model, which renumbers the others.
-_RENUMBERED = {"cam": (mujoco_names.Obj.CAMERA, "ncam"), "light": (mujoco_names.Obj.LIGHT, "nlight"), "site": (mujoco_names.Obj.SITE, "nsite")}
+_RENUMBERED = {
+    "cam": (mujoco_names.Obj.CAMERA, "ncam"),
+    "light": (mujoco_names.Obj.LIGHT, "nlight"),
+    "site": (mujoco_names.Obj.SITE, "nsite"),
+}
 
-_PARTS = ["time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "userdata"]
+_PARTS = [
+    "time",
+    "qpos",
+    "qvel",
+    "act",
+    "qacc_warmstart",
+    "ctrl",
+    "qfrc_applied",
+    "xfrc_applied",
+    "eq_active",
+    "mocap_pos",
+    "mocap_quat",
+    "userdata",
+]
 
 
 class _ArchivedSceneCfg(SceneCfg):
@@ -50,9 +67,15 @@ class EpisodeWorlds:
     """
 
     def __init__(
-        self, episode: Episode, num_worlds: int, sensors: Sequence[Any] = (), *, edit: Callable[[Any], None] | None = None,
-        brightness: float = 1.0, threads: int = 0,
-    ) -> None:  # fmt: skip
+        self,
+        episode: Episode,
+        num_worlds: int,
+        sensors: Sequence[Any] = (),
+        *,
+        edit: Callable[[Any], None] | None = None,
+        brightness: float = 1.0,
+        threads: int = 0,
+    ) -> None:
         self._brightness = brightness
 
         def edit_spec(spec: Any) -> None:
@@ -74,7 +97,9 @@ class EpisodeWorlds:
         self.sim = Simulation(self.scene, num_worlds, threads=threads)
         self._rows: dict[str, Any] = {}
         for prefix, (kind, count) in _RENUMBERED.items():
-            before, now = ([mujoco_names.id2name(m, kind, i) for i in range(getattr(m, count))] for m in (recorded, self.sim.model))
+            before, now = (
+                [mujoco_names.id2name(m, kind, i) for i in range(getattr(m, count))] for m in (recorded, self.sim.model)
+            )
             kept = [i for i, name in enumerate(now) if name in before]  # additions have new names
             if len(kept) == len(before) < len(now):
                 self._rows[prefix] = kept
@@ -86,9 +111,17 @@ class EpisodeWorlds:
         sim, fields = self.sim, playback.fields_of(episode, self._recorded)
         stored = playback.inputs_of(episode).state.shape[1]
         if stored != sim.state.shape[1]:
-            raise ValueError(f"{playback.where(episode)}: the recorded state has {stored} numbers, that of the model has {sim.state.shape[1]}. "
-                             "An edit must not add joints, actuators or bodies.")  # fmt: skip
-        check_inputs(playback.inputs_of(episode), self._recorded, stored, playback.substeps_of(episode, self._recorded), playback.where(episode))
+            raise ValueError(
+                f"{playback.where(episode)}: the recorded state has {stored} numbers, that of the model has {sim.state.shape[1]}. "
+                "An edit must not add joints, actuators or bodies."
+            )
+        check_inputs(
+            playback.inputs_of(episode),
+            self._recorded,
+            stored,
+            playback.substeps_of(episode, self._recorded),
+            playback.where(episode),
+        )
         for name in self._changed[world] - fields.keys():
             self._write(world, name, np.array(field_of(sim.model, name)))
         for name, values in fields.items():
@@ -113,8 +146,10 @@ class EpisodeWorlds:
             now[rows] = values
             return now
         if now.shape != values.shape:
-            raise ValueError(f"{playback.where(episode)}: the edited model has another shape of '{name}': {now.shape} instead of {values.shape}. "
-                             "Only cameras, lights, sites with names, and sensors can be added.")  # fmt: skip
+            raise ValueError(
+                f"{playback.where(episode)}: the edited model has another shape of '{name}': {now.shape} instead of {values.shape}. "
+                "Only cameras, lights, sites with names, and sensors can be added."
+            )
         return values
 
 

@@ -72,8 +72,17 @@ def _indexed(root: Path, source: Fetcher | None) -> tuple[list[EpisodeEntry], li
     for row in read_index(root):
         place = root / row["path"]
         house = place.parent.name
-        entry = EpisodeEntry(place, row["trajectory"], row["length"], _house(place), row["episode"], row["seed"], row["outcome"],
-                             of_house.setdefault(house, len(of_house)), source)  # fmt: skip
+        entry = EpisodeEntry(
+            place,
+            row["trajectory"],
+            row["length"],
+            _house(place),
+            row["episode"],
+            row["seed"],
+            row["outcome"],
+            of_house.setdefault(house, len(of_house)),
+            source,
+        )
         if source is None:
             _plain_folders(root, place, folders)
         if entry.recording == len(descriptions):
@@ -125,7 +134,9 @@ def is_unfinished(root: Path) -> bool:
     """Whether more episodes may follow, or wait to be published. An index is written at the end of a recording."""
     if (root / INDEX).exists():
         return False
-    return (root / "job.json").exists() or any(any(root.glob(f"{folder}.recording")) for folder in ("", "house_*/", "shard_*/house_*/"))
+    return (root / "job.json").exists() or any(
+        any(root.glob(f"{folder}.recording")) for folder in ("", "house_*/", "shard_*/house_*/")
+    )
 
 
 def entries_of(root: Path, source: Fetcher | None = None) -> tuple[list[EpisodeEntry], list[Description]]:
@@ -164,10 +175,20 @@ def _episodes(file: Group, path: Path, recording: int) -> Iterator[EpisodeEntry]
         if flags is None:
             raise ValueError(f"{trajectory.where} has no dataset 'success'")
         if not isinstance(flags, Rows) or flags.ndim != 1 or not flags.is_number:
-            raise ValueError(f"{flags.where} is {getattr(flags, 'dtype', 'a group')} {list(getattr(flags, 'shape', ()))}; it must be one bool for each observation")
+            raise ValueError(
+                f"{flags.where} is {getattr(flags, 'dtype', 'a group')} {list(getattr(flags, 'shape', ()))}; it must be one bool for each observation"
+            )
         outcome = trajectory.attrs.text("outcome") if "outcome" in trajectory.attrs else None
         if outcome is None:  # MolmoSpaces' files have no attributes
             outcome = _OUTCOMES[bool(len(flags) and flags[-1])]
         number = trajectory.attrs.integer("episode", 0, 2**53)
-        yield EpisodeEntry(path, name, len(flags), _house(path), int(name[5:]) if number is None else number, trajectory.attrs.integer("seed", 0, 2**64 - 1), outcome,
-                           recording)  # fmt: skip
+        yield EpisodeEntry(
+            path,
+            name,
+            len(flags),
+            _house(path),
+            int(name[5:]) if number is None else number,
+            trajectory.attrs.integer("seed", 0, 2**64 - 1),
+            outcome,
+            recording,
+        )

@@ -65,7 +65,9 @@ def plain_name(name: str, about: str, nested: bool = False) -> str:
     """A name that becomes part of a file name or a stream. ``nested``: may have several parts with ``/`` between them."""
     for part in name.split("/") if nested else [name]:
         if not re.fullmatch(r"\w[\w .+\-]*", part) or len(part.encode()) > 100 or ".." in part:
-            raise ValueError(f"{about}: the name {found(name)} cannot be used, expected letters, digits, '_', '-' and '.', at most 100")
+            raise ValueError(
+                f"{about}: the name {found(name)} cannot be used, expected letters, digits, '_', '-' and '.', at most 100"
+            )
     return name
 
 

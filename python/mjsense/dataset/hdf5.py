@@ -100,14 +100,18 @@ class Attributes:
         if value is None:
             return None
         if not isinstance(value, np.integer) or not low <= int(value) <= high:
-            raise ValueError(f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a whole number from {low} to {high}")
+            raise ValueError(
+                f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a whole number from {low} to {high}"
+            )
         return int(value)
 
     def number(self, name: str, default: float) -> float:
         """A finite number that is not negative."""
         value = self.get(name, default)
         if not isinstance(value, (float, np.floating, np.integer)) or not 0 <= float(value) < np.inf:
-            raise ValueError(f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a finite number of at least 0")
+            raise ValueError(
+                f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a finite number of at least 0"
+            )
         return float(value)
 
 
@@ -261,7 +265,9 @@ class Rows:
         """Raises an error if there is too much to read at once."""
         most = limits.UNPACKED_FREE + limits.UNPACKED_RATIO * self._file_bytes
         if self.bytes > most:
-            raise ValueError(f"{self.where} has {self.bytes} bytes, more than the {most} that are read from a file of {self._file_bytes} bytes")
+            raise ValueError(
+                f"{self.where} has {self.bytes} bytes, more than the {most} that are read from a file of {self._file_bytes} bytes"
+            )
 
     @property
     def has_chunk_checksums(self) -> bool:
@@ -304,7 +310,9 @@ class Rows:
 
     def _check_sum(self, found: int, stated: str) -> None:
         if f"{found:08x}" != stated:
-            raise ValueError(f"{self.where} differs from what was recorded: its checksum is not {printable(stated[:20])}; `mjsense verify` lists what is damaged")
+            raise ValueError(
+                f"{self.where} differs from what was recorded: its checksum is not {printable(stated[:20])}; `mjsense verify` lists what is damaged"
+            )
 
     def _check_storage(self) -> None:
         h5d = optional("h5py.h5d", "dataset", "Reading recordings")
@@ -348,7 +356,10 @@ class Rows:
     def _read_chunks(self, first: int, count: int) -> np.ndarray:
         assert self._chunk is not None
         chunk, shape = self._chunk, self.shape
-        begins = [range(first - first % chunk[0], first + count, chunk[0]), *(range(0, size, step) for size, step in zip(shape[1:], chunk[1:]))]
+        begins = [
+            range(first - first % chunk[0], first + count, chunk[0]),
+            *(range(0, size, step) for size, step in zip(shape[1:], chunk[1:])),
+        ]
         if (number := _product(tuple(len(begin) for begin in begins))) > limits.CHUNKS:
             raise ValueError(f"has {number} chunks, more than {limits.CHUNKS}")
         result = np.full((count, *shape[1:]), self._dataset.fillvalue, self.dtype)
@@ -358,7 +369,10 @@ class Rows:
                 continue
             inside = tuple(slice(0, min(step, size - begin)) for step, size, begin in zip(chunk, shape, at))
             skip, end = max(first - at[0], 0), min(first + count - at[0], inside[0].stop)
-            target = (slice(at[0] + skip - first, at[0] + end - first), *(slice(b, b + i.stop) for b, i in zip(at[1:], inside[1:])))
+            target = (
+                slice(at[0] + skip - first, at[0] + end - first),
+                *(slice(b, b + i.stop) for b, i in zip(at[1:], inside[1:])),
+            )
             result[target] = values[(slice(skip, end), *inside[1:])]
         return result
 
@@ -372,7 +386,9 @@ class Rows:
         if stored > limits.ROW_BYTES + (limits.ROW_BYTES >> 4):
             raise ValueError(f"has a packed chunk of {stored} bytes, more than {limits.ROW_BYTES}")
         without, data = dataset.read_direct_chunk(at)
-        data = data[:stored]  # without filters, h5py gives as many bytes as a whole chunk has, and does not fill those that are not stored
+        data = data[
+            :stored
+        ]  # without filters, h5py gives as many bytes as a whole chunk has, and does not fill those that are not stored
         for i in reversed(range(len(self._filters))):
             if without >> i & 1:
                 continue
@@ -419,4 +435,6 @@ def _reading(where: str) -> Iterator[None]:
         yield
     except _ERRORS as error:
         text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
-        raise ValueError(f"{where} {text}" if not isinstance(error, (KeyError, OSError, RuntimeError)) else f"{where} cannot be read: {text}") from None
+        raise ValueError(
+            f"{where} {text}" if not isinstance(error, (KeyError, OSError, RuntimeError)) else f"{where} cannot be read: {text}"
+        ) from None

@@ -98,9 +98,14 @@ def _with_rows(source: _Source, wanted: list[int]) -> list[int]:
     if len(empty) == len(wanted):
         raise ValueError(f"{source.root}: no episode has rows")
     if empty:
-        warnings.warn(f"{source.root}: {len(empty)} of {len(wanted)} episodes have no rows and are left out: {empty[:10]}", stacklevel=4)
+        warnings.warn(
+            f"{source.root}: {len(empty)} of {len(wanted)} episodes have no rows and are left out: {empty[:10]}", stacklevel=4
+        )
     if short := [index for index in wanted if source.episodes[index]["length"] == 1]:
-        warnings.warn(f"{source.root}: {len(short)} of {len(wanted)} episodes have one row, whose action is left out: {short[:10]}", stacklevel=4)
+        warnings.warn(
+            f"{source.root}: {len(short)} of {len(wanted)} episodes have one row, whose action is left out: {short[:10]}",
+            stacklevel=4,
+        )
     return [index for index in wanted if index not in set(empty)]
 
 
@@ -121,8 +126,10 @@ class _Source:
         content = foreign.read_bytes(foreign.file_inside(root, "meta/info.json", place), place, foreign.MAX_JSON)
         self.info = bounded_json.parse_object(content, place, foreign.MAX_JSON)
         if not str(self.info.get("codebase_version", "")).startswith("v3."):
-            raise ValueError(f"{root} has the version {foreign.found(self.info.get('codebase_version'))}, expected v3.0; "
-                             "python -m lerobot.datasets.v30.convert_dataset_v21_to_v30 converts v2.1")  # fmt: skip
+            raise ValueError(
+                f"{root} has the version {foreign.found(self.info.get('codebase_version'))}, expected v3.0; "
+                "python -m lerobot.datasets.v30.convert_dataset_v21_to_v30 converts v2.1"
+            )
         if absent := [key for key in ("features", "fps", "data_path") if key not in self.info]:
             raise ValueError(f"{place} has no '{absent[0]}'")
         self.robot = foreign.text(self.info.get("robot_type") or "", f"{place}: robot_type")
@@ -130,7 +137,11 @@ class _Source:
         self.features = {key: Feature(key, about, f"{place}: features: {foreign.found(key)}") for key, about in features.items()}
         self.rate = foreign.rate(self.info["fps"], f"{place}: fps")
         self.images = {key: one for key, one in self.features.items() if one.is_image}
-        self.numbers = {key: one for key, one in self.features.items() if key not in (*self.images, *_COUNTERS, *_RESULTS) and one.dtype != "string"}
+        self.numbers = {
+            key: one
+            for key, one in self.features.items()
+            if key not in (*self.images, *_COUNTERS, *_RESULTS) and one.dtype != "string"
+        }
         self._tables = _needs("pyarrow.parquet")
         self.episodes: dict[int, dict[str, Any]] = {}
         for path in sorted(root.glob("meta/episodes/*/*.parquet")):
@@ -141,7 +152,9 @@ class _Source:
                     raise ValueError(f"{path}: episode_index {index} is there twice")
                 foreign.whole(row.get("length"), f"{path}: length of episode {index}", 0, foreign.MAX_ROWS)
                 tasks = row.get("tasks")
-                if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) and len(task) <= 10_000 for task in tasks)):
+                if tasks is not None and not (
+                    isinstance(tasks, list) and all(isinstance(task, str) and len(task) <= 10_000 for task in tasks)
+                ):
                     raise ValueError(f"{path}: tasks of episode {index} is {foreign.found(tasks)}, expected a list of texts")
                 self.episodes[index] = row
         if not self.episodes:
@@ -163,8 +176,10 @@ class _Source:
             count = sum(group.column(i).num_values for group in groups for i in range(group.num_columns))
             size = sum(group.total_byte_size for group in groups)
             if about.num_rows > foreign.MAX_ROWS or count > _MAX_VALUES or size > _MAX_TABLE:
-                raise ValueError(f"{path}: has {about.num_rows} rows, {count} values and {size} bytes, "
-                                 f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}")  # fmt: skip
+                raise ValueError(
+                    f"{path}: has {about.num_rows} rows, {count} values and {size} bytes, "
+                    f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
+                )
             return self._tables.read_table(place, columns=columns)
         except Exception as error:
             raise self._damaged(path, error) from None
@@ -197,8 +212,16 @@ class _Source:
     def rows(self, index: int) -> dict[str, np.ndarray]:
         """Columns of an episode, ``[T, ...]``; images as the bytes of their files; ``task``: positions in its list of tasks."""
         episode = self.episodes[index]
-        path = self._path("data_path", index, chunk_index=episode.get("data/chunk_index"), file_index=episode.get("data/file_index"))
-        wanted = [*self.numbers, *_RESULTS, *(key for key, one in self.images.items() if one.dtype == "image"), "episode_index", "task_index"]
+        path = self._path(
+            "data_path", index, chunk_index=episode.get("data/chunk_index"), file_index=episode.get("data/file_index")
+        )
+        wanted = [
+            *self.numbers,
+            *_RESULTS,
+            *(key for key, one in self.images.items() if one.dtype == "image"),
+            "episode_index",
+            "task_index",
+        ]
         if self._read[0] != path:
             known = self._names(path)
             self._read = path, self._table(path, [name for name in wanted if name in known])
@@ -243,7 +266,9 @@ class _Source:
         positions = [tasks.index(text_of[number]) if text_of.get(number) in tasks else -1 for number in numbers]
         if -1 in positions:
             number = numbers[positions.index(-1)]
-            raise ValueError(f"{place}: task_index is {foreign.found(number)}, expected that of a task of the episode: {foreign.found(tasks)}")
+            raise ValueError(
+                f"{place}: task_index is {foreign.found(number)}, expected that of a task of the episode: {foreign.found(tasks)}"
+            )
         return np.array(positions, np.int64)
 
     def frames(self, index: int, key: str, rows: dict[str, np.ndarray]) -> Iterator[np.ndarray]:
@@ -256,7 +281,9 @@ class _Source:
         episode = self.episodes[index]
         places = {name: episode.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index")}
         path = self._path("video_path", index, video_key=foreign.plain_name(key, f"{self.root}: features"), **places)
-        first = foreign.number(episode.get(f"videos/{key}/from_timestamp"), f"{self.root}: from_timestamp of {key} in episode {index}", -1, 1e7)
+        first = foreign.number(
+            episode.get(f"videos/{key}/from_timestamp"), f"{self.root}: from_timestamp of {key} in episode {index}", -1, 1e7
+        )
         length, count = episode["length"], 0
         av = _needs("av")
         try:
@@ -270,7 +297,11 @@ class _Source:
                     if float(frame.pts * stream.time_base) < first - 0.5 / float(self.rate):
                         continue
                     feature.check_size(frame.height, frame.width, str(path))
-                    yield feature.depth(frame.to_ndarray(format="gray12le")) if feature.is_depth else frame.to_ndarray(format="rgb24")
+                    yield (
+                        feature.depth(frame.to_ndarray(format="gray12le"))
+                        if feature.is_depth
+                        else frame.to_ndarray(format="rgb24")
+                    )
                     count += 1
                     if count == length:
                         return
@@ -287,7 +318,9 @@ class Feature:
         foreign.text(key, place, 200)
         self.dtype = foreign.text(about.get("dtype"), f"{place}: dtype", 40)
         if self.dtype not in (*_TYPES, "video", "image", "string"):
-            raise ValueError(f"{place}: dtype is {foreign.found(self.dtype)}, expected one of {', '.join(_TYPES)}, video, image, string")
+            raise ValueError(
+                f"{place}: dtype is {foreign.found(self.dtype)}, expected one of {', '.join(_TYPES)}, video, image, string"
+            )
         self.is_image = self.dtype in ("video", "image")
         shape = about.get("shape")
         if not isinstance(shape, list) or not 1 <= len(shape) <= 8:
@@ -296,7 +329,11 @@ class Feature:
         if (count := math.prod(sizes)) > foreign.MAX_ROW_NUMBERS and not self.is_image:
             raise ValueError(f"{place}: shape has {count} numbers, the limit is {foreign.MAX_ROW_NUMBERS}")
         names = about.get("names")
-        names = [name for part in names.values() for name in (part if isinstance(part, list) else [part])] if isinstance(names, dict) else names
+        names = (
+            [name for part in names.values() for name in (part if isinstance(part, list) else [part])]
+            if isinstance(names, dict)
+            else names
+        )
         if names is not None and not (isinstance(names, list) and all(isinstance(name, (str, int)) for name in names)):
             raise ValueError(f"{place}: names is {foreign.found(names)}, expected a list of texts")
         self.names = [str(name)[:200] for name in names or []]
@@ -306,9 +343,14 @@ class Feature:
         self.shape: tuple[int, ...] = self._image_shape(sizes) if self.is_image else () if sizes == [1] else tuple(sizes)
         """Height and width of images, or the shape of other values."""
         if self.is_depth:
-            self._depth = [foreign.number(info.get(f"video.{name}"), f"{place}: video.{name}", 0, 1e6) for name in ("depth_min", "depth_max", "shift")]
+            self._depth = [
+                foreign.number(info.get(f"video.{name}"), f"{place}: video.{name}", 0, 1e6)
+                for name in ("depth_min", "depth_max", "shift")
+            ]
             if not self._depth[0] + self._depth[2] > 0 or not self._depth[0] < self._depth[1]:
-                raise ValueError(f"{place}: depths from {self._depth[0]} to {self._depth[1]} m with a shift of {self._depth[2]} m, expected rising values above 0")
+                raise ValueError(
+                    f"{place}: depths from {self._depth[0]} to {self._depth[1]} m with a shift of {self._depth[2]} m, expected rising values above 0"
+                )
 
     def _image_shape(self, sizes: list[int]) -> tuple[int, int]:
         """Height and width, wherever the channels are: by their name, or else by their number."""
@@ -316,17 +358,25 @@ class Feature:
             raise ValueError(f"{self._place}: shape is {sizes}, expected height, width and channels")
         if len(sizes) == 2:
             return foreign.image_shape(sizes[0], sizes[1], f"{self._place}: shape")
-        named = [i for i, name in enumerate(self.names[:3]) if name.lower() in ("channel", "channels", "c")] if len(self.names) == 3 else []
+        named = (
+            [i for i, name in enumerate(self.names[:3]) if name.lower() in ("channel", "channels", "c")]
+            if len(self.names) == 3
+            else []
+        )
         last = named[0] == 2 if named else sizes[2] in (1, 3, 4)
         if sizes[2 if last else 0] not in (1, 3, 4):
-            raise ValueError(f"{self._place}: shape is {sizes} with the names {self.names}, expected 1, 3 or 4 channels at its start or end")
+            raise ValueError(
+                f"{self._place}: shape is {sizes} with the names {self.names}, expected 1, 3 or 4 channels at its start or end"
+            )
         height, width = sizes[:2] if last else sizes[1:]
         return foreign.image_shape(height, width, f"{self._place}: shape")
 
     def check_size(self, height: int, width: int, place: str) -> None:
         """Encoders may add rows and columns, up to their block size."""
         if not (0 <= height - self.shape[0] < _BLOCK and 0 <= width - self.shape[1] < _BLOCK):
-            raise ValueError(f"{place}: has images of {height} x {width} pixels, and info.json states {self.shape[0]} x {self.shape[1]}")
+            raise ValueError(
+                f"{place}: has images of {height} x {width} pixels, and info.json states {self.shape[0]} x {self.shape[1]}"
+            )
 
     def depth(self, codes: np.ndarray) -> np.ndarray:
         near, far, shift = self._depth
@@ -404,7 +454,9 @@ class _Pose:
             raise ValueError(f"scene: MuJoCo cannot load {scene}: {error}") from None
 
         def read(file: str, folder: str) -> tuple[str, bytes]:
-            path = next((path for path in (scene.parent / folder / file, scene.parent / file, Path(file)) if path.is_file()), None)
+            path = next(
+                (path for path in (scene.parent / folder / file, scene.parent / file, Path(file)) if path.is_file()), None
+            )
             if path is None:
                 raise FileNotFoundError(f"scene: {scene} names {file}, which does not exist")
             content = path.read_bytes()
@@ -419,12 +471,18 @@ class _Pose:
         names = list(joints) if joints is not None else feature.names
         size = math.prod(feature.shape)
         scalar = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-        known = {self.model.joint(i).name: int(self.model.jnt_qposadr[i]) for i in range(self.model.njnt) if self.model.jnt_type[i] in scalar}
+        known = {
+            self.model.joint(i).name: int(self.model.jnt_qposadr[i])
+            for i in range(self.model.njnt)
+            if self.model.jnt_type[i] in scalar
+        }
         if len(names) != size:
             raise ValueError(f"joints names {len(names)} joints, but {_STATE} has {size} numbers")
         if unknown := [name for name in names if name and name not in known]:
-            raise UnknownNameError(f"{scene} has no hinge or slide joint '{unknown[0]}', the name of a number of {_STATE}; joints (--joints) gives others, "
-                                   f"of {', '.join(known)}")  # fmt: skip
+            raise UnknownNameError(
+                f"{scene} has no hinge or slide joint '{unknown[0]}', the name of a number of {_STATE}; joints (--joints) gives others, "
+                f"of {', '.join(known)}"
+            )
         self._from = [i for i, name in enumerate(names) if name]
         self._to = [known[names[i]] for i in self._from]
 
@@ -446,26 +504,37 @@ class _Writer:
         self._cameras: dict[str, np.ndarray] = {}
         names: dict[str, str] = {}
         for key, feature in source.images.items():
-            name = foreign.plain_name(key.removeprefix("observation.images.").removeprefix("observation."), f"{source.root}: features: {foreign.found(key)}")
+            name = foreign.plain_name(
+                key.removeprefix("observation.images.").removeprefix("observation."),
+                f"{source.root}: features: {foreign.found(key)}",
+            )
             name = f"{name}_depth" if feature.is_depth and not name.endswith("_depth") else name
             if name in names:
                 raise ValueError(f"{source.root}: the features {names[name]} and {key} are the same camera '{name}'")
             names[name] = key
             if feature.is_depth:
-                self._cameras[key] = streams.add(name, "float32", feature.shape, "Depth image of the camera; 0.01 m: no measurement.", video=True, unit="m")
+                self._cameras[key] = streams.add(
+                    name, "float32", feature.shape, "Depth image of the camera; 0.01 m: no measurement.", video=True, unit="m"
+                )
             else:
                 self._cameras[key] = streams.add(name, "uint8", (*feature.shape, 3), "Image of the camera.", video=True)
         self._numbers: dict[str, np.ndarray] = {}
         for key, feature in source.numbers.items():
             name = key.removeprefix("observation.")
-            place = "actions/action" if key == "action" else f"observation/{foreign.plain_name(name, f'{source.root}: features: {foreign.found(key)}')}"
+            place = (
+                "actions/action"
+                if key == "action"
+                else f"observation/{foreign.plain_name(name, f'{source.root}: features: {foreign.found(key)}')}"
+            )
             if place in names:
                 raise ValueError(f"{source.root}: the features {names[place]} and {key} are the same stream '{place}'")
             names[place] = key
             what = "Action that led to this row; 0 in the first row." if key == "action" else f"Feature {key} of the data set."
             what += f" Numbers: {', '.join(feature.names)}." if len(feature.names) > 1 else ""
             what += NOT_A_NUMBER if feature.dtype.startswith("float") else ""
-            self._numbers[key] = streams.add(place, "float32" if feature.dtype == "float16" else feature.dtype, feature.shape, what)
+            self._numbers[key] = streams.add(
+                place, "float32" if feature.dtype == "float16" else feature.dtype, feature.shape, what
+            )
         self._task = None
         if any(len(source.episodes[i].get("tasks") or []) > 1 for i in episodes):
             what = "Task of this row: its position in the list 'tasks' of obs_scene, from 0."
@@ -496,12 +565,24 @@ class _Writer:
             if self._task is not None:
                 self._task[0] = rows["task"][t] if "task" in rows else 0
             if self._pose is not None and self._state is not None:
-                self._state[0] = self._pose.state(rows[_STATE][t], float(t / source.rate), f"{source.root}: episode {index}, row {t}")
+                self._state[0] = self._pose.state(
+                    rows[_STATE][t], float(t / source.rate), f"{source.root}: episode {index}, row {t}"
+                )
             before = t - 1  # the results of this step's action
             self._recorder.append(
-                [0], [float(reward[before]) if t and reward is not None else 0.0], [bool(t and done is not None and done[before])],
-                [t == length - 1], [bool(t and success is not None and success[before])])  # fmt: skip
-        outcome = "no success: the data set has no next.success" if success is None else "success" if np.any(success[-1:]) else "no success"
+                [0],
+                [float(reward[before]) if t and reward is not None else 0.0],
+                [bool(t and done is not None and done[before])],
+                [t == length - 1],
+                [bool(t and success is not None and success[before])],
+            )
+        outcome = (
+            "no success: the data set has no next.success"
+            if success is None
+            else "success"
+            if np.any(success[-1:])
+            else "no success"
+        )
         task = ", then ".join(tasks)
         scene = {"task_description": task, "text": task, "policy_dt_ms": float(1000 / source.rate), "episode_index": index}
         self._recorder.finish_episode(0, json.dumps(scene | ({"tasks": tasks} if len(tasks) > 1 else {})), outcome)

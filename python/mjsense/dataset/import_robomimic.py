@@ -98,7 +98,9 @@ def import_robomimic(
                 options = {**OPTIONS, "house": house, "episodes": len(members)} | ({"archive": archive} if archive[0] else {})
                 writer = _Writer(part, members[0], about, rate, settings, options)
                 for i, demo in enumerate(members):
-                    writer.write(i, demo, {"task_description": about.name, "policy_dt_ms": float(1000 / rate)} | about.instruction)
+                    writer.write(
+                        i, demo, {"task_description": about.name, "policy_dt_ms": float(1000 / rate)} | about.instruction
+                    )
                     done += 1
                     if progress is not None:
                         progress(done, len(kept))
@@ -111,10 +113,16 @@ def _with_rows(path: Path, demos: list[_Demonstration]) -> list[_Demonstration]:
     if len(empty) == len(demos):
         raise ValueError(f"{path}: no demonstration has rows: {', '.join(empty[:10])}")
     if empty:
-        warnings.warn(f"{path}: {', '.join(empty[:10])} {'has' if len(empty) == 1 else 'have'} no rows, and {len(empty)} of {len(demos)} demonstrations "
-                      "are left out", stacklevel=4)  # fmt: skip
+        warnings.warn(
+            f"{path}: {', '.join(empty[:10])} {'has' if len(empty) == 1 else 'have'} no rows, and {len(empty)} of {len(demos)} demonstrations "
+            "are left out",
+            stacklevel=4,
+        )
     if short := [demo.name for demo in demos if demo.length == 1]:
-        warnings.warn(f"{path}: {', '.join(short[:10])}: one row, whose action is left out ({len(short)} of {len(demos)} demonstrations)", stacklevel=4)
+        warnings.warn(
+            f"{path}: {', '.join(short[:10])}: one row, whose action is left out ({len(short)} of {len(demos)} demonstrations)",
+            stacklevel=4,
+        )
     return [demo for demo in demos if demo.length > 0]
 
 
@@ -157,13 +165,17 @@ class _Demonstration:
         self.arrays: dict[str, Any] = {"actions": actions}
         observations: Any = foreign.group_at(demo, "obs", self.about)
         for key in observations or ():
-            self.arrays[f"obs/{foreign.plain_name(key, f'{self.about}: obs')}"] = foreign.dataset_at(observations, key, f"{self.about}: obs")
+            self.arrays[f"obs/{foreign.plain_name(key, f'{self.about}: obs')}"] = foreign.dataset_at(
+                observations, key, f"{self.about}: obs"
+            )
         for key in ("rewards", "dones", "states", "integration_states"):
             if (array := foreign.dataset_at(demo, key, self.about)) is not None:
                 self.arrays[key] = array
         for key, array in self.arrays.items():
             if len(array) != self.length:
-                raise ValueError(f"{self.about}: {key} has {len(array)} rows, and actions has {self.length}; expected the same number")
+                raise ValueError(
+                    f"{self.about}: {key} has {len(array)} rows, and actions has {self.length}; expected the same number"
+                )
             if key in ("rewards", "dones") and array.ndim != 1 and array.shape != (self.length, 1):
                 raise ValueError(f"{self.about}: {key} has the shape {[*array.shape]}, expected [{self.length}]")
         text = foreign.attribute(demo, "ep_meta", self.about)
@@ -203,7 +215,9 @@ def _stored(assets: Any, file: str, about: str) -> bytes | None:
         return None
     content = foreign.dataset_at(group, name, f"{about}: assets")
     if content.dtype != np.uint8 or content.ndim != 1:
-        raise ValueError(f"{about}: assets: {foreign.found(file)} is {content.dtype} {[*content.shape]}, expected uint8 with one dimension")
+        raise ValueError(
+            f"{about}: assets: {foreign.found(file)} is {content.dtype} {[*content.shape]}, expected uint8 with one dimension"
+        )
     return content[()].tobytes()
 
 
@@ -223,23 +237,36 @@ def _find(path: Path, file: str, folder: str, assets: str | Path | None, about: 
     for inside, candidate in candidates:
         if candidate.is_file():
             return foreign.regular_inside((inside,), candidate, about)
-    hint = "install robosuite, or pass assets= (--assets) the folder of its package" if "robosuite" in parts and assets is None else (
-        "pass assets= (--assets) the folder that contains it")  # fmt: skip
+    hint = (
+        "install robosuite, or pass assets= (--assets) the folder of its package"
+        if "robosuite" in parts and assets is None
+        else ("pass assets= (--assets) the folder that contains it")
+    )
     places = " or ".join(str(place) for place in (root, path.parent) if place is not None)
     demo = about.removeprefix(f"{path}: ")
-    raise FileNotFoundError(f"{path}: the model of {demo} names {file[:300]!r}, which does not exist in {places}; {hint}, or leave the model out "
-                            "with model=False (--without-model)")  # fmt: skip
+    raise FileNotFoundError(
+        f"{path}: the model of {demo} names {file[:300]!r}, which does not exist in {places}; {hint}, or leave the model out "
+        "with model=False (--without-model)"
+    )
 
 
 class _Writer:
     """Writes the demonstrations that share one model."""
 
     def __init__(
-        self, out: str | Path, demo: _Demonstration, about: _About, rate: Fraction, settings: dict[str, Any], options: dict[str, Any]
+        self,
+        out: str | Path,
+        demo: _Demonstration,
+        about: _About,
+        rate: Fraction,
+        settings: dict[str, Any],
+        options: dict[str, Any],
     ) -> None:
         self._model = compile_archive(demo.archive[1], demo.about) if demo.archive[0] else None
         self._streams = Rows()
-        self._rows: dict[str, tuple[np.ndarray, str]] = {}  # row to write to, and the array of the demonstration that it comes from
+        self._rows: dict[
+            str, tuple[np.ndarray, str]
+        ] = {}  # row to write to, and the array of the demonstration that it comes from
         self._turned: set[str] = set()
         for place, values in sorted(demo.arrays.items()):
             if not place.startswith("obs/"):
@@ -252,16 +279,27 @@ class _Writer:
                 shape = foreign.image_shape(values.shape[1], values.shape[2], f"{demo.about}: {place}")
                 self._add(demo, key, place, "float32", shape, "Depth image of the camera.", video=True, unit="m")
             else:
-                self._add(demo, f"observation/{key}", place, values.dtype.name, values.shape[1:], "Observation of the demonstration.")
+                self._add(
+                    demo, f"observation/{key}", place, values.dtype.name, values.shape[1:], "Observation of the demonstration."
+                )
                 continue
             if about.upside_down:
                 self._turned.add(place)
         actions = demo.arrays["actions"]
-        self._add(demo, "actions/action", "actions", actions.dtype.name, actions.shape[1:], "Action that led to this row; 0 in the first row.")
+        self._add(
+            demo,
+            "actions/action",
+            "actions",
+            actions.dtype.name,
+            actions.shape[1:],
+            "Action that led to this row; 0 in the first row.",
+        )
         self._state = None if self._model is None else self._streams.add_state(self._model)
         self._core = self._streams.recorder(out, rate, settings, options)
 
-    def _add(self, demo: _Demonstration, name: str, place: str, dtype: str, shape: tuple[int, ...], description: str, **more: Any) -> None:
+    def _add(
+        self, demo: _Demonstration, name: str, place: str, dtype: str, shape: tuple[int, ...], description: str, **more: Any
+    ) -> None:
         if name in self._rows:
             raise ValueError(f"{demo.about}: {place} and {self._rows[name][1]} are the same camera '{name}'")
         if dtype == "float16":
@@ -295,7 +333,9 @@ class _Writer:
             reward = float(rewards[t - 1]) if t else 0.0
             last = t == length - 1
             self._core.append([0], [reward], [bool(t and ended[t - 1])], [last], [reward > 0])
-        outcome = "no success: the file has no rewards" if "rewards" not in arrays else "success" if rewards[-1] > 0 else "no success"
+        outcome = (
+            "no success: the file has no rewards" if "rewards" not in arrays else "success" if rewards[-1] > 0 else "no success"
+        )
         self._core.finish_episode(0, json.dumps(scene), demo.outcome or outcome)
 
     def _check(self, demo: _Demonstration) -> None:
@@ -303,8 +343,10 @@ class _Writer:
         known = {place: row for row, place in self._rows.values()}
         for place in known.keys() | {place for place in demo.arrays if place.startswith("obs/")}:
             if place not in known or place not in demo.arrays:
-                raise ValueError(f"{demo.about}: {place} is {'missing' if place in known else 'not'} in {'this' if place in known else 'the first'} demonstration; "
-                                 "expected the same observations in all")  # fmt: skip
+                raise ValueError(
+                    f"{demo.about}: {place} is {'missing' if place in known else 'not'} in {'this' if place in known else 'the first'} demonstration; "
+                    "expected the same observations in all"
+                )
             size = known[place][0].size
             if (here := int(np.prod(demo.arrays[place].shape[1:]))) != size:
                 raise ValueError(f"{demo.about}: {place} has {here} numbers in a row, and {size} in the first demonstration")
@@ -318,7 +360,9 @@ class _Writer:
             return _finite(whole[()], f"{demo.about}: integration_states")
         stored, size = demo.arrays["states"], 1 + model.nq + model.nv
         if stored.shape[1:] != (size,):
-            raise ValueError(f"{demo.about}: states have {int(np.prod(stored.shape[1:]))} numbers; time, qpos and qvel of its model are {size}")
+            raise ValueError(
+                f"{demo.about}: states have {int(np.prod(stored.shape[1:]))} numbers; time, qpos and qvel of its model are {size}"
+            )
         states = _finite(stored[()], f"{demo.about}: states")
         data, result = mujoco.MjData(model), np.empty((len(states), place.shape[1]))
         for t, state in enumerate(states):

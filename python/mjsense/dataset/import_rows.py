@@ -40,7 +40,9 @@ class Rows(WrittenRows):
     def add_state(self, model: mujoco.MjModel) -> np.ndarray:
         """Declares the data for replay. Returns the array ``[1, nstate]`` to write MuJoCo's states to, in the order of mjSTATE_INTEGRATION."""
         size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
-        state = self.add("replay/state", "float64", (size,), "MuJoCo's state, in the order of mjSTATE_INTEGRATION.", frame="world")
+        state = self.add(
+            "replay/state", "float64", (size,), "MuJoCo's state, in the order of mjSTATE_INTEGRATION.", frame="world"
+        )
         self.add("replay/written", "float64", (size,), _WRITTEN, frame="world")[:] = np.nan
         return state
 

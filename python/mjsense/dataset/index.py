@@ -50,7 +50,9 @@ def _check_columns(path: Path, file: Any) -> None:
     expected = {**dict.fromkeys(_TEXTS, ("string",)), **dict.fromkeys(_NUMBERS, ("int64", "uint64")), "success": ("bool",)}
     for name, kinds in expected.items():
         if types.get(name) not in kinds:
-            raise ValueError(f"{path}: the column '{name}' is {printable(types.get(name, 'missing')[:100])}; it must be {' or '.join(kinds)}")
+            raise ValueError(
+                f"{path}: the column '{name}' is {printable(types.get(name, 'missing')[:100])}; it must be {' or '.join(kinds)}"
+            )
     if metadata.num_rows > EPISODES:
         raise ValueError(f"{path} has {metadata.num_rows} rows, more than {EPISODES}")
     for group in range(metadata.num_row_groups):

@@ -52,7 +52,9 @@ def decode(rows: np.ndarray, what: str = "a row") -> dict[str, tuple[np.ndarray,
     """
     columns: dict[str, tuple[list[int], list[Any]]] = {}
     for t, row in enumerate(rows):
-        for path, value in _leaves(bounded_json.parse_object(row.tobytes().rstrip(b"\0") or b"{}", f"{what} row {t}", JSON_ROW_BYTES), ""):
+        for path, value in _leaves(
+            bounded_json.parse_object(row.tobytes().rstrip(b"\0") or b"{}", f"{what} row {t}", JSON_ROW_BYTES), ""
+        ):
             if value == []:
                 continue
             if path not in columns:

@@ -32,8 +32,27 @@ MAX_NUMBERS = 1 << 26
 """Of one array of an episode; it has 512 MiB."""
 MAX_SUBSTEPS = 100_000
 _INVERSES = ("invweight0", "acc0")
-_PARTS = ("qpos0", "qpos_spring", "body_", "jnt_", "dof_", "geom_", "site_", "cam_", "light_", "flex_", "flexedge_", "mat_", "pair_", "eq_", "tendon_",
-          "wrap_prm", "actuator_", "sensor_", "key_")  # fmt: skip
+_PARTS = (
+    "qpos0",
+    "qpos_spring",
+    "body_",
+    "jnt_",
+    "dof_",
+    "geom_",
+    "site_",
+    "cam_",
+    "light_",
+    "flex_",
+    "flexedge_",
+    "mat_",
+    "pair_",
+    "eq_",
+    "tendon_",
+    "wrap_prm",
+    "actuator_",
+    "sensor_",
+    "key_",
+)
 """Beginnings of the names of fields that may differ between worlds."""
 _BOXES = "bvh_aabb"
 """The boxes of bodies contain objects that are larger in an episode. Of the others, which fields name as structure, this is the only one."""
@@ -100,8 +119,13 @@ def _packed(shape: tuple[int, ...]) -> tuple[int, ...]:
     return shape[:-1] if len(shape) > 1 and shape[-1] == 1 else shape
 
 
-INPUTS = {"state": ("float64", 2, False), "written": ("float64", 2, True), "ctrl": ("float64", 3, False), "mocap": ("float64", 4, False),
-          "held": ("int32", 1, False)}  # fmt: skip
+INPUTS = {
+    "state": ("float64", 2, False),
+    "written": ("float64", 2, True),
+    "ctrl": ("float64", 3, False),
+    "mocap": ("float64", 4, False),
+    "held": ("int32", 1, False),
+}
 """Arrays of ``replay/``: type, number of dimensions, and whether NaN has a meaning. All but ``held`` have a row per observation; no step led to
 row 0, whose controls and poses have none."""
 
@@ -113,7 +137,12 @@ def read_input(group: Mapping[str, Any], name: str, length: int, about: str) -> 
     dataset, (dtype, dimensions, with_nan) = group[name], INPUTS[name]
     shape: list[int] = [*getattr(dataset, "shape", ())]
     rows = shape[0] if name == "held" and shape else length
-    if getattr(dataset, "dtype", None) != dtype or len(shape) != dimensions or shape[0] != rows or (name == "mocap" and shape[3] != 7):
+    if (
+        getattr(dataset, "dtype", None) != dtype
+        or len(shape) != dimensions
+        or shape[0] != rows
+        or (name == "mocap" and shape[3] != 7)
+    ):
         expected = f"{dtype} with {dimensions} dimensions" + ("" if name == "held" else f" and {length} rows")
         raise ValueError(f"{about}: replay/{name}: is {getattr(dataset, 'dtype', 'a group')} {shape}, expected {expected}")
     if (count := math.prod(shape)) > MAX_NUMBERS:
@@ -121,7 +150,11 @@ def read_input(group: Mapping[str, Any], name: str, length: int, about: str) -> 
     values = dataset[()]
     low, high = (np.fmin, np.fmax) if with_nan else (np.minimum, np.maximum)
     used = values[1:] if name in ("ctrl", "mocap") else values
-    if dtype == "float64" and used.size and not (abs(low.reduce(used, None)) <= MAX_STATE and abs(high.reduce(used, None)) <= MAX_STATE):
+    if (
+        dtype == "float64"
+        and used.size
+        and not (abs(low.reduce(used, None)) <= MAX_STATE and abs(high.reduce(used, None)) <= MAX_STATE)
+    ):
         wrong = ~(np.abs(values) <= MAX_STATE) & ~(np.isnan(values) & with_nan)
         wrong[: len(values) - len(used)] = False
         if wrong.any():
@@ -139,8 +172,10 @@ def check_inputs(inputs: ReplayInputs, model: mujoco.MjModel, size: int, substep
     """
     found = inputs.state.shape[1]
     if found != size:
-        raise ValueError(f"{about}: the recorded state has {found} numbers, that of MuJoCo {'.'.join(map(str, libmujoco.SERIES))} has {size}. "
-                         "Replay needs a MuJoCo of the series that recorded.")  # fmt: skip
+        raise ValueError(
+            f"{about}: the recorded state has {found} numbers, that of MuJoCo {'.'.join(map(str, libmujoco.SERIES))} has {size}. "
+            "Replay needs a MuJoCo of the series that recorded."
+        )
     if inputs.written.shape != inputs.state.shape:
         raise ValueError(f"{about}: replay/written has the shape {[*inputs.written.shape]}, expected {[*inputs.state.shape]}")
     if not 0.51 <= substeps <= MAX_SUBSTEPS:
@@ -154,6 +189,8 @@ def check_inputs(inputs: ReplayInputs, model: mujoco.MjModel, size: int, substep
     if nu != model.nu:
         raise ValueError(f"{about}: replay/ctrl has {nu} controls, expected {model.nu}")
     if ticks < 1 or round(substeps) % ticks:
-        raise ValueError(f"{about}: replay/ctrl has {ticks} control ticks, expected a divisor of the {round(substeps)} physics steps of a row")
+        raise ValueError(
+            f"{about}: replay/ctrl has {ticks} control ticks, expected a divisor of the {round(substeps)} physics steps of a row"
+        )
     if inputs.mocap is not None and inputs.mocap.shape[1:3] != (ticks, model.nmocap):
         raise ValueError(f"{about}: replay/mocap has the shape {[*inputs.mocap.shape]}, expected [T, {ticks}, {model.nmocap}, 7]")

@@ -27,9 +27,25 @@ MAX_LENGTH_WORK = 300_000_000
 
 _FACTORS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
 _DOFS = {"free": 6, "ball": 3}
-_ACTUATORS = {"general", "motor", "position", "velocity", "intvelocity", "orientation", "pid", "damper", "cylinder", "muscle", "adhesion", "dcmotor", "plugin"}
+_ACTUATORS = {
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "orientation",
+    "pid",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+    "dcmotor",
+    "plugin",
+}
 _LIMITS: dict[str, dict[str, int]] = {
-    "option": dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints"), 10_000),
+    "option": dict.fromkeys(
+        ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints"), 10_000
+    ),
     "size": {"njmax": 10_000_000, "nconmax": 1_000_000, "nstack": MAX_ARENA // 8, "nuserdata": 1_000_000, "nkey": 10_000},
     "numeric": {"size": 1_000_000},
     "user": {"dim": 1_000_000},
@@ -115,7 +131,9 @@ class _Sizes:
         for size in root.iter("size"):
             match = re.fullmatch(r"\s*(?:-1|(\d{1,12})([KMGTPE]?))\s*", size.get("memory", "-1"), re.IGNORECASE)
             if match is None:
-                self._fail("memory of 'size'", repr(size.get("memory", "")[:60]), "a whole number of bytes, perhaps with K, M or G")
+                self._fail(
+                    "memory of 'size'", repr(size.get("memory", "")[:60]), "a whole number of bytes, perhaps with K, M or G"
+                )
             elif match[1] and int(match[1]) * _FACTORS[match[2].upper()] > MAX_ARENA:
                 self._fail("memory of 'size'", size.get("memory"), f"{MAX_ARENA} bytes")
         for lengths in root.iter("lengthrange"):
@@ -131,7 +149,11 @@ class _Sizes:
         steps = 1000.0
         for lengths in root.iter("lengthrange"):
             steps = float(lengths.get("inttotal", "10")) / float(lengths.get("timestep", "0.01"))
-        muscles = sum("lengthrange" not in one.attrib for one in root.iter() if one.tag == "muscle" or "muscle" in (one.get("gaintype"), one.get("biastype")))
+        muscles = sum(
+            "lengthrange" not in one.attrib
+            for one in root.iter()
+            if one.tag == "muscle" or "muscle" in (one.get("gaintype"), one.get("biastype"))
+        )
         if (work := 2 * muscles * steps * self._elements) > MAX_LENGTH_WORK:
             self._fail("the work for the length ranges of muscles (elements x steps)", f"{work:g}", MAX_LENGTH_WORK)
 
@@ -141,7 +163,9 @@ class _Sizes:
             if element.tag not in ("texture", "hfield"):
                 continue
             files = [self._members[element.attrib[key]] for key in element.attrib if key.startswith("file")]
-            channels = self._value(element, "nchannel", 3) if element.tag == "texture" else 4  # a number of a height field has 4 bytes
+            channels = (
+                self._value(element, "nchannel", 3) if element.tag == "texture" else 4
+            )  # a number of a height field has 4 bytes
             for content in files:
                 width, height = image_size(content)
                 total += max(width * height * channels, len(content))
@@ -152,7 +176,11 @@ class _Sizes:
             elif not files:
                 total += self._value(element, "nrow", 0) * self._value(element, "ncol", 0) * channels
             if total > MAX_PIXELS:
-                self._fail(f"the size of the textures and height fields up to the {element.tag} '{element.get('name', '')[:80]}'", f"{total} bytes", MAX_PIXELS)
+                self._fail(
+                    f"the size of the textures and height fields up to the {element.tag} '{element.get('name', '')[:80]}'",
+                    f"{total} bytes",
+                    MAX_PIXELS,
+                )
 
     def _check_meshes(self, root: Element) -> None:
         for mesh in root.iter("mesh"):
@@ -164,7 +192,11 @@ class _Sizes:
                 product = math.inf
             deep = 4.0**product if mesh.get("builtin") in ("sphere", "hemisphere") and product < 20 else product
             if not deep <= 1_000_000:
-                self._fail(f"the product of params of the mesh '{mesh.get('name', '')[:80]}'", repr(mesh.get("params", "")[:60]), "10 subdivisions or 1,000,000")
+                self._fail(
+                    f"the product of params of the mesh '{mesh.get('name', '')[:80]}'",
+                    repr(mesh.get("params", "")[:60]),
+                    "10 subdivisions or 1,000,000",
+                )
 
     def _tree(self, element: Element, copies: int, above: int) -> int:
         """Counts the elements below, each ``copies`` times, and the numbers of the inertia matrix. Returns the degrees of freedom.
@@ -174,11 +206,19 @@ class _Sizes:
         if element.tag in ("replicate", "composite", "flexcomp"):
             copies *= max(1, self._value(element, "count", 1))
             if element.tag == "replicate" and copies > self._max_copies:
-                self._fail("the number of copies by replicate", copies, f"{self._max_copies}{' with sensors' if self._max_copies < MAX_COPIES else ''}")
+                self._fail(
+                    "the number of copies by replicate",
+                    copies,
+                    f"{self._max_copies}{' with sensors' if self._max_copies < MAX_COPIES else ''}",
+                )
         self._elements += copies * (10 if element.tag in ("composite", "flexcomp") else 1)
         if self._elements > MAX_ELEMENTS:
             self._fail("the number of elements after replicate and composite", self._elements, MAX_ELEMENTS)
-        own = sum(_DOFS.get(joint.get("type", "hinge"), 1) if joint.tag == "joint" else 6 for joint in element if joint.tag in ("joint", "freejoint"))
+        own = sum(
+            _DOFS.get(joint.get("type", "hinge"), 1) if joint.tag == "joint" else 6
+            for joint in element
+            if joint.tag in ("joint", "freejoint")
+        )
         if element.tag == "composite":
             own += 3
         self._add(copies * own * (above + own), "the inertia matrix")
@@ -196,14 +236,21 @@ class _Sizes:
                 for element in section:
                     numbers = dofs if tag == "tendon" else 1
                     if element.tag == "rangefinder" and "camera" in element.attrib:
-                        pixels = [self._value(camera, "resolution", 1) for camera in root.iter("camera") if camera.get("name") == element.get("camera")]
+                        pixels = [
+                            self._value(camera, "resolution", 1)
+                            for camera in root.iter("camera")
+                            if camera.get("name") == element.get("camera")
+                        ]
                         numbers = 8 * max(pixels, default=self._defaults.get(("camera", "resolution"), 1))
                     elif element.tag == "numeric":
                         numbers = self._value(element, "size", 1)
                     elif tag == "sensor":
                         numbers = 16 * self._value(element, "dim", 1) * self._value(element, "num", 1)
                     history = self._defaults_of_actuators() if element.tag in _ACTUATORS else 1
-                    self._add(numbers * max(1, self._value(element, "nsample", 1), history), f"the {tag} '{element.get('name', '')[:80]}'")
+                    self._add(
+                        numbers * max(1, self._value(element, "nsample", 1), history),
+                        f"the {tag} '{element.get('name', '')[:80]}'",
+                    )
         for config in root.iter("config"):
             for word in config.get("value", "").split():
                 if re.fullmatch(r"[+-]?\d+", word) and abs(int(word[:20])) > 1000 and config.get("key") == "size":

@@ -22,13 +22,39 @@ else:
     mujoco = libmujoco.shared
 
 # Element lists of mjSpec by the prefix of their fields in mjModel. Fields and attributes have the same names, except those in _RENAMED.
-_ELEMENTS = {"body": "bodies", "geom": "geoms", "jnt": "joints", "site": "sites", "cam": "cameras", "light": "lights", "mat": "materials",
-             "actuator": "actuators", "eq": "equalities", "tendon": "tendons"}  # fmt: skip
+_ELEMENTS = {
+    "body": "bodies",
+    "geom": "geoms",
+    "jnt": "joints",
+    "site": "sites",
+    "cam": "cameras",
+    "light": "lights",
+    "mat": "materials",
+    "actuator": "actuators",
+    "eq": "equalities",
+    "tendon": "tendons",
+}
 _RENAMED = {"eq_data": "data", "eq_active0": "active", "actuator_ctrlrange": "ctrlrange"}
 # The compiler computes these from the others.
-_DERIVED = {"body_invweight0", "body_subtreemass", "bvh_aabb", "dof_M0", "dof_invweight0", "geom_aabb", "geom_rbound", "actuator_acc0",
-            "actuator_length0", "tendon_length0", "tendon_invweight0", "cam_pos0", "cam_poscom0", "cam_mat0", "light_pos0",
-            "light_poscom0", "light_dir0"}  # fmt: skip
+_DERIVED = {
+    "body_invweight0",
+    "body_subtreemass",
+    "bvh_aabb",
+    "dof_M0",
+    "dof_invweight0",
+    "geom_aabb",
+    "geom_rbound",
+    "actuator_acc0",
+    "actuator_length0",
+    "tendon_length0",
+    "tendon_invweight0",
+    "cam_pos0",
+    "cam_poscom0",
+    "cam_mat0",
+    "light_pos0",
+    "light_poscom0",
+    "light_dir0",
+}
 _INERTIAL = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH) if mujoco else -1
 
@@ -82,7 +108,9 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
                 _set(element, _RENAMED.get(field, name), new[i])
     result = _exact_xml(spec)
     compiled = mujoco.MjModel.from_xml_string(result, assets)
-    if wrong := [field for field in changed if not np.allclose(field_of(compiled, field), field_of(model, field), rtol=1e-5, atol=1e-8)]:
+    if wrong := [
+        field for field in changed if not np.allclose(field_of(compiled, field), field_of(model, field), rtol=1e-5, atol=1e-8)
+    ]:
         raise ValueError(f"{playback.where(episode)}: MJCF cannot express its {', '.join(wrong)}")
     return result, assets
 

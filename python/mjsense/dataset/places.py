@@ -19,7 +19,10 @@ def is_plain_name(name: str) -> bool:
     """Whether this is a file name without a folder: not empty, without a separator and control characters, and not ``.`` or ``..``."""
     if not name or name in (".", "..") or "/" in name or len(name) > NAME_BYTES:
         return False
-    return all(ord(c) >= 0x20 and not 0x7F <= ord(c) < 0xA0 and not 0xD800 <= ord(c) < 0xE000 for c in name) and len(name.encode()) <= NAME_BYTES
+    return (
+        all(ord(c) >= 0x20 and not 0x7F <= ord(c) < 0xA0 and not 0xD800 <= ord(c) < 0xE000 for c in name)
+        and len(name.encode()) <= NAME_BYTES
+    )
 
 
 def printable(text: str) -> str:
@@ -73,7 +76,11 @@ def open_plain(path: Path) -> PlainFile:
         raise IsADirectoryError(f"{path}: is a directory, not a file")
     if not stat.S_ISREG(about.st_mode):
         wrong = f"is {next((kind for test, kind in _KINDS if test(about.st_mode)), 'a device')}, not a file"
-    elif about.st_size > SPARSE_FREE and about.st_size > SPARSE_RATIO * 512 * about.st_blocks and _has_hole(descriptor, about.st_size):
+    elif (
+        about.st_size > SPARSE_FREE
+        and about.st_size > SPARSE_RATIO * 512 * about.st_blocks
+        and _has_hole(descriptor, about.st_size)
+    ):
         wrong = f"declares {about.st_size} bytes but stores {512 * about.st_blocks}: it is not read"
     if wrong:
         os.close(descriptor)

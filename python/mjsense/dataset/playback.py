@@ -25,6 +25,7 @@ else:
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION) if libmujoco.shared else 0
 
+
 def where(episode: EpisodeRows) -> str:
     return f"episode {episode.index} ({episode.path.name}, {episode.trajectory})"
 
@@ -37,7 +38,9 @@ def inputs_of(episode: EpisodeRows) -> ReplayInputs:
     with open_h5(episode.path) as file:
         group = file[episode.trajectory].get("replay")
         if group is None and "env" in episode.settings:
-            raise ValueError(f"{where(episode)} has no data for replay: the environment '{episode.settings['env']}' is not simulated by mjsense")
+            raise ValueError(
+                f"{where(episode)} has no data for replay: the environment '{episode.settings['env']}' is not simulated by mjsense"
+            )
         if group is None:
             raise ValueError(
                 f"{where(episode)} has no data for replay. Record it again without --no-replay (replay=False); "
@@ -73,7 +76,9 @@ def archive_of(episode: EpisodeRows) -> Path:
         raise ValueError(f"{where(episode)}: the attribute 'recording' names no model_archive")
     path = episode.path.parent / name
     if not path.exists():
-        raise FileNotFoundError(f"{where(episode)} needs the model archive {path}, which is missing; copy it from the recording's folder")
+        raise FileNotFoundError(
+            f"{where(episode)} needs the model archive {path}, which is missing; copy it from the recording's folder"
+        )
     return path
 
 

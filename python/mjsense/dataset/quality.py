@@ -54,13 +54,19 @@ def kept_rows(episode: EpisodeRows) -> list[int]:
     """Rows of the observations that :meth:`Episode.trimmed` leaves."""
     actors = [name for name in episode.streams if name.startswith("env_states/actors/")]
     joints = [name for name in episode.streams if name.startswith("obs/agent/qpos/")]
-    poses = [np.nan_to_num(episode[name].reshape(episode.length, -1)[:, :7].astype(float)) for name in actors]  # NaN: the object is absent
+    poses = [
+        np.nan_to_num(episode[name].reshape(episode.length, -1)[:, :7].astype(float)) for name in actors
+    ]  # NaN: the object is absent
     slow = _SLOW / float(episode.fps)
     still = idle_steps(episode)
     for pose in poses:
         still[1:] &= (np.abs(np.diff(pose, axis=0)) <= slow).all(1)
     moving = np.flatnonzero(~still)
-    positions = np.concatenate([*poses, *(episode[name].reshape(episode.length, -1) for name in joints)], 1) if joints else np.zeros((episode.length, 0))
+    positions = (
+        np.concatenate([*poses, *(episode[name].reshape(episode.length, -1) for name in joints)], 1)
+        if joints
+        else np.zeros((episode.length, 0))
+    )
     kept = [0]
     for t in range(1, episode.length):
         if not still[t] or t > moving[-1] or np.abs(positions[t] - positions[kept[-1]]).max() > _DRIFT:
@@ -72,7 +78,11 @@ def quality_of(episode: EpisodeRows) -> EpisodeQuality:
     idle = idle_steps(episode)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(int), [0]])))
     waits = edges[1::2] - edges[::2]
-    tools = [episode[name] for name, stream in episode.streams.items() if name.startswith("obs/extra/tcp_pose") and stream.shape == _POSE]
+    tools = [
+        episode[name]
+        for name, stream in episode.streams.items()
+        if name.startswith("obs/extra/tcp_pose") and stream.shape == _POSE
+    ]
     jerks = [np.diff(tool[:, :3].astype(float), 3, axis=0) * float(episode.fps) ** 3 for tool in tools if len(tool) > 3]
     visibility: dict[str, dict[str, float]] = {}
     for name in episode.streams:

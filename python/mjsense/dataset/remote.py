@@ -43,9 +43,14 @@ class Remote:
         if folder.exists():
             return
         system, root = open_address(self.address)
-        source, part = f"{root}/{folder.relative_to(self.local)}".rstrip("/."), folder.with_name(f"{folder.name}.{os.getpid()}.part")
+        source, part = (
+            f"{root}/{folder.relative_to(self.local)}".rstrip("/."),
+            folder.with_name(f"{folder.name}.{os.getpid()}.part"),
+        )
         if not (found := [str(file) for file in system.find(source)]):
-            raise FileNotFoundError(f"{self.address}/{folder.relative_to(self.local)} does not exist, but the index of the recording names it")
+            raise FileNotFoundError(
+                f"{self.address}/{folder.relative_to(self.local)} does not exist, but the index of the recording names it"
+            )
         shutil.rmtree(part, ignore_errors=True)
         names = [_below(source, file, self.address) for file in found]
         for file, name in zip(found, names):
@@ -64,7 +69,9 @@ def _below(folder: str, key: str, address: str) -> str:
     """The path of an object in a folder: keys of object storage may contain ``..`` and empty names, which leave the folder."""
     name = key[len(folder) + 1 :]
     if not key.startswith(f"{folder}/") or not all(map(is_plain_name, name.split("/"))):
-        raise ValueError(f"{address}: the object '{printable(key[-200:])}' is not named as a file of the folder '{printable(folder[-200:])}'; nothing was copied")
+        raise ValueError(
+            f"{address}: the object '{printable(key[-200:])}' is not named as a file of the folder '{printable(folder[-200:])}'; nothing was copied"
+        )
     return name
 
 
@@ -90,7 +97,11 @@ def resolved(root: str | Path) -> tuple[Path, Remote | None]:
         version = repr(sorted((name, about.get("size")) for name, about in files.items())).encode()
     cache = Path(os.environ.get("MJSENSE_CACHE") or Path.home() / ".cache/mjsense")
     name = base.rsplit("/", 1)[-1]
-    local = cache / hashlib.sha256(address.encode() + b"\0" + version).hexdigest()[:16] / (name if is_plain_name(name) else "recording")
+    local = (
+        cache
+        / hashlib.sha256(address.encode() + b"\0" + version).hexdigest()[:16]
+        / (name if is_plain_name(name) else "recording")
+    )
     remote = Remote(address, local)
     if INDEX not in small:
         local.parent.mkdir(parents=True, exist_ok=True)

@@ -36,7 +36,12 @@ def _recording_options() -> dict[str, dict[str, Any]]:
     structs = json.loads(_core.schema())["structs"]
     fields = {field["name"] for field in structs["CameraSensorCfg"]["fields"]} - {"width", "height"}
     options = {option["name"]: option for option in structs["RecordJobCfg"]["fields"]}
-    return {name: {**option, "camera": field} for name, option in options.items() for field in (name, f"use_{name}") if field in fields}
+    return {
+        name: {**option, "camera": field}
+        for name, option in options.items()
+        for field in (name, f"use_{name}")
+        if field in fields
+    }
 
 
 def image_options() -> dict[str, str]:
@@ -87,7 +92,11 @@ class RenderCamera:
 
     def settings(self) -> dict[str, Any]:
         """Its entry in ``cameras`` of the recording's settings."""
-        return {key: value for key, value in asdict(self).items() if key not in ("segmentation", "camera", "body", "pos", "quat", "fovy") or value}
+        return {
+            key: value
+            for key, value in asdict(self).items()
+            if key not in ("segmentation", "camera", "body", "pos", "quat", "fovy") or value
+        }
 
 
 def recorded_cameras(episode: Episode, names: Sequence[str] | None) -> list[RenderCamera]:
@@ -150,13 +159,22 @@ def added_camera(name: str, given: Mapping[str, Any], size: tuple[int, int]) -> 
         if not np.linalg.norm(quat) > 1e-9:
             raise ValueError(f"camera '{name}': quat is zero")
     else:
-        quat = _looking(name, pos, _vector(name, "lookat", given["lookat"], 3), _vector(name, "up", given.get("up", (0, 0, 1)), 3))
+        quat = _looking(
+            name, pos, _vector(name, "lookat", given["lookat"], 3), _vector(name, "up", given.get("up", (0, 0, 1)), 3)
+        )
     fovy = given.get("fovy")
     return RenderCamera(
-        name, int(given.get("width", size[0])), int(given.get("height", size[1])), bool(given.get("depth", False)),
-        bool(given.get("segmentation", False)), "", str(given.get("body") or ""), tuple(pos.tolist()), tuple(quat.tolist()),
+        name,
+        int(given.get("width", size[0])),
+        int(given.get("height", size[1])),
+        bool(given.get("depth", False)),
+        bool(given.get("segmentation", False)),
+        "",
+        str(given.get("body") or ""),
+        tuple(pos.tolist()),
+        tuple(quat.tolist()),
         None if fovy is None else float(fovy),
-    )  # fmt: skip
+    )
 
 
 class CameraSystem:
@@ -167,7 +185,9 @@ class CameraSystem:
         if not robot:
             raise ValueError(f"camera_system '{name}': {episode.path} was recorded without a robot; use add_cameras")
         if not is_known_thing(robot):
-            raise ValueError(f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from a recording; use add_cameras")
+            raise ValueError(
+                f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from a recording; use add_cameras"
+            )
         self._robot = _core.Robot(robot)
         self._system = _core.CameraSystem(name, self._robot.file, ROBOT_PREFIX, self._robot.base)
         self.cameras: list[RenderCamera] = []

@@ -16,6 +16,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.arguments import checked
+from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import line_of
 from mjsense.dataset import render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
@@ -93,14 +94,19 @@ class _Playing:
 class _House:
     """Renders the episodes of one house."""
 
-    def __init__(self, episodes: list[Episode], others: list[int], out: Path, options: dict[str, Any], progress: _Progress) -> None:
+    def __init__(
+        self, episodes: list[Episode], others: list[int], out: Path, options: dict[str, Any], progress: _Progress
+    ) -> None:
         self._episodes, self._progress = episodes, progress
         first = episodes[0]
         archive_of(first)  # raises an error with the reason if the recording has no data for replay
         cameras, self._system, unchanged = render_cameras.choose(
-            first, options["cameras"], options["add_cameras"], options["camera_system"],
+            first,
+            options["cameras"],
+            options["add_cameras"],
+            options["camera_system"],
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
-        )  # fmt: skip
+        )
         settings = first._recording.settings
         images = render_cameras.recorded_images(settings)
         given = {name: options[name] for name in (*images, "brightness", "crf", "preset") if options.get(name) is not None}
@@ -112,25 +118,39 @@ class _House:
         self._frames = sum(1 + camera.depth for camera in new_cameras)
         handles = self._make_worlds(new_cameras, images, brightness, options)
         self._skip = _replaced_streams(first, copied)
-        changed = {"cameras": [camera.settings() for camera in cameras], **images,
-                   "render": {"of": first._recording.provenance, "carried": _carried_streams(first, self._skip), "episodes": [episode.number for episode in episodes],
-                              "brightness": brightness, "camera_system": options["camera_system"]}}  # fmt: skip
+        changed = {
+            "cameras": [camera.settings() for camera in cameras],
+            **images,
+            "render": {
+                "of": first._recording.provenance,
+                "carried": _carried_streams(first, self._skip),
+                "episodes": [episode.number for episode in episodes],
+                "brightness": brightness,
+                "camera_system": options["camera_system"],
+            },
+        }
         self._recorder = self._make_recorder(out, handles, settings | changed, options)
         self.path = Path(self._recorder.path)
         for number in () if self._recorder.enough else others:
             if not self._recorder.decided(number):
                 self._recorder.skip_episode(number, "not in the rendering")
 
-    def _make_worlds(self, cameras: list[RenderCamera], images: dict[str, Any], brightness: float, options: dict[str, Any]) -> list[Any]:
+    def _make_worlds(
+        self, cameras: list[RenderCamera], images: dict[str, Any], brightness: float, options: dict[str, Any]
+    ) -> list[Any]:
         """Makes the simulation with the cameras and sensors. Returns the handles of the streams to record."""
         first, sensors = self._episodes[0], list(options["sensors"])
         suite_sensors = [sensor for sensor in sensors if isinstance(sensor, CoreSensor)]
         scene_sensors = [sensor for sensor in sensors if not isinstance(sensor, CoreSensor)]
         views = [camera.scene_sensor(images) for camera in cameras]
         self._worlds = EpisodeWorlds(
-            first, min(options["worlds"], len(self._episodes)), [*views, *scene_sensors],
-            edit=options["edit"], brightness=brightness, threads=options["threads"],
-        )  # fmt: skip
+            first,
+            min(options["num_worlds"], len(self._episodes)),
+            [*views, *scene_sensors],
+            edit=options["edit"],
+            brightness=brightness,
+            threads=options["threads"],
+        )
         if self._system:
             self._system.bind(self._worlds)
         own = [self._worlds.scene[_key_of(sensor)] for sensor in scene_sensors]
@@ -138,16 +158,24 @@ class _House:
         self._sensors, handles = recorded_sensors(self._worlds.sim, [*streams, *own, *suite_sensors])
         for handle in handles:
             if handle.has_memory:
-                raise ValueError(f"sensor '{handle.name}' depends on the physics steps between observations (air time, history, delays); "
-                                 "render computes sensors from the recorded states only")  # fmt: skip
+                raise ValueError(
+                    f"sensor '{handle.name}' depends on the physics steps between observations (air time, history, delays); "
+                    "render computes sensors from the recorded states only"
+                )
         return handles
 
     def _make_recorder(self, out: Path, handles: list[Any], settings: dict[str, Any], options: dict[str, Any]) -> Any:
         """The recorder of the new recording, whose other options are those of the old one."""
         first, sim = self._episodes[0], self._worlds.sim
         description, archive, rate = first._recording, archive_of(first), Fraction(first.fps)
-        files = FILE_OPTIONS | {"episodes": len(self._episodes), "resume": options["resume"], "house": first.house or 0, "batches": options["batches"],
-                                "gzip": description.gzip, "archive": (archive.name, archive.read_bytes())}  # fmt: skip
+        files = FILE_OPTIONS | {
+            "episodes": len(self._episodes),
+            "resume": options["resume"],
+            "house": first.house or 0,
+            "batches": options["batches"],
+            "gzip": description.gzip,
+            "archive": (archive.name, archive.read_bytes()),
+        }
         video = (description.video or {}) | {key: options[key] for key in ("crf", "preset") if options[key] is not None}
         use_installed_ffmpeg()
         text = json.dumps(settings, sort_keys=True, separators=(",", ":"))
@@ -210,7 +238,9 @@ def _carried_streams(episode: Episode, replaced: list[str]) -> list[str]:
     listed = [*_texts(stated.get("streams")), *(_texts(rendered.get("carried")) if isinstance(rendered, dict) else ())]
 
     def is_replaced(entry: str) -> bool:
-        name = entry[: entry.rfind("(")].rpartition(" ")[0].replace("sensor_param_", "obs/sensor_param/", 1)  # of "qpos uint8(2000,)"
+        name = (
+            entry[: entry.rfind("(")].rpartition(" ")[0].replace("sensor_param_", "obs/sensor_param/", 1)
+        )  # of "qpos uint8(2000,)"
         places = [name] if name.startswith("obs/") else [f"obs/extra/{name}", f"obs/sensor_data/{name.replace('/', '_')}"]
         return any(place == prefix or place.startswith(f"{prefix}/") for place in places for prefix in replaced)
 
@@ -225,6 +255,7 @@ def _key_of(sensor: Any) -> str:
     return getattr(sensor, "prefixed_name", None) or getattr(sensor, "uuid", None) or sensor.name
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def render(
     root: str | Path | Dataset,
@@ -245,7 +276,7 @@ def render(
     sensors: Callable[[], Iterable[Any]] | Iterable[Any] = (),
     copy: bool = True,
     episodes: Sequence[int] | None = None,
-    worlds: int = 4,
+    num_worlds: int = 4,
     threads: int = 0,
     batches: int = 0,
     crf: int | None = None,
@@ -279,7 +310,7 @@ def render(
             with several houses, a function that makes them for each house. One with the name of a recorded stream replaces it.
         copy: Copy the videos of recorded cameras of which no option changes the images. False: render them again, with the same result.
         episodes: Positions of episodes in the recording; by default all.
-        worlds: Number of episodes that are rendered in parallel.
+        num_worlds: Number of episodes that are rendered in parallel.
         threads: Number of threads; 0: one per available CPU.
         batches: Number of HDF5 files over which the episodes of a house are distributed; 0: one per four episodes.
         crf, preset: Quality and speed of the video encoder; by default as recorded.
@@ -288,11 +319,27 @@ def render(
             stderr is a terminal or a notebook.
     """
     options: dict[str, Any] = {
-        "cameras": cameras, "add_cameras": add_cameras or {}, "camera_system": camera_system, "width": width, "height": height, "depth": depth,
-        "segmentation": segmentation, "shadows": shadows, "samples": samples, "shadow_samples": shadow_samples, "brightness": brightness, "edit": edit, "copy": copy,
-        "worlds": worlds, "threads": threads, "batches": batches, "crf": crf, "preset": preset, "resume": resume,
-    }  # fmt: skip
-    for name, value in (("worlds", worlds), ("width", width), ("height", height), ("samples", samples)):
+        "cameras": cameras,
+        "add_cameras": add_cameras or {},
+        "camera_system": camera_system,
+        "width": width,
+        "height": height,
+        "depth": depth,
+        "segmentation": segmentation,
+        "shadows": shadows,
+        "samples": samples,
+        "shadow_samples": shadow_samples,
+        "brightness": brightness,
+        "edit": edit,
+        "copy": copy,
+        "num_worlds": num_worlds,
+        "threads": threads,
+        "batches": batches,
+        "crf": crf,
+        "preset": preset,
+        "resume": resume,
+    }
+    for name, value in (("num_worlds", num_worlds), ("width", width), ("height", height), ("samples", samples)):
         if value is not None and value < 1:
             raise ValueError(f"{name} is {value}: must be at least 1")
     if brightness is not None and not brightness > 0:
@@ -304,7 +351,9 @@ def render(
     made = sensors if callable(sensors) else None
     given = () if callable(sensors) else list(sensors)
     if len(houses) > 1 and any(not hasattr(sensor, "kind") or isinstance(sensor, CoreSensor) for sensor in given):
-        raise ValueError(f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs to one simulation")
+        raise ValueError(
+            f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs to one simulation"
+        )
     if Path(out).resolve() in {dataset.root.resolve(), *(chosen[0].path.resolve().parents[1] for chosen in houses)}:
         raise ValueError(f"the output directory '{out}' is that of the recording; choose another one")
     state = _Progress(len(dataset.episodes), progress)

@@ -13,6 +13,7 @@ import numpy as np
 from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
 from mjsense.core.mujoco_names import Obj, id2name
+from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import counter
 from mjsense.dataset.dataset import Dataset, opened
 from mjsense.dataset.deviation import Deviation
@@ -99,7 +100,9 @@ class ReplayReport:
                     reasons.setdefault(reason, set()).add(name)
             lines += [f"not computed: {', '.join(sorted(names))}: {reason}" for reason, names in sorted(reasons.items())]
         for e in self.episodes:
-            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()] + [f"  {e.refused}"] * bool(e.refused)
+            lines += [f"  episode {e.episode}, {how}: {found}" for how, found in e.deviations.items()] + [
+                f"  {e.refused}"
+            ] * bool(e.refused)
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -141,7 +144,9 @@ def _deviation(stepper: Stepper, t: int, recorded: np.ndarray, replayed: np.ndar
         return None
     first = int(differs.argmax())
     part, i = stepper.part(first)
-    return Deviation(t, part, _element(stepper.model, part, i), float(recorded[first]), float(replayed[first]), int(differs.sum()))
+    return Deviation(
+        t, part, _element(stepper.model, part, i), float(recorded[first]), float(replayed[first]), int(differs.sum())
+    )
 
 
 def _stepper(episode: Episode) -> Stepper:
@@ -169,6 +174,7 @@ def check_episode(episode: Episode) -> EpisodeCheck:
     return EpisodeCheck(episode.index, episode.length - 1, **found)
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def check_replay(
     root: str | Path | Dataset,
@@ -176,7 +182,7 @@ def check_replay(
     actions: bool = True,
     states: bool = False,
     episodes: Sequence[int] | None = None,
-    worlds: int = 4,
+    num_worlds: int = 4,
     threads: int = 0,
     progress: bool | Callable[[int, int], None] | None = None,
 ) -> ReplayReport:
@@ -192,7 +198,7 @@ def check_replay(
             Depth is compared bit for bit, rgb by its video, because the encoder makes equal files of equal images. Streams of the policy,
             and others that cannot be computed, are listed with the reason.
         episodes: Positions of episodes in the recording; by default all.
-        worlds: Number of episodes whose sensors are computed in parallel.
+        num_worlds: Number of episodes whose sensors are computed in parallel.
         threads: Number of threads that compute sensors; 0: one per available CPU.
         progress: Show the progress on stderr, or a function that is called with the number of checks done and of all; by default
             shown where stderr is a terminal or a notebook.
@@ -204,7 +210,7 @@ def check_replay(
         checks[episode.index] = check_episode(episode)
         done += 1
         report(done, total)
-    for episode, sensors in check_sensors(chosen, worlds=worlds, threads=threads) if states else ():
+    for episode, sensors in check_sensors(chosen, worlds=num_worlds, threads=threads) if states else ():
         made = checks.get(episode.index) or EpisodeCheck(episode.index, episode.length - 1)
         checks[episode.index] = replace(made, sensors=sensors)
         done += 1

@@ -65,7 +65,13 @@ class _Rebuilt:
         settings = episode._recording.settings
         cameras = settings["cameras"]
         options = {key: settings[key] for key in _core.rollout_options() if key in settings}
-        options |= {"policy": "", "replay_sensor": True, "num_worlds": num_worlds, "threads": threads, "cameras": [camera["name"] for camera in cameras]}
+        options |= {
+            "policy": "",
+            "replay_sensor": True,
+            "num_worlds": num_worlds,
+            "threads": threads,
+            "cameras": [camera["name"] for camera in cameras],
+        }
         for side in ("width", "height"):
             sizes = {camera[side] for camera in cameras}
             options[side] = sizes.pop() if len(sizes) == 1 else None
@@ -79,7 +85,9 @@ class _Rebuilt:
         self.sim: Any = self._rollout.simulation()
         stored = inputs_of(episode).state.shape[1]
         if self.sim.state.shape[1] != stored:
-            raise ValueError(f"the recorded state has {stored} numbers, that of the task in this version has {self.sim.state.shape[1]}")
+            raise ValueError(
+                f"the recorded state has {stored} numbers, that of the task in this version has {self.sim.state.shape[1]}"
+            )
         self.handles: list[Any] = []
         self.reasons: dict[str, str] = {}
         self._optional: set[str] = set()
@@ -135,7 +143,9 @@ class _Archived:
         cameras, settings = render_cameras.recorded_cameras(episode, None), episode._recording.settings
         images = render_cameras.recorded_images(settings)
         views = [camera.scene_sensor(images) for camera in cameras]
-        self._worlds = EpisodeWorlds(episode, num_worlds, views, brightness=settings.get("render", {}).get("brightness", 1.0), threads=threads)
+        self._worlds = EpisodeWorlds(
+            episode, num_worlds, views, brightness=settings.get("render", {}).get("brightness", 1.0), threads=threads
+        )
         self.sim = self._worlds.sim
         self._sensors, self.handles = recorded_sensors(self.sim, [stream for camera in cameras for stream in camera.streams()])
         self.reasons: dict[str, str] = {}
@@ -158,7 +168,9 @@ def _worlds_of(episode: Episode, num_worlds: int, threads: int) -> tuple[Any, st
     if "render" in settings:
         return _Archived(episode, num_worlds, threads), "carried over from the recording that was rendered"
     if "task" in settings.get("code", {}):
-        return _Archived(episode, num_worlds, threads), f"belongs to the task '{settings.get('task')}', which is written in Python"
+        return _Archived(
+            episode, num_worlds, threads
+        ), f"belongs to the task '{settings.get('task')}', which is written in Python"
     try:
         return _Rebuilt(episode, num_worlds, threads), _OF_POLICY
     except (KeyError, ValueError, RuntimeError, OSError) as error:
@@ -172,7 +184,9 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     rate = Fraction(first.fps)
     video = first._recording.video or {}
     options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
-    recorder = _core.Recorder(worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options)
+    recorder = _core.Recorder(
+        worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options
+    )
     for start in range(0, len(episodes), worlds.sim.num_worlds):
         playing = list(enumerate(episodes[start : start + worlds.sim.num_worlds]))
         for w, episode in playing:
@@ -211,7 +225,9 @@ def _array_deviation(name: str, recorded: np.ndarray, replayed: np.ndarray) -> D
         return Deviation(0, name, "the shape", was, now, 1)
     if recorded.tobytes() == replayed.tobytes():
         return None
-    words = [np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1, rows.dtype.itemsize) for rows in (recorded, replayed)]
+    words = [
+        np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1, rows.dtype.itemsize) for rows in (recorded, replayed)
+    ]
     differs = (words[0] != words[1]).any(2)
     t = int(differs.any(1).argmax())
     first = int(differs[t].argmax())
@@ -234,7 +250,11 @@ def _video_deviation(name: str, recorded: Episode, replayed: Episode) -> Deviati
 
 def _sensor_of(dataset: Rows) -> str:
     """Name of the sensor of a stream."""
-    return str(bounded_json.parse_object(dataset.attrs.text("spec", "{}"), f"{dataset.where}: the attribute 'spec'", TEXT_BYTES).get("sensor", ""))
+    return str(
+        bounded_json.parse_object(dataset.attrs.text("spec", "{}"), f"{dataset.where}: the attribute 'spec'", TEXT_BYTES).get(
+            "sensor", ""
+        )
+    )
 
 
 def _compare(recorded: Episode, replayed: Episode, worlds: Any, otherwise: str) -> SensorCheck:

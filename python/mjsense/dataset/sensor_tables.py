@@ -76,7 +76,11 @@ def sensors_of(path: str | Path) -> list[Any]:
     tables = read_toml(path).get("sensors")
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         raise ValueError(f"{path}: contains no [[sensors]] tables")
-    kinds = {cls.kind: cls for cls in vars(configs).values() if isinstance(cls, type) and issubclass(cls, configs.SensorCfg) and hasattr(cls, "kind")}
+    kinds = {
+        cls.kind: cls
+        for cls in vars(configs).values()
+        if isinstance(cls, type) and issubclass(cls, configs.SensorCfg) and hasattr(cls, "kind")
+    }
     sensors = []
     for i, table in enumerate(tables):
         kind, context = str(table.get("kind", "")), f"{path}: sensors[{i}]"

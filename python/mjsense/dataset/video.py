@@ -53,7 +53,9 @@ class VideoInfo:
 def decoded(info: VideoInfo, pixels: np.ndarray) -> np.ndarray:
     """Values of a picture: uint8 [H, W, 3] of rgb, float32 [H, W] m of depth."""
     if not all(got in (stated, stated + stated % 2) for got, stated in zip(pixels.shape, (info.height, info.width))):
-        raise RuntimeError(f"{info.path}: a frame has {pixels.shape[1]} x {pixels.shape[0]} pixels, the recording states {info.width} x {info.height}")
+        raise RuntimeError(
+            f"{info.path}: a frame has {pixels.shape[1]} x {pixels.shape[0]} pixels, the recording states {info.width} x {info.height}"
+        )
     pixels = pixels[: info.height, : info.width]  # odd sizes are stored with one column or row more
     if info.encoding == "rgb":
         return np.ascontiguousarray(pixels)
@@ -97,7 +99,9 @@ class _Job:
 
 
 def _no_frame(info: VideoInfo, index: int) -> Exception:
-    return RuntimeError(f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)")
+    return RuntimeError(
+        f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)"
+    )
 
 
 class FrameReader:
@@ -160,7 +164,13 @@ class FrameReader:
         at += ["-max_pixels", str((info.width + 64) * (info.height + 64))]
         with open_plain(info.path) as file:
             self._tables.get((info.path, "sum"), lambda: (check_sum(file, info.crc, str(info.path)) or True, 1))
-            raw = frames_of(info.path, file.fileno(), at, ["-frames:v", str(count), "-f", "rawvideo", "-pix_fmt", info.pixel_format], count * size)
+            raw = frames_of(
+                info.path,
+                file.fileno(),
+                at,
+                ["-frames:v", str(count), "-f", "rawvideo", "-pix_fmt", info.pixel_format],
+                count * size,
+            )
         if len(raw) % size:
             raise RuntimeError(f"{info.path}: ffmpeg cannot decode it: its images have another size than the recording states")
         found = None

@@ -59,7 +59,9 @@ def check_sum(file: PlainFile, stated: str, what: str) -> None:
             crc = zlib.crc32(piece, crc)
         file.seek(0)
         if f"{crc:08x}" != stated:
-            raise RuntimeError(f"{what} differs from what was recorded: its checksum is {crc:08x}, not {printable(stated[:20])}; `mjsense verify` lists what is damaged")
+            raise RuntimeError(
+                f"{what} differs from what was recorded: its checksum is {crc:08x}, not {printable(stated[:20])}; `mjsense verify` lists what is damaged"
+            )
 
 
 @contextmanager
@@ -74,7 +76,9 @@ def open_container(path: Path, crc: str = "", codecs: str = CODECS) -> Iterator[
     with open_plain(path) as file:
         check_sum(file, crc, str(path))
         try:
-            with av.open(file, format=container_format(path), options={"codec_whitelist": codecs, "protocol_whitelist": "none"}) as container:
+            with av.open(
+                file, format=container_format(path), options={"codec_whitelist": codecs, "protocol_whitelist": "none"}
+            ) as container:
                 if not container.streams.video or container.streams.video[0].codec_context.name not in codecs.split(","):
                     raise RuntimeError(f"{path}: contains no video of {codecs.replace(',', ' or ')}")
                 yield container
@@ -107,7 +111,9 @@ class Packets:
             context = stream.codec_context
             self.codec, self.extradata, self.size = context.name, context.extradata, (context.width, context.height)
             if any(got not in (stated, stated + stated % 2) for got, stated in zip(self.size, size)):
-                raise RuntimeError(f"{path}: its images have {self.size[0]} x {self.size[1]} pixels, the recording states {size[0]} x {size[1]}")
+                raise RuntimeError(
+                    f"{path}: its images have {self.size[0]} x {self.size[1]} pixels, the recording states {size[0]} x {size[1]}"
+                )
             for packet in container.demux(stream):
                 if not packet.size or packet.pts is None or packet.pos is None or stream.time_base is None:
                     continue  # the end of the stream
@@ -182,7 +188,9 @@ class Decoder:
                 try:
                     found += [(decoded.pts, decoded) for decoded in decode(packet)]
                 except self._error as error:
-                    raise RuntimeError(f"{packets.path}: the frame {packets.frames[n]} cannot be decoded: {error.strerror}") from None
+                    raise RuntimeError(
+                        f"{packets.path}: the frame {packets.frames[n]} cannot be decoded: {error.strerror}"
+                    ) from None
                 self._next = n + 1
                 if found and found[-1][0] >= frame:
                     self._newest = found[-1][0]

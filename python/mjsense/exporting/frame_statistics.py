@@ -40,13 +40,17 @@ def _decoded(path: Path, wanted: set[int] | None) -> tuple[np.ndarray, int]:
     """Histograms of the wanted frames; None: of the key frames."""
     with open_container(path) as video:
         stream = video.streams.video[0]
-        stream.codec_context.options = {"skip_loop_filter": "all"}  # changes pixels at edges of blocks by a few levels, and is 20 % faster
+        stream.codec_context.options = {
+            "skip_loop_filter": "all"
+        }  # changes pixels at edges of blocks by a few levels, and is 20 % faster
         if wanted is None:
             stream.codec_context.skip_frame = "NONKEY"
         step = _step(stream.width, stream.height)
         width, height = -(-stream.width // step), -(-stream.height // step)
         frames = (frame for n, frame in enumerate(video.decode(stream)) if wanted is None or n in wanted)
-        return statistics.histograms(frame.reformat(width, height, "rgb24", interpolation="POINT", threads=1).to_ndarray() for frame in frames)
+        return statistics.histograms(
+            frame.reformat(width, height, "rgb24", interpolation="POINT", threads=1).to_ndarray() for frame in frames
+        )
 
 
 def _step(width: int, height: int) -> int:

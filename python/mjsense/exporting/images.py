@@ -49,7 +49,9 @@ def to_uint16(depth: np.ndarray, unit: float) -> np.ndarray:
 def padded(image: np.ndarray) -> Any:
     """A frame for an encoder of videos with an even width and height."""
     height, width = int(image.shape[0]), int(image.shape[1])
-    return needs("av").VideoFrame.from_ndarray(np.pad(image, np.array([(0, height % 2), (0, width % 2), (0, 0)]), "edge"), format="rgb24")
+    return needs("av").VideoFrame.from_ndarray(
+        np.pad(image, np.array([(0, height % 2), (0, width % 2), (0, 0)]), "edge"), format="rgb24"
+    )
 
 
 @contextlib.contextmanager

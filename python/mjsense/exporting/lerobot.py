@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.dataset import Episode
 from mjsense.exporting import lerobot_depth
 from mjsense.exporting.frame_statistics import image_histograms
@@ -33,8 +32,8 @@ from mjsense.exporting.lerobot_files import (
     times,
     write_json,
 )
-from mjsense.exporting.mapping import Mapping, Source, print_trimming
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, print_trimming
+from mjsense.exporting.output import needs
 from mjsense.exporting.remux import Concatenation
 
 DATA_FILE_MB, VIDEO_FILE_MB = 100, 200
@@ -42,44 +41,13 @@ _TOLERANCE_S = 1e-4  # LeRobot's tolerance of times of frames
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 
 
-@checked
-def export_lerobot(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    exact_rate: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
-
-    Args:
-        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder of the data set, which must not exist.
-        map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object. Videos of episodes with such steps are encoded again.
-        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
-            such a data set. By default the rate is rounded if that changes it by at most 5 %.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle, whole_rate=not exact_rate)
-    source.print_notes()
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Writes all episodes to the new folder ``path``."""
     print_rate(source)
-    with new_output(out) as path:
-        writer = Writer(source, path)
-        for episode in source.each(progress):
-            writer.add(episode)
-        writer.close()
-    return Path(out)
+    writer = Writer(source, path)
+    for episode in source.each(progress):
+        writer.add(episode)
+    writer.close()
 
 
 class _Tables:
@@ -159,6 +127,9 @@ def _place(file: int) -> dict[str, int]:
 class Writer:
     """A data set that is being written."""
 
+    LAST_FILE = "meta/info.json"
+    """The file that is written last."""
+
     def __init__(self, source: Source, path: Path) -> None:
         check_columns(source)
         self._source, self._path = source, path
@@ -199,7 +170,10 @@ class Writer:
                     place, first = videos.add(path, video.fps, frames, length)
                 histograms[key] = image_histograms(episode, self._source.cameras[camera])
             entry |= {f"videos/{key}/{name}": value for name, value in place.items()}
-            entry |= {f"videos/{key}/from_timestamp": first, f"videos/{key}/to_timestamp": first + length / float(self._source.fps)}
+            entry |= {
+                f"videos/{key}/from_timestamp": first,
+                f"videos/{key}/to_timestamp": first + length / float(self._source.fps),
+            }
         for name, found in self._statistics.add(columns, histograms).items():
             entry |= {f"stats/{name}/{key}": value for key, value in found.items()}
         entry |= {f"meta/episodes/{name}": value for name, value in self._episodes.place.items()}
@@ -237,13 +211,21 @@ class Writer:
         _write_tasks(self._path / "meta/tasks.parquet", self._tasks)
         write_json(self._path / "meta/stats.json", self._statistics.all())
         info = {
-            "codebase_version": "v3.0", "robot_type": self._source.robot or None, "total_episodes": self._count, "total_frames": self._frames,
-            "total_tasks": len(self._tasks), "chunks_size": FILES_PER_CHUNK, "data_files_size_in_mb": DATA_FILE_MB,
-            "video_files_size_in_mb": VIDEO_FILE_MB, "fps": number(self._source.fps), "splits": {"train": f"0:{self._count}"},
-            "data_path": f"data/{_PLACE}.parquet", "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
+            "codebase_version": "v3.0",
+            "robot_type": self._source.robot or None,
+            "total_episodes": self._count,
+            "total_frames": self._frames,
+            "total_tasks": len(self._tasks),
+            "chunks_size": FILES_PER_CHUNK,
+            "data_files_size_in_mb": DATA_FILE_MB,
+            "video_files_size_in_mb": VIDEO_FILE_MB,
+            "fps": number(self._source.fps),
+            "splits": {"train": f"0:{self._count}"},
+            "data_path": f"data/{_PLACE}.parquet",
+            "video_path": f"videos/{{video_key}}/{_PLACE}.mp4" if self._videos else None,
             "features": features_of(self._source, self._codec),
-        }  # fmt: skip
-        write_json(self._path / "meta/info.json", info)
+        }
+        write_json(self._path / self.LAST_FILE, info)
 
 
 def _write_tasks(path: Path, tasks: list[str]) -> None:
@@ -252,5 +234,7 @@ def _write_tasks(path: Path, tasks: list[str]) -> None:
     column = {"name": "task", "field_name": "task", "pandas_type": "unicode", "numpy_type": "object", "metadata": None}
     index = {"name": "task_index", "field_name": "task_index", "pandas_type": "int64", "numpy_type": "int64", "metadata": None}
     about = {"index_columns": ["task"], "column_indexes": [], "columns": [index, column], "pandas_version": "2.0.0"}
-    table = pa.table({"task_index": list(range(len(tasks))), "task": tasks}).replace_schema_metadata({"pandas": json.dumps(about)})
+    table = pa.table({"task_index": list(range(len(tasks))), "task": tasks}).replace_schema_metadata(
+        {"pandas": json.dumps(about)}
+    )
     needs("pyarrow.parquet").write_table(table, in_folder(path))

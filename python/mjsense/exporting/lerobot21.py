@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from mjsense.core.arguments import checked
 from mjsense.exporting.frame_statistics import image_histograms
 from mjsense.exporting.images import video_file
 from mjsense.exporting.lerobot_files import (
@@ -28,8 +27,8 @@ from mjsense.exporting.lerobot_files import (
     table_of,
     write_json,
 )
-from mjsense.exporting.mapping import Mapping, Source, check_names
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, check_names
+from mjsense.exporting.output import needs
 from mjsense.exporting.remux import Concatenation
 
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
@@ -38,48 +37,13 @@ _INSTRUCTION = "human.task_description"
 """GR00T's name of the instruction. It reads the number of the task from a column of its own."""
 
 
-@checked
-def export_lerobot21(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    exact_rate: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``. See docs/export.md.
-
-    Args:
-        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder of the data set, which must not exist.
-        map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object. Videos of episodes with such steps are encoded again.
-        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
-            such a data set. By default the rate is rounded if that changes it by at most 5 %.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle, whole_rate=not exact_rate)
-    source.print_notes()
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Writes all episodes to the new folder ``path``."""
     print_rate(source)
     if depth := [camera for camera in source.cameras if is_depth(source, camera)]:
         raise ValueError(f"LeRobot v2.1 has no depth images; leave '{depth[0]}' out of the map, or export to LeRobot v3.0")
     check_columns(source, [f"annotation.{_INSTRUCTION}"])
     modality = modality_of(source)
-    with new_output(out) as path:
-        _write(source, path, modality, progress)
-    return Path(out)
-
-
-def _write(source: Source, path: Path, modality: dict[str, Any], progress: Callable[[int, int], None] | None) -> None:
     entries: list[dict[str, Any]] = []
     found: list[dict[str, Any]] = []
     codec: dict[str, Any] = {}
@@ -99,24 +63,42 @@ def _write(source: Source, path: Path, modality: dict[str, Any], progress: Calla
                 copy.add(file, video.fps, frames, episode.length - 1)
                 copy.close()
             histograms[image_key(camera)] = image_histograms(episode, source.cameras[camera])
-        entries.append({"episode_index": position, "tasks": [episode.task], "length": episode.length - 1,
-                        "trimmed_steps": episode.trimmed_steps, "recorded_fps": float(source.recorded_fps)})  # fmt: skip
+        entries.append(
+            {
+                "episode_index": position,
+                "tasks": [episode.task],
+                "length": episode.length - 1,
+                "trimmed_steps": episode.trimmed_steps,
+                "recorded_fps": float(source.recorded_fps),
+            }
+        )
         found.append({"episode_index": position, "stats": statistics.add(columns, histograms)})
         first += episode.length - 1
     _write_lines(path / "meta/episodes.jsonl", entries)
     _write_lines(path / "meta/episodes_stats.jsonl", found)
     _write_lines(path / "meta/tasks.jsonl", [{"task_index": i, "task": task} for i, task in enumerate(source.tasks)])
     # GR00T's loader takes the numbers of a move group out of every statistic, so each must have as many as the column.
-    write_json(path / "meta/stats.json", {name: {key: value for key, value in found.items() if key != "count"} for name, found in statistics.all().items()})
+    write_json(
+        path / "meta/stats.json",
+        {name: {key: value for key, value in found.items() if key != "count"} for name, found in statistics.all().items()},
+    )
     write_json(path / "meta/modality.json", modality)
     count = len(source)
     info = {
-        "codebase_version": "v2.1", "robot_type": source.robot or None, "total_episodes": count, "total_frames": first,
-        "total_tasks": len(source.tasks), "total_videos": count * len(source.cameras), "total_chunks": -(-count // FILES_PER_CHUNK),
-        "chunks_size": FILES_PER_CHUNK, "fps": number(source.fps), "splits": {"train": f"0:{count}"}, "data_path": _DATA,
+        "codebase_version": "v2.1",
+        "robot_type": source.robot or None,
+        "total_episodes": count,
+        "total_frames": first,
+        "total_tasks": len(source.tasks),
+        "total_videos": count * len(source.cameras),
+        "total_chunks": -(-count // FILES_PER_CHUNK),
+        "chunks_size": FILES_PER_CHUNK,
+        "fps": number(source.fps),
+        "splits": {"train": f"0:{count}"},
+        "data_path": _DATA,
         "video_path": _VIDEO if source.cameras else None,
         "features": features_of(source, codec) | {f"annotation.{_INSTRUCTION}": {"dtype": "int64", "shape": [1], "names": None}},
-    }  # fmt: skip
+    }
     write_json(path / "meta/info.json", info)
 
 

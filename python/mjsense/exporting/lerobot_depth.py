@@ -18,8 +18,17 @@ _LARGEST = 4095
 _LOG_NEAR, _LOG_RANGE = np.log(_NEAR_M + _SHIFT_M), np.log((_FAR_M + _SHIFT_M) / (_NEAR_M + _SHIFT_M))
 LEVELS = np.exp(_LOG_NEAR + np.arange(_LARGEST + 1) / _LARGEST * _LOG_RANGE) - _SHIFT_M
 """Distances of the codes. [m]"""
-INFO = {"is_depth_map": True, "depth_unit": "m", "video.depth_min": _NEAR_M, "video.depth_max": _FAR_M, "video.shift": _SHIFT_M,
-        "video.use_log": True, "video.channels": 1, "video.codec": "hevc", "video.pix_fmt": "gray12le"}  # fmt: skip
+INFO = {
+    "is_depth_map": True,
+    "depth_unit": "m",
+    "video.depth_min": _NEAR_M,
+    "video.depth_max": _FAR_M,
+    "video.shift": _SHIFT_M,
+    "video.use_log": True,
+    "video.channels": 1,
+    "video.codec": "hevc",
+    "video.pix_fmt": "gray12le",
+}
 """Entries of a feature's ``info`` in ``meta/info.json``."""
 # Two frames between key frames, as LeRobot's own videos; x265 prints its settings otherwise.
 _X265 = "lossless=1:bframes=0:keyint=2:log-level=none"

@@ -47,11 +47,17 @@ def print_rate(source: Source) -> None:
     """Prints on stderr that the rate is not a whole number."""
     exact, longer = float(source.recorded_fps), float(source.recorded_fps / source.fps) - 1
     if source.fps != source.recorded_fps:
-        print(f"{exact:.6g} rows per second are written as {source.fps}, because LeRobot's rates are whole numbers: times are {abs(longer):.1%} "
-              f"{'longer' if longer > 0 else 'shorter'}; --exact-rate (exact_rate=True) keeps the rate. {_WHOLE_RATE}", file=sys.stderr)  # fmt: skip
+        print(
+            f"{exact:.6g} rows per second are written as {source.fps}, because LeRobot's rates are whole numbers: times are {abs(longer):.1%} "
+            f"{'longer' if longer > 0 else 'shorter'}; --exact-rate (exact_rate=True) keeps the rate. {_WHOLE_RATE}",
+            file=sys.stderr,
+        )
     elif source.fps.denominator != 1:
-        print(f"{exact:.6g} rows per second are not a whole number: LeRobot reads the data set, but cannot delete, split or append episodes. "
-              f"{_WHOLE_RATE}", file=sys.stderr)  # fmt: skip
+        print(
+            f"{exact:.6g} rows per second are not a whole number: LeRobot reads the data set, but cannot delete, split or append episodes. "
+            f"{_WHOLE_RATE}",
+            file=sys.stderr,
+        )
 
 
 def check_columns(source: Source, more: Iterable[str] = ()) -> None:
@@ -61,7 +67,10 @@ def check_columns(source: Source, more: Iterable[str] = ()) -> None:
         more: Further columns of the format.
     """
     own = ("next.done", *_INDICES, "task", *more)
-    names = [*((name, f"LeRobot's column '{name}'") for name in own), *((key_of(feature), f"the feature '{feature.name}'") for feature in exported(source))]
+    names = [
+        *((name, f"LeRobot's column '{name}'") for name in own),
+        *((key_of(feature), f"the feature '{feature.name}'") for feature in exported(source)),
+    ]
     check_names([*names, *((image_key(camera), f"the camera '{camera}'") for camera in source.cameras)])
 
 
@@ -141,7 +150,9 @@ class Statistics:
         self._columns: dict[str, list[np.ndarray]] = {}
         self._histograms: dict[str, tuple[np.ndarray, int]] = {}
 
-    def add(self, columns: dict[str, np.ndarray], histograms: dict[str, tuple[np.ndarray, int]]) -> dict[str, dict[str, list[Any]]]:
+    def add(
+        self, columns: dict[str, np.ndarray], histograms: dict[str, tuple[np.ndarray, int]]
+    ) -> dict[str, dict[str, list[Any]]]:
         """The statistics of an episode with these columns and histograms of images."""
         for name, values in columns.items():
             self._columns.setdefault(name, []).append(values)
@@ -154,7 +165,9 @@ class Statistics:
         return _statistics_of({name: np.concatenate(parts) for name, parts in self._columns.items()}, self._histograms)
 
 
-def _statistics_of(columns: dict[str, np.ndarray], histograms: dict[str, tuple[np.ndarray, int]]) -> dict[str, dict[str, list[Any]]]:
+def _statistics_of(
+    columns: dict[str, np.ndarray], histograms: dict[str, tuple[np.ndarray, int]]
+) -> dict[str, dict[str, list[Any]]]:
     found = {name: statistics.of_rows(values) for name, values in columns.items()}
     for name, (counts, images) in histograms.items():
         found[name] = statistics.of_histograms(counts, images, statistics.LEVELS if len(counts) == 3 else lerobot_depth.LEVELS)

@@ -113,7 +113,7 @@ class Source:
         map: A :class:`Mapping`, a TOML file, or a dict of the same form; by default :class:`Mapping`'s defaults.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`); None: in episodes whose task places an
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`); None: in episodes whose task places an
             object.
         whole_rate: Round ``fps`` to a whole number, as formats need whose rates are whole numbers, if that changes it by at most 5 %.
     """
@@ -139,7 +139,9 @@ class Source:
             raise ValueError(f"{root}: no episode with a step matches")
         self._notes: list[str] = []
         if without := len(chosen.episodes) - len(self.episodes):
-            self._notes.append(f"{without} of {len(chosen.episodes)} episodes have one observation and no step; they are left out")
+            self._notes.append(
+                f"{without} of {len(chosen.episodes)} episodes have one observation and no step; they are left out"
+            )
         if episodes is None and is_unfinished(chosen.root):
             print(f"{root} is unfinished; the export has the episodes that are published", file=sys.stderr)
         self.first_step: int = 0
@@ -161,10 +163,15 @@ class Source:
         the recorded observation consists of images."""
         self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
         """The distinct instructions, in the order of their first episode."""
-        colour = [name[len(VIDEOS) :] for name, stream in chosen.streams.items() if stream.kind == "video" and len(stream.shape) == 3]
+        colour = [
+            name[len(VIDEOS) :] for name, stream in chosen.streams.items() if stream.kind == "video" and len(stream.shape) == 3
+        ]
         if mapping.state is None:
-            self._notes += [f"the image '{name}' is recorded as an array and left out; RecordEpisodes(image_videos=True) records RGB images as videos"
-                            for name in known if _observed(name) and _is_image(known[name])]  # fmt: skip
+            self._notes += [
+                f"the image '{name}' is recorded as an array and left out; RecordEpisodes(image_videos=True) records RGB images as videos"
+                for name in known
+                if _observed(name) and _is_image(known[name])
+            ]
         self.cameras: dict[str, str] = {camera: camera for camera in colour} if mapping.cameras is None else dict(mapping.cameras)
         """Names of cameras in the recording by exported name."""
         for camera in self.cameras.values():
@@ -220,7 +227,9 @@ class Source:
             values = loaded.get(stream)
             mask = given_name(stream)
             if values is None and mask is None:
-                raise UnknownNameError(f"Episode {episode.index} ({episode.path.name}) has no stream '{stream}', which the feature '{feature.name}' needs")
+                raise UnknownNameError(
+                    f"Episode {episode.index} ({episode.path.name}) has no stream '{stream}', which the feature '{feature.name}' needs"
+                )
             if mask is not None:
                 values = _filled(stream, values, loaded.get(mask), loaded.get(_measured(stream)), episode.length, size)
             assert values is not None
@@ -257,7 +266,9 @@ def check_names(names: Iterable[tuple[str, str]]) -> None:
     owners: dict[str, str] = {}
     for name, owner in names:
         if owners.setdefault(name, owner) != owner:
-            raise ValueError(f"{owners[name]} and {owner} have the same name in the export, '{name}'; choose other names in the map")
+            raise ValueError(
+                f"{owners[name]} and {owner} have the same name in the export, '{name}'; choose other names in the map"
+            )
 
 
 def named_streams(source: Source, features: Iterable[str], place: str = "", image: str = "") -> Iterator[tuple[str, str]]:
@@ -270,7 +281,11 @@ def named_streams(source: Source, features: Iterable[str], place: str = "", imag
     yield from ((f"{place}{name}", f"the feature '{name}'") for name in features)
     yield from ((f"{place}{name}{image}", f"the video '{camera}'") for name, camera in source.cameras.items())
     known = source.episodes[0].streams if source.episodes else {}
-    yield from ((f"{place}{name}_depth", f"the video '{camera}_depth'") for name, camera in source.cameras.items() if f"{VIDEOS}{camera}_depth" in known)
+    yield from (
+        (f"{place}{name}_depth", f"the video '{camera}_depth'")
+        for name, camera in source.cameras.items()
+        if f"{VIDEOS}{camera}_depth" in known
+    )
 
 
 def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[str, Stream]) -> Feature:
@@ -284,7 +299,9 @@ def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[s
     for stream in found:
         about = known[stream]
         if about.kind == "video" or about.dtype == object or about.dtype.itemsize * int(np.prod(about.shape)) >= LARGE_ROW:
-            raise ValueError(f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than {LARGE_ROW} bytes per row")
+            raise ValueError(
+                f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than {LARGE_ROW} bytes per row"
+            )
         short = stream if "/" not in stream else stream.rsplit("/", 1)[1]
         short = short if short not in parts else stream
         size = int(np.prod(about.shape))
@@ -331,7 +348,9 @@ def _measured(stream: str) -> str:
     return f"obs/agent/qpos/{stream.removeprefix(_JOINTS)}" if stream.startswith(_JOINTS) else ""
 
 
-def _filled(stream: str, values: np.ndarray | None, given: np.ndarray | None, measured: np.ndarray | None, length: int, size: int) -> np.ndarray:
+def _filled(
+    stream: str, values: np.ndarray | None, given: np.ndarray | None, measured: np.ndarray | None, length: int, size: int
+) -> np.ndarray:
     """Actions ``[length, size]`` in which rows without an action have the action before them; relative ones have 0."""
     before = np.zeros((length, size)) if measured is None or measured.size != length * size else measured
     if values is None or given is None:

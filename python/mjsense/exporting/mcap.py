@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.video_decoder import open_container
 from mjsense.exporting.images import CRF, depth_videos, padded
-from mjsense.exporting.mapping import Mapping, Source, check_names
-from mjsense.exporting.output import join_folders, needs, new_output
+from mjsense.exporting.mapping import Source, check_names
+from mjsense.exporting.output import join_folders, needs
 from mjsense.exporting.scene import Body, Shape, bodies
 
 _NS = 1_000_000_000
@@ -26,48 +25,17 @@ _Message = tuple[int, str, Any]
 """Observation, topic, and a protobuf message or a dict of numbers."""
 
 
-@checked
-def export_mcap(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    encode_again: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
-    calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages.
-
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which topics: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        encode_again: Encode videos again that have B-frames, which ``foxglove.CompressedVideo`` does not allow; other videos are copied.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-
-    Raises:
-        ValueError: A video has B-frames, and ``encode_again`` is False.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success)
-    source.print_notes()
-    with new_output(out) as path:
-        write(source, path, progress, encode_again=encode_again)
-    return Path(out)
-
-
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None, *, encode_again: bool = False) -> None:
     """Writes the files of all episodes to the new folder ``path``."""
     writers, schemas = needs("mcap.writer", "mcap"), needs("mcap_protobuf.schema", "mcap")
     for module in ("foxglove_schemas_protobuf", "av"):
         needs(module, "mcap")
-    check_names([*((topic, f"the topic '/{topic}'") for topic in ("tf", "scene", "joint_states")), *((name, f"the feature '{name}'") for name in source.features)])
+    check_names(
+        [
+            *((topic, f"the topic '/{topic}'") for topic in ("tf", "scene", "joint_states")),
+            *((name, f"the feature '{name}'") for name in source.features),
+        ]
+    )
     path.mkdir()
     for episode in source.each(progress):
         with open(path / f"episode_{episode.index:08d}.mcap", "wb") as file:
@@ -131,7 +99,11 @@ def _message(kind: str, **fields: Any) -> Any:
 
 def _feature(source: Source, episode: Episode, name: str) -> Iterator[_Message]:
     for t, row in enumerate(source.rows(episode)[name].astype(np.float64)):
-        yield t, f"/{name}", {n: value if np.isfinite(value) else None for n, value in zip(source.features[name].names, row.tolist())}
+        yield (
+            t,
+            f"/{name}",
+            {n: value if np.isfinite(value) else None for n, value in zip(source.features[name].names, row.tolist())},
+        )
 
 
 def _video(source: Source, episode: Episode, name: str, encode_again: bool) -> Iterator[_Message]:
@@ -139,7 +111,9 @@ def _video(source: Source, episode: Episode, name: str, encode_again: bool) -> I
     packets = _copied(video)
     if packets is None:
         if not encode_again:
-            raise ValueError(f"{video.path} has B-frames, which MCAP's CompressedVideo does not allow: record without B-frames, or pass encode_again=True (--encode-again)")
+            raise ValueError(
+                f"{video.path} has B-frames, which MCAP's CompressedVideo does not allow: record without B-frames, or pass encode_again=True (--encode-again)"
+            )
         packets = _encoded(video)
     for t, packet in enumerate(packets):
         yield t, f"/cameras/{name}/video", _message("CompressedVideo", frame_id=name, data=packet, format="h264")
@@ -165,7 +139,11 @@ def _encoded(video: Video) -> Iterator[bytes]:
     encoder: Any = av.CodecContext.create("libx264", "w")
     encoder.width, encoder.height, encoder.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
     encoder.framerate = video.fps
-    encoder.options = {"preset": "veryfast", "tune": "zerolatency", "crf": str(CRF)}  # zerolatency: no B-frames, one packet for each frame
+    encoder.options = {
+        "preset": "veryfast",
+        "tune": "zerolatency",
+        "crf": str(CRF),
+    }  # zerolatency: no B-frames, one packet for each frame
     for t in range(len(video)):
         yield b"".join(bytes(packet) for packet in encoder.encode(padded(video[t])))
 
@@ -174,15 +152,26 @@ def _depth(name: str, video: Video) -> Iterator[_Message]:
     height, width = video.shape[1:3]
     for t in range(len(video)):
         data = video[t].astype("<f4").tobytes()
-        yield t, f"/cameras/{name}/depth", _message("RawImage", frame_id=name, width=width, height=height, encoding="32FC1", step=4 * width, data=data)
+        yield (
+            t,
+            f"/cameras/{name}/depth",
+            _message("RawImage", frame_id=name, width=width, height=height, encoding="32FC1", step=4 * width, data=data),
+        )
 
 
 def _calibration(source: Source, episode: Episode, name: str) -> Iterator[_Message]:
     place = f"obs/sensor_param/{source.cameras[name]}/intrinsic_cv"
     height, width = source.video(episode, name).shape[1:3]
     for t, matrix in enumerate(episode[place] if place in episode.streams else ()):
-        numbers = {"D": [0.0] * 5, "K": matrix.ravel(), "R": np.eye(3).ravel(), "P": np.hstack([matrix, np.zeros((3, 1))]).ravel()}
-        calibration = _message("CameraCalibration", frame_id=name, width=width, height=height, distortion_model="plumb_bob", **numbers)
+        numbers = {
+            "D": [0.0] * 5,
+            "K": matrix.ravel(),
+            "R": np.eye(3).ravel(),
+            "P": np.hstack([matrix, np.zeros((3, 1))]).ravel(),
+        }
+        calibration = _message(
+            "CameraCalibration", frame_id=name, width=width, height=height, distortion_model="plumb_bob", **numbers
+        )
         yield t, f"/cameras/{name}/calibration", calibration
 
 
@@ -192,10 +181,15 @@ def _joints(episode: Episode) -> Iterator[_Message]:
     if any(place not in episode for place in places):
         return
     positions, velocities = (episode[place] for place in places)
-    groups = [group for group, rows in positions.items() if rows.ndim == 2 and velocities.get(group, rows[:0]).shape == rows.shape]
+    groups = [
+        group for group, rows in positions.items() if rows.ndim == 2 and velocities.get(group, rows[:0]).shape == rows.shape
+    ]
     for t in range(episode.length if groups else 0):
-        joints = [_message("JointState", name=f"{group}_{i}", position=positions[group][t, i], velocity=velocities[group][t, i])
-                  for group in groups for i in range(positions[group].shape[1])]  # fmt: skip
+        joints = [
+            _message("JointState", name=f"{group}_{i}", position=positions[group][t, i], velocity=velocities[group][t, i])
+            for group in groups
+            for i in range(positions[group].shape[1])
+        ]
         yield t, "/joint_states", _message("JointStates", joints=joints)
 
 
@@ -220,7 +214,15 @@ def _transforms(source: Source, episode: Episode, shown: list[Body]) -> Iterator
         transforms = []
         for name, (positions, quats) in moved.items():
             pose = _pose(positions[t], quats[t])
-            transforms.append(_message("FrameTransform", parent_frame_id=_WORLD, child_frame_id=name, translation=pose["position"], rotation=pose["orientation"]))
+            transforms.append(
+                _message(
+                    "FrameTransform",
+                    parent_frame_id=_WORLD,
+                    child_frame_id=name,
+                    translation=pose["position"],
+                    rotation=pose["orientation"],
+                )
+            )
         if transforms:
             yield t, "/tf", _message("FrameTransforms", transforms=transforms)
 

@@ -18,10 +18,9 @@ def needs(module: str, extra: str = "export") -> Any:
     return optional(module, extra, "This export")
 
 
-def join_folders(source: Any, parts: Iterable[Path], out: Path) -> None:
-    """Writes the new folder ``out`` with the files of several folders, which are moved."""
-    with new_output(out) as path:
-        path.mkdir()
-        for part in parts:
-            for file in part.iterdir():
-                file.rename(path / file.name)
+def join_folders(source: Any, parts: Iterable[Path], path: Path) -> None:
+    """Writes the new folder ``path`` with the files of several folders, which are moved."""
+    path.mkdir()
+    for part in parts:
+        for file in part.iterdir():
+            file.rename(path / file.name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``record --format lerobot``: a recording that is converted to LeRobot v3.0 while it is made.
+"""``record --format lerobot``: a recording that is converted to another format while it is made.
 
 The recording is made in the folder ``OUT.recording`` as always, so it is crash-safe and can be resumed. A thread adds each published HDF5
 file to a data set in the folder ``OUT.part``, which is renamed to ``OUT`` when the recording is complete. After a crash the data set is
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsense.dataset.files import BATCH
-from mjsense.exporting.lerobot import Writer
+from mjsense.exporting.formats import FORMATS, format_of, module_of
 from mjsense.exporting.mapping import Mapping, Source
 from mjsense.exporting.output import complete_output, needs, part_of
 
@@ -32,42 +32,58 @@ class CompleteError(FileExistsError):
 
 @contextlib.contextmanager
 def converted(
-    out: str | Path, *, resume: bool = False, map: Any = None, trim_idle: bool | None = None, keep_recording: bool = False, quiet: bool = False
+    out: str | Path,
+    *,
+    format: str = "lerobot",
+    resume: bool = False,
+    map: Any = None,
+    trim_idle: bool | None = None,
+    keep_recording: bool = False,
+    quiet: bool = False,
 ) -> Iterator[Path]:
-    """A folder to record to. At the end of the block the recording becomes the LeRobot data set ``out``, if it is complete.
+    """A folder to record to. At the end of the block the recording becomes the data set ``out``, if it is complete.
 
     Args:
         out: Folder of the data set.
+        format: Name of a format that is written while the recording is made.
         resume: Whether the recording may exist.
-        map: Features and cameras, as in :func:`mjsense.export_lerobot`.
-        trim_idle: Leave out idle steps, as in :func:`mjsense.export_lerobot`.
+        map: Features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
+        trim_idle: Leave out idle steps, as in :func:`mjsense.exporting.export_lerobot`.
         keep_recording: Keep the recording, ``OUT.recording``, when the data set is complete.
         quiet: Do not print how many steps are left out.
 
     Raises:
         CompleteError: ``resume`` is True, and the data set is complete.
         FileExistsError: ``resume`` is False, and ``out`` or ``OUT.recording`` exists; or another process writes ``out``.
-        FileNotFoundError, ValueError: ``map`` is not a mapping.
+        FileNotFoundError, ValueError: ``map`` is not a mapping, or ``format`` cannot be written during a recording.
     """
     final, mapping = Path(out), Mapping.of(map)
-    for module in ("av", "pyarrow"):
-        needs(module)
+    if not format_of(format).while_recording:
+        known = ", ".join(name for name, one in FORMATS.items() if one.while_recording)
+        raise ValueError(
+            f"format '{format}' cannot be written during a recording, only {known}: record first, and export the recording"
+        )
+    for module in ("av", format_of(format).library):
+        needs(module, format_of(format).extra)
+    writer = module_of(format).Writer
     options = {"map": mapping, "trim_idle": trim_idle, "whole_rate": True}
-    with part_of(final) as part, _converted(final, part, resume, options, keep_recording, quiet) as folder:
+    with part_of(final) as part, _converted(writer, final, part, resume, options, keep_recording, quiet) as folder:
         yield folder
 
 
 @contextlib.contextmanager
-def _converted(final: Path, part: Path, resume: bool, options: dict[str, Any], keep_recording: bool, quiet: bool) -> Iterator[Path]:
+def _converted(
+    writer: Any, final: Path, part: Path, resume: bool, options: dict[str, Any], keep_recording: bool, quiet: bool
+) -> Iterator[Path]:
     folder = final.with_name(f"{final.name}.recording")
     if final.is_dir() and any(final.iterdir()):
-        if not resume or not (final / "meta/info.json").exists():
+        if not resume or not (final / writer.LAST_FILE).exists():
             raise FileExistsError(f"{final} exists; name another output, or delete it")
         _remove(folder, part, keep_recording)
         raise CompleteError(f"{final} is complete")
     if folder.exists() and not resume:
         raise FileExistsError(f"{folder} contains an unfinished recording: continue it with resume (--resume), or delete it")
-    conversion = _Conversion(folder, final, part, options)
+    conversion = _Conversion(writer, folder, final, part, options)
     conversion.start()
     try:
         yield folder
@@ -89,10 +105,11 @@ def _remove(folder: Path, part: Path, keep: bool) -> None:
 class _Conversion(threading.Thread):
     """Writes the data set while the recording grows."""
 
-    def __init__(self, recording: Path, out: Path, part: Path, options: dict[str, Any]) -> None:
-        super().__init__(name="mjsense-lerobot", daemon=True)
+    def __init__(self, writer: Any, recording: Path, out: Path, part: Path, options: dict[str, Any]) -> None:
+        super().__init__(name="mjsense-conversion", daemon=True)
+        self._new_writer = writer
         self._recording, self._out, self._part, self._options = recording, out, part, options
-        self.writer: Writer | None = None
+        self.writer: Any = None
         self._ended, self._error = threading.Event(), None
 
     def end(self) -> None:
@@ -136,7 +153,7 @@ class _Conversion(threading.Thread):
                         source = Source(file, **self._options)
                     except ValueError:  # no episode with a step
                         continue
-                    self.writer = self.writer or Writer(source, path)
+                    self.writer = self.writer or self._new_writer(source, path)
                     abouts.append((source.features, source.cameras, source.fps, source.robot))
                     for episode in source.episodes:
                         self.writer.add(episode, source)
@@ -149,7 +166,7 @@ class _Conversion(threading.Thread):
                 # Files have different features, for example because a move group never acts in one: only all together decide them.
                 shutil.rmtree(path, ignore_errors=True)
                 whole = Source(self._recording, **self._options)
-                self.writer = Writer(whole, path)
+                self.writer = self._new_writer(whole, path)
                 for episode in whole.episodes:
                     self.writer.add(episode)
             self.writer.close()

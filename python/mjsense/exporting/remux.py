@@ -49,10 +49,14 @@ class Concatenation:
             stream = video.streams.video[0]
             packets = [packet for packet in video.demux(stream) if packet.dts is not None]
             if len(packets) != frames:
-                raise ValueError(f"{path} has {len(packets)} frames, but its episode has {frames} observations; `mjsense verify` checks the files")
+                raise ValueError(
+                    f"{path} has {len(packets)} frames, but its episode has {frames} observations; `mjsense verify` checks the files"
+                )
             tick = 1 / (fps * stream.time_base)  # of one frame
             if tick.denominator != 1 or sorted(packet.pts for packet in packets) != [n * tick.numerator for n in range(frames)]:
-                raise ValueError(f"{path}: its times are not those of {fps} frames per second from 0; `mjsense verify` checks the files")
+                raise ValueError(
+                    f"{path}: its times are not those of {fps} frames per second from 0; `mjsense verify` checks the files"
+                )
             if kept < frames and packets[-1].pts != (frames - 1) * tick.numerator:
                 raise ValueError(f"{path}: its last frame cannot be left out, because others need it")
             # Frames are decoded up to `delay` positions before they are shown; dts is therefore negative at the start.

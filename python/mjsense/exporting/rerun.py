@@ -1,75 +1,127 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export to recordings of the Rerun viewer: videos, numbers, cameras, and the 3D scene."""
+"""Files of the Rerun viewer. They have these entities:
+
+task                            the instruction
+features/NAME                   a curve for each number
+world/cameras/NAME              pose and focal length of a camera, if they are known
+world/cameras/NAME/colour       its images or video; also /depth and other images of the camera
+world/scene/BODY                pose of a body; its name begins with its number in the model
+world/scene/BODY/GEOM           a geom of it; its name begins with its number in the body
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.core.png import png_of
 from mjsense.dataset import Episode
+from mjsense.dataset.episode_rows import VIDEOS
 from mjsense.exporting.images import depth_unit, depth_videos, to_uint16
-from mjsense.exporting.mapping import Mapping, Source
-from mjsense.exporting.output import join_folders, needs, new_output
+from mjsense.exporting.mapping import Source
+from mjsense.exporting.output import join_folders, needs
 from mjsense.exporting.scene import Shape, bodies
-
-
-@checked
-def export_rerun(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a folder of ``.rrd`` files, one for each episode, which ``rerun OUT/*.rrd`` shows: the videos as they are,
-    depth images, features as curves, and, if the recording has data for replay, the geoms of the scene.
-
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which curves: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success)
-    source.print_notes()
-    with new_output(out) as path:
-        write(source, path, progress)
-    return Path(out)
 
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Writes the files of all episodes to the new folder ``path``."""
-    rr = needs("rerun", "rerun")
+    needs("rerun", "rerun")
     path.mkdir()
     for episode in source.each(progress):
         name = f"episode_{episode.index:08d}"
-        stream = rr.RecordingStream("mjsense", recording_id=f"{source.name}_{name}")
-        stream.save(path / f"{name}.rrd", default_blueprint=_blueprint(source, episode))
-        stream.send_recording_name(f"{episode.index}: {episode.task}")
-        stream.send_property("episode", rr.AnyValues(outcome=episode.outcome, seed=str(episode.seed), file=f"{episode.path.name}/{episode.trajectory}"))
-        stream.log("task", rr.TextDocument(episode.task), static=True)
-        _log_features(rr, stream, source, episode)
-        for camera in source.cameras:
-            _log_camera(rr, stream, source, episode, camera)
-        _log_depth(rr, stream, source, episode)
-        _log_scene(rr, stream, source, episode)
-        stream.disconnect()
+        with RerunFile(path / f"{name}.rrd", f"{source.name}_{name}", _blueprint(source, episode)) as file:
+            rr, stream = file.rr, file.stream
+            stream.send_recording_name(f"{episode.index}: {episode.task}")
+            place = f"{episode.path.name}/{episode.trajectory}"
+            stream.send_property("episode", rr.AnyValues(outcome=episode.outcome, seed=str(episode.seed), file=place))
+            stream.log("task", rr.TextDocument(episode.task), static=True)
+            _log_features(rr, stream, source, episode)
+            for camera in source.cameras:
+                _log_camera(rr, stream, source, episode, camera)
+            _log_depth(rr, stream, source, episode)
+            _log_scene(rr, stream, source, episode)
 
 
 join = join_folders
+
+
+class RerunFile:
+    """A file that is written step by step. At the end of the block it is complete."""
+
+    def __init__(self, path: Path, recording_id: str | None = None, blueprint: Any = None) -> None:
+        self.rr = needs("rerun", "rerun")
+        self.stream = self.rr.RecordingStream("mjsense", recording_id=recording_id)
+        self.stream.save(path, default_blueprint=blueprint)
+        self.stream.log("world", self.rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+    def __enter__(self) -> RerunFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stream.disconnect()
+
+    def at(self, frame: int, seconds: float) -> None:
+        """Sets the time of what is logged from now on."""
+        self.stream.set_time("frame", sequence=frame)
+        self.stream.set_time("time", duration=seconds)
+
+    def curve(self, name: str, values: np.ndarray) -> None:
+        """Logs the present numbers of a feature."""
+        self.stream.log(f"features/{name}", self.rr.Scalars(values))
+
+    def image(self, name: str, image: np.ndarray) -> None:
+        """Logs the present image of a camera: uint8 [H, W, 3], or depth in metres, float [H, W, 1]; other images are skipped.
+
+        Args:
+            name: ``CAMERA``, ``CAMERA_depth`` as in recordings, or ``CAMERA/rgb`` as in a scene.
+        """
+        if image.dtype.kind == "f":
+            logged = self.rr.DepthImage(image.reshape(image.shape[:2]), meter=1.0)
+        elif image.dtype == np.uint8:
+            logged = self.rr.Image(image).compress()
+        else:
+            return
+        self.stream.log(_image_entity(name), logged)
+
+    def pose(self, body: str, position: np.ndarray, quat: np.ndarray) -> None:
+        """Logs the present pose of a body. ``quat`` is wxyz."""
+        self.stream.log(body, self._transform(position, quat))
+
+    def mesh(
+        self, place: str, position: np.ndarray, quat: np.ndarray, *, vertices: np.ndarray, faces: np.ndarray, **looks: Any
+    ) -> None:
+        """Logs a geom, in the frame of its body.
+
+        Args:
+            looks: Further arguments of ``rerun.Mesh3D``.
+        """
+        self.stream.log(place, self._transform(position, quat))
+        self.stream.log(place, self.rr.Mesh3D(vertex_positions=vertices, triangle_indices=faces, **looks))
+
+    def _transform(self, position: np.ndarray, quat: np.ndarray) -> Any:
+        return self.rr.Transform3D(translation=position, quaternion=self.rr.Quaternion(xyzw=quat[[1, 2, 3, 0]]))
+
+
+def body_entity(number: int, name: str) -> str:
+    """Entity of a body of a model."""
+    return f"world/scene/{_part(number, name)}"
+
+
+def geom_entity(body: str, number: int, name: str) -> str:
+    """Entity of a geom of a body, with its number in the body."""
+    return f"{body}/{_part(number, name)}"
+
+
+def _image_entity(name: str) -> str:
+    camera, _, field = name.removeprefix(VIDEOS).partition("/")
+    if not field:
+        field = "depth" if camera.endswith("_depth") else "colour"
+        camera = camera.removesuffix("_depth")
+    return f"world/cameras/{camera}/{'colour' if field == 'rgb' else field}"
 
 
 def _blueprint(source: Source, episode: Episode) -> Any:
@@ -86,7 +138,10 @@ def _blueprint(source: Source, episode: Episode) -> Any:
         eye = None
     cameras = [rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name) for name in source.cameras]
     curves = [rrb.TimeSeriesView(origin=f"features/{name}", name=name) for name in source.features]
-    shown = ["$origin/**", *(f"- $origin/cameras/{name}/depth" for name in source.cameras)]  # depth images would cover the scene with points
+    shown = [
+        "$origin/**",
+        *(f"- $origin/cameras/{name}/depth" for name in source.cameras),
+    ]  # depth images would cover the scene with points
     scene = rrb.Spatial3DView(origin="world", name="scene", contents=shown, eye_controls=eye)
     left = rrb.Vertical(scene, rrb.TextDocumentView(origin="task", name="task"), row_shares=[9, 1])
     right = rrb.Vertical(*cameras, rrb.Tabs(*curves)) if cameras else rrb.Tabs(*curves)
@@ -94,13 +149,18 @@ def _blueprint(source: Source, episode: Episode) -> Any:
 
 
 def _times(rr: Any, source: Source, rows: int) -> list[Any]:
-    return [rr.TimeColumn("time", duration=[float(t / source.fps) for t in range(rows)]), rr.TimeColumn("frame", sequence=range(rows))]
+    return [
+        rr.TimeColumn("time", duration=[float(t / source.fps) for t in range(rows)]),
+        rr.TimeColumn("frame", sequence=range(rows)),
+    ]
 
 
 def _log_features(rr: Any, stream: Any, source: Source, episode: Episode) -> None:
     for name, rows in source.rows(episode).items():
         stream.log(f"features/{name}", rr.SeriesLines(names=list(source.features[name].names)), static=True)
-        stream.send_columns(f"features/{name}", _times(rr, source, len(rows)), rr.Scalars.columns(scalars=rows.astype(np.float64)))
+        stream.send_columns(
+            f"features/{name}", _times(rr, source, len(rows)), rr.Scalars.columns(scalars=rows.astype(np.float64))
+        )
 
 
 def _log_camera(rr: Any, stream: Any, source: Source, episode: Episode, name: str) -> None:
@@ -108,7 +168,9 @@ def _log_camera(rr: Any, stream: Any, source: Source, episode: Episode, name: st
     video.check()
     asset = rr.AssetVideo(path=video.path)
     stream.log(f"{place}/colour", asset, static=True)
-    frames = rr.VideoFrameReference.columns(timestamp=[rr.components.VideoTimestamp(nanoseconds=int(t)) for t in asset.read_frame_timestamps_nanos()])
+    frames = rr.VideoFrameReference.columns(
+        timestamp=[rr.components.VideoTimestamp(nanoseconds=int(t)) for t in asset.read_frame_timestamps_nanos()]
+    )
     stream.send_columns(f"{place}/colour", times, frames)
     poses = _camera_poses(source, episode, name)
     if poses is None:
@@ -136,13 +198,15 @@ def _log_depth(rr: Any, stream: Any, source: Source, episode: Episode) -> None:
 
 def _log_scene(rr: Any, stream: Any, source: Source, episode: Episode) -> None:
     """The geoms of each body, once, and the poses of the bodies that move, at every observation."""
-    for i, body in enumerate(bodies(episode)):
-        place = f"world/scene/{_part(i, body.name)}"
-        for k, shape in enumerate(body.shapes):
-            stream.log(f"{place}/{_part(k, shape.name)}", _drawn(rr, shape), static=True)
+    for body in bodies(episode):
+        place = body_entity(body.number, body.name)
+        for shape in body.shapes:
+            stream.log(geom_entity(place, shape.number, shape.name), _drawn(rr, shape), static=True)
         quats = body.quats[:, [1, 2, 3, 0]]
         if body.moves:
-            stream.send_columns(place, _times(rr, source, episode.length), rr.Transform3D.columns(translation=body.positions, quaternion=quats))
+            stream.send_columns(
+                place, _times(rr, source, episode.length), rr.Transform3D.columns(translation=body.positions, quaternion=quats)
+            )
         else:
             stream.log(place, rr.Transform3D(translation=body.positions[0], quaternion=quats[0]), static=True)
 
@@ -156,7 +220,9 @@ def _drawn(rr: Any, shape: Shape) -> Any:
     """Rerun's shape."""
     x, _, z = shape.size
     if shape.triangles is not None:
-        corners = shape.triangles.reshape(-1, 3) @ shape.rotation.T + shape.position  # each triangle has its own, so that edges are sharp
+        corners = (
+            shape.triangles.reshape(-1, 3) @ shape.rotation.T + shape.position
+        )  # each triangle has its own, so that edges are sharp
         normals = np.repeat(np.cross(corners[1::3] - corners[::3], corners[2::3] - corners[::3]), 3, 0)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return rr.Mesh3D(vertex_positions=corners, vertex_normals=normals, albedo_factor=shape.rgba)

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.core.png import png_of
 from mjsense.dataset import Episode
 from mjsense.exporting.images import FLAGS, depth_unit, depth_videos, to_uint16
-from mjsense.exporting.mapping import Mapping, Source, check_names, named_streams
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, check_names, named_streams
+from mjsense.exporting.output import needs
 
 _VERSION = "1.0.0"
 _SHARD_BYTES = 200_000_000
@@ -26,80 +25,57 @@ _OWN = ("observation", "reward", "discount", "is_first", "is_last", "is_terminal
 _MODULE = "tensorflow_datasets.core.features."
 
 
-@checked
-def export_rlds(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG.
+def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Writes all episodes to the new folder ``path``, whose name is that of the data set."""
+    _write_data_set(source, _records(source, progress), path)
+
+
+def join(source: Source, parts: Iterable[Path], path: Path) -> None:
+    """Writes the new data set ``path`` with the records of several data sets.
 
     Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist. Its name is that of the data set: small letters, digits and ``_``.
-        map: Which streams become which features: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+        source: The episodes of all parts.
     """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_notes()
-    _write_data_set(source, _records(source, progress), Path(out))
-    return Path(out)
+    _write_data_set(source, (record for part in parts for record in _records_of(part)), path)
 
 
-def write(source: Source, path: Path) -> None:
-    """Writes the records of all episodes to the new file ``path``."""
-    with open(path, "wb") as file:
-        file.writelines(_records(source))
-
-
-def join(source: Source, parts: Iterable[Path], out: Path) -> None:
-    """Writes the new data set ``out`` with the records of several files.
-
-    Args:
-        source: The episodes of all files.
-    """
-    _write_data_set(source, (record for part in parts for record in _read_records(part)), out)
-
-
-def _write_data_set(source: Source, records: Iterable[bytes], out: Path) -> None:
-    name = out.resolve().name
+def _write_data_set(source: Source, records: Iterable[bytes], path: Path) -> None:
+    name = path.name
     observed = [feature for feature in source.features if not source.features[feature].of_step]
     others = [feature for feature in source.features if source.features[feature].of_step and feature not in FLAGS]
-    check_names([*((key, f"RLDS's '{key}'") for key in _OWN), *((feature, f"the feature '{feature}'") for feature in others),
-                 *named_streams(source, observed, "observation/")])  # fmt: skip
+    check_names(
+        [
+            *((key, f"RLDS's '{key}'") for key in _OWN),
+            *((feature, f"the feature '{feature}'") for feature in others),
+            *named_streams(source, observed, "observation/"),
+        ]
+    )
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         valid = re.sub(r"\W+", "_", name.lower())
-        raise ValueError(f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'")
-    with new_output(out) as path:
-        folder = path / _VERSION
-        folder.mkdir(parents=True)
-        shards: list[list[int]] = []  # bytes of the examples of each shard
-        for record in records:
-            if not shards or sum(shards[-1]) > _SHARD_BYTES:
-                shards.append([])
-            with open(folder / f"shard_{len(shards) - 1}", "ab") as file:
-                file.write(record)
-            shards[-1].append(len(record) - _FRAME_BYTES)
-        for k in range(len(shards)):
-            (folder / f"shard_{k}").rename(folder / f"{name}-train.tfrecord-{k:05d}-of-{len(shards):05d}")
-        split = {"name": "train", "filepathTemplate": "{DATASET}-{SPLIT}.{FILEFORMAT}-{SHARD_X_OF_Y}",
-                 "shardLengths": [str(len(shard)) for shard in shards], "numBytes": str(sum(sum(shard) for shard in shards))}  # fmt: skip
-        about = f"{len(source)} episodes of the robot {source.robot} at {source.fps} observations per second, recorded with mjsense."
-        info = {"name": name, "version": _VERSION, "description": about, "fileFormat": "tfrecord", "splits": [split]}
-        (folder / "dataset_info.json").write_text(json.dumps(info, indent=2))
-        (folder / "features.json").write_text(json.dumps(_features(source), indent=2))
+        raise ValueError(
+            f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'"
+        )
+    folder = path / _VERSION
+    folder.mkdir(parents=True)
+    shards: list[list[int]] = []  # bytes of the examples of each shard
+    for record in records:
+        if not shards or sum(shards[-1]) > _SHARD_BYTES:
+            shards.append([])
+        with open(folder / f"shard_{len(shards) - 1}", "ab") as file:
+            file.write(record)
+        shards[-1].append(len(record) - _FRAME_BYTES)
+    for k in range(len(shards)):
+        (folder / f"shard_{k}").rename(folder / f"{name}-train.tfrecord-{k:05d}-of-{len(shards):05d}")
+    split = {
+        "name": "train",
+        "filepathTemplate": "{DATASET}-{SPLIT}.{FILEFORMAT}-{SHARD_X_OF_Y}",
+        "shardLengths": [str(len(shard)) for shard in shards],
+        "numBytes": str(sum(sum(shard) for shard in shards)),
+    }
+    about = f"{len(source)} episodes of the robot {source.robot} at {source.fps} observations per second, recorded with mjsense."
+    info = {"name": name, "version": _VERSION, "description": about, "fileFormat": "tfrecord", "splits": [split]}
+    (folder / "dataset_info.json").write_text(json.dumps(info, indent=2))
+    (folder / "features.json").write_text(json.dumps(_features(source), indent=2))
 
 
 # The description of the features, as tensorflow-datasets writes it.
@@ -112,7 +88,11 @@ def _dict(features: dict[str, Any]) -> dict[str, Any]:
 def _tensor(dtype: str, shape: tuple[int, ...] = (), description: str = "") -> dict[str, Any]:
     kind = "tensor_feature.Tensor" if shape else "scalar.Scalar"
     dimensions = {"dimensions": [str(n) for n in shape]} if shape else {}
-    return {"pythonClassName": _MODULE + kind, "tensor": {"dtype": dtype, "encoding": "none", "shape": dimensions}, "description": description}
+    return {
+        "pythonClassName": _MODULE + kind,
+        "tensor": {"dtype": dtype, "encoding": "none", "shape": dimensions},
+        "description": description,
+    }
 
 
 def _image(dtype: str, shape: tuple[int, ...], description: str = "") -> dict[str, Any]:
@@ -135,13 +115,26 @@ def _features(source: Source) -> dict[str, Any]:
     step |= {"reward": _tensor("float32"), "discount": _tensor("float32"), "language_instruction": _text()}
     for name, feature in source.features.items():
         if name not in FLAGS:
-            (step if feature.of_step else observation)[name] = _tensor(_stored(feature.dtype), (feature.size,), ", ".join(feature.names))
+            (step if feature.of_step else observation)[name] = _tensor(
+                _stored(feature.dtype), (feature.size,), ", ".join(feature.names)
+            )
     for name in source.cameras if source.episodes else ():
         observation[name] = _image("uint8", source.video(source.episodes[0], name).shape[1:])
     for name, video in depth_videos(source, source.episodes[0]).items() if source.episodes else ():
-        observation[f"{name}_depth"] = _image("uint16", (*video.shape[1:], 1), f"Distance to the camera plane in units of {depth_unit(video)} m; 0: no measurement.")
-    steps = {"pythonClassName": f"{_MODULE}dataset_feature.Dataset", "sequence": {"feature": _dict({"observation": _dict(observation), **step}), "length": "-1"}}
-    metadata = {"file_path": _text(), "outcome": _text(), "success": _tensor("bool"), "seed": _tensor("int64"), "trimmed_steps": _tensor("int64")}
+        observation[f"{name}_depth"] = _image(
+            "uint16", (*video.shape[1:], 1), f"Distance to the camera plane in units of {depth_unit(video)} m; 0: no measurement."
+        )
+    steps = {
+        "pythonClassName": f"{_MODULE}dataset_feature.Dataset",
+        "sequence": {"feature": _dict({"observation": _dict(observation), **step}), "length": "-1"},
+    }
+    metadata = {
+        "file_path": _text(),
+        "outcome": _text(),
+        "success": _tensor("bool"),
+        "seed": _tensor("int64"),
+        "trimmed_steps": _tensor("int64"),
+    }
     return _dict({"steps": steps, "episode_metadata": _dict(metadata)})
 
 
@@ -216,7 +209,8 @@ def _records(source: Source, progress: Callable[[int, int], None] | None = None)
         yield length + masked(length) + data + masked(data)
 
 
-def _read_records(path: Path) -> Iterator[bytes]:
-    with open(path, "rb") as file:
-        while length := file.read(8):
-            yield length + file.read(struct.unpack("<Q", length)[0] + _FRAME_BYTES - len(length))
+def _records_of(folder: Path) -> Iterator[bytes]:
+    for path in sorted((folder / _VERSION).glob("*.tfrecord-*")):
+        with open(path, "rb") as file:
+            while length := file.read(8):
+                yield length + file.read(struct.unpack("<Q", length)[0] + _FRAME_BYTES - len(length))

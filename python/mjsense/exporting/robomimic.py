@@ -10,52 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.core.env_ids import env_id
 from mjsense.dataset import Episode, Video
 from mjsense.dataset.model_xml import model_xml
 from mjsense.exporting.images import FLAGS, depth_videos
-from mjsense.exporting.mapping import Mapping, Source, check_names, named_streams
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, check_names, named_streams
+from mjsense.exporting.output import needs
 
 _GYM = 2  # robomimic's EnvType.GYM_TYPE
 _VALID_EVERY = 10
 _OWN = ("actions", "rewards", "dones", "obs", "next_obs", "states", "integration_states", "assets")
 """Members of a demonstration."""
-
-
-@checked
-def export_robomimic(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
-    data for replay. Images are decoded, because robomimic reads arrays.
-
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: File to write. It must not exist.
-        map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_notes()
-    with new_output(out) as path:
-        write(source, path, progress)
-    return Path(out)
 
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
@@ -71,18 +36,23 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
 def _check_names(source: Source) -> None:
     observed = [name for name, feature in source.features.items() if not feature.of_step]
     others = [name for name, feature in source.features.items() if feature.of_step and name not in ("action", *FLAGS)]
-    check_names([*((name, f"robomimic's '{name}'") for name in _OWN), *((name, f"the feature '{name}'") for name in others),
-                 *named_streams(source, observed, "obs/", "_image")])  # fmt: skip
+    check_names(
+        [
+            *((name, f"robomimic's '{name}'") for name in _OWN),
+            *((name, f"the feature '{name}'") for name in others),
+            *named_streams(source, observed, "obs/", "_image"),
+        ]
+    )
 
 
-def join(source: Source, parts: Iterable[Path], out: Path) -> None:
-    """Writes the new file ``out`` with the demonstrations of several files, whose arrays are copied as they are compressed.
+def join(source: Source, parts: Iterable[Path], path: Path) -> None:
+    """Writes the new file ``path`` with the demonstrations of several files, whose arrays are copied as they are compressed.
 
     Args:
         source: The episodes of all files.
     """
     h5py = needs("h5py", "robomimic")
-    with new_output(out) as path, h5py.File(path, "w") as file:
+    with h5py.File(path, "w") as file:
         models: dict[bytes, Any] = {}
         count = 0
         for part in parts:
@@ -157,7 +127,9 @@ def _write_demo(demo: Any, models: dict[bytes, Any], source: Source, episode: Ep
 
 def _write_video(demo: Any, name: str, video: Video) -> None:
     shape = video.shape if len(video.shape) == 4 else (*video.shape, 1)  # robomimic's depth images have one channel
-    options = dict(dtype=video.dtype, chunks=(1, *shape[1:]), compression="gzip", compression_opts=1, shuffle=video.dtype.itemsize > 1)
+    options = dict(
+        dtype=video.dtype, chunks=(1, *shape[1:]), compression="gzip", compression_opts=1, shuffle=video.dtype.itemsize > 1
+    )
     steps = len(video) - 1
     now, after = (demo.create_dataset(f"{group}/{name}", (steps, *shape[1:]), **options) for group in ("obs", "next_obs"))
     for t in range(steps + 1):

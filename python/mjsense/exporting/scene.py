@@ -30,6 +30,8 @@ class Shape:
     """A geom in the frame of its body."""
 
     name: str
+    number: int
+    """Number in its body."""
     kind: str
     """``box``, ``ellipsoid``, ``cylinder`` and ``capsule`` along z, or ``mesh``."""
     size: np.ndarray
@@ -52,6 +54,8 @@ class Body:
     """A body with visible geoms, and its pose in the world at every observation."""
 
     name: str
+    number: int
+    """Number in the model."""
     shapes: tuple[Shape, ...]
     positions: np.ndarray
     """[T, 3]."""
@@ -74,31 +78,35 @@ def bodies(episode: Episode) -> list[Body]:
     positions, quats = np.stack([p for p, _ in poses]), np.stack([q for _, q in poses])
     absent = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in playback.inputs_of(episode).held}
     present = [i for i in range(model.nbody) if i == 0 or int(model.body_rootid[i]) not in absent]
-    return [Body(model.body(i).name, shapes, positions[:, i], quats[:, i]) for i in present if (shapes := tuple(_shapes(model, i)))]
+    return [
+        Body(model.body(i).name, i, shapes, positions[:, i], quats[:, i]) for i in present if (shapes := tuple(_shapes(model, i)))
+    ]
 
 
 def _shapes(model: mujoco.MjModel, body: int) -> Iterator[Shape]:
     kinds = mujoco.mjtGeom
     for i in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
         material, size, position = model.geom_matid[i], model.geom_size[i], model.geom_pos[i]
-        rgba = model.mat_rgba[material] if material >= 0 and np.array_equal(model.geom_rgba[i], _NO_COLOUR) else model.geom_rgba[i]
+        rgba = (
+            model.mat_rgba[material] if material >= 0 and np.array_equal(model.geom_rgba[i], _NO_COLOUR) else model.geom_rgba[i]
+        )
         if model.geom_group[i] >= _SEEN_GROUPS or rgba[3] == 0:
             continue
         name, quat = model.geom(i).name or f"geom_{i}", model.geom_quat[i]
-        kind = kinds(model.geom_type[i])
+        kind, number = kinds(model.geom_type[i]), i - model.body_geomadr[body]
         if kind == kinds.mjGEOM_PLANE:
             half = np.array([size[0] or _PLANE, size[1] or _PLANE, 0.001])
-            yield Shape(name, "box", half, position - [0, 0, half[2]], quat, rgba)
+            yield Shape(name, number, "box", half, position - [0, 0, half[2]], quat, rgba)
         elif kind == kinds.mjGEOM_BOX:
-            yield Shape(name, "box", size, position, quat, rgba)
+            yield Shape(name, number, "box", size, position, quat, rgba)
         elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_ELLIPSOID):
             half = size if kind == kinds.mjGEOM_ELLIPSOID else np.full(3, size[0])
-            yield Shape(name, "ellipsoid", half, position, quat, rgba)
+            yield Shape(name, number, "ellipsoid", half, position, quat, rgba)
         elif kind in (kinds.mjGEOM_CYLINDER, kinds.mjGEOM_CAPSULE):
             form = "cylinder" if kind == kinds.mjGEOM_CYLINDER else "capsule"
-            yield Shape(name, form, np.array([size[0], size[0], size[1]]), position, quat, rgba)
+            yield Shape(name, number, form, np.array([size[0], size[0], size[1]]), position, quat, rgba)
         elif kind == kinds.mjGEOM_MESH:
             mesh = model.geom_dataid[i]
             vertices = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
             faces = model.mesh_face[model.mesh_faceadr[mesh] :][: model.mesh_facenum[mesh]]
-            yield Shape(name, "mesh", size, position, quat, rgba, vertices[faces])
+            yield Shape(name, number, "mesh", size, position, quat, rgba, vertices[faces])

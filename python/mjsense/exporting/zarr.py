@@ -9,47 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.core.arguments import checked
 from mjsense.exporting.images import depth_videos
-from mjsense.exporting.mapping import Mapping, Source, check_names, named_streams
-from mjsense.exporting.output import needs, new_output
+from mjsense.exporting.mapping import Source, check_names, named_streams
+from mjsense.exporting.output import needs
 
 _ROWS = 4096  # rows of a chunk of numbers
 _CHUNK_BYTES = 2_000_000  # of a chunk of images, as Diffusion Policy's own
-
-
-@checked
-def export_zarr(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion
-    Policy's ``ReplayBuffer`` reads them. Images are decoded.
-
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which arrays: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
-    """
-    source = Source(root, map=map, episodes=episodes, success=success, trim_idle=trim_idle)
-    source.print_notes()
-    with new_output(out) as path:
-        write(source, path, progress)
-    return Path(out)
 
 
 def write(source: Source, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
@@ -59,8 +24,10 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     data = group.create_group("data")
     ends = _ends(source)
     steps = int(ends[-1])
-    arrays = {name: data.create_dataset(name, shape=(steps, feature.size), chunks=(_ROWS, feature.size), dtype=feature.dtype)
-              for name, feature in source.features.items()}  # fmt: skip
+    arrays = {
+        name: data.create_dataset(name, shape=(steps, feature.size), chunks=(_ROWS, feature.size), dtype=feature.dtype)
+        for name, feature in source.features.items()
+    }
     for i, episode in enumerate(source.each(progress)):
         begin, end = int(ends[i]) - episode.length + 1, int(ends[i])
         for name, rows in source.rows(episode).items():
@@ -78,8 +45,8 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
     _finish(group, source)
 
 
-def join(source: Source, parts: Iterable[Path], out: Path) -> None:
-    """Writes the new folder ``out`` with the rows of several folders in their order. Chunks that lie in one part are moved; only those in
+def join(source: Source, parts: Iterable[Path], path: Path) -> None:
+    """Writes the new folder ``path`` with the rows of several folders in their order. Chunks that lie in one part are moved; only those in
     which two parts meet are compressed again.
 
     Args:
@@ -87,32 +54,33 @@ def join(source: Source, parts: Iterable[Path], out: Path) -> None:
     """
     zarr = _zarr()
     steps = int(_ends(source)[-1])
-    with new_output(out) as path:
-        group = zarr.open_group(str(path), mode="w")
-        data = group.create_group("data")
-        begin = 0
-        for part in parts:
-            end = begin
-            for name, array in zarr.open_group(str(part), mode="r")["data"].arrays():
-                if name not in data:
-                    data.create_dataset(name, shape=(steps, *array.shape[1:]), chunks=array.chunks, dtype=array.dtype)
-                rows, end = array.chunks[0], len(array)
-                for number in range(begin // rows, -(-end // rows)):
-                    first, last = number * rows, min((number + 1) * rows, steps)
-                    if begin <= first and last <= end:
-                        place = f"data/{name}/{number}{'.0' * (array.ndim - 1)}"
-                        (part / place).rename(path / place)
-                    else:
-                        met = slice(max(first, begin), min(last, end))
-                        data[name][met] = array[met]
-            begin = end
-        _finish(group, source)
+    group = zarr.open_group(str(path), mode="w")
+    data = group.create_group("data")
+    begin = 0
+    for part in parts:
+        end = begin
+        for name, array in zarr.open_group(str(part), mode="r")["data"].arrays():
+            if name not in data:
+                data.create_dataset(name, shape=(steps, *array.shape[1:]), chunks=array.chunks, dtype=array.dtype)
+            rows, end = array.chunks[0], len(array)
+            for number in range(begin // rows, -(-end // rows)):
+                first, last = number * rows, min((number + 1) * rows, steps)
+                if begin <= first and last <= end:
+                    place = f"data/{name}/{number}{'.0' * (array.ndim - 1)}"
+                    (part / place).rename(path / place)
+                else:
+                    met = slice(max(first, begin), min(last, end))
+                    data[name][met] = array[met]
+        begin = end
+    _finish(group, source)
 
 
 def _zarr() -> Any:
     zarr = needs("zarr", "zarr")
     if not zarr.__version__.startswith("2."):
-        raise RuntimeError(f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip install 'mjsense[zarr]'")
+        raise RuntimeError(
+            f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip install 'mjsense[zarr]'"
+        )
     return zarr
 
 
@@ -131,5 +99,7 @@ def _attributes(source: Source) -> dict[str, Any]:
         "fps": float(source.fps),
         "robot": source.robot,
         "names": {name: list(feature.names) for name, feature in source.features.items()},
-        "episodes": [{"task": e.task, "outcome": e.outcome, "seed": e.seed, "trimmed_steps": e.trimmed_steps} for e in source.episodes],
+        "episodes": [
+            {"task": e.task, "outcome": e.outcome, "seed": e.seed, "trimmed_steps": e.trimmed_steps} for e in source.episodes
+        ],
     }

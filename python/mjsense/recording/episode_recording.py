@@ -82,7 +82,9 @@ class EpisodeRecording:
         if len(camera_size) != 2:
             raise ValueError(f"RecordEpisodes: camera_size is {camera_size}: must be (height, width)")
         if unknown := options.keys() - set(_OPTIONS):
-            raise TypeError(f"RecordEpisodes() got unexpected arguments {', '.join(sorted(unknown))}; options are {', '.join(_OPTIONS)}")
+            raise TypeError(
+                f"RecordEpisodes() got unexpected arguments {', '.join(sorted(unknown))}; options are {', '.join(_OPTIONS)}"
+            )
         self._env = env
         self._vector = isinstance(env, VectorEnv)
         self._worlds: int = env.num_envs if self._vector else 1
@@ -94,17 +96,26 @@ class EpisodeRecording:
         self.path = Path(out) / f"house_{self._options['house']}"
         """Folder of the episodes."""
         if not resume and self.path.exists() and any(self.path.iterdir()):
-            raise ValueError(f"RecordEpisodes: '{self.path}' has a recording: pass resume=True to continue it, or choose another folder")
+            raise ValueError(
+                f"RecordEpisodes: '{self.path}' has a recording: pass resume=True to continue it, or choose another folder"
+            )
         prefix = "single_" if self._vector else ""
-        spaces = {"observation": getattr(env, f"{prefix}observation_space"), "actions/action": getattr(env, f"{prefix}action_space")}
+        spaces = {
+            "observation": getattr(env, f"{prefix}observation_space"),
+            "actions/action": getattr(env, f"{prefix}action_space"),
+        }
         self._rows = {name: self._rows_of(name, space) for name, space in spaces.items()}
-        self.autoreset = (env.metadata or {}).get("autoreset_mode", AutoresetMode.NEXT_STEP) if self._vector else AutoresetMode.DISABLED
+        self.autoreset = (
+            (env.metadata or {}).get("autoreset_mode", AutoresetMode.NEXT_STEP) if self._vector else AutoresetMode.DISABLED
+        )
         """When the environments are reset."""
         self._fps = self._rate(fps)
         needs_mujoco = bool(sensors) or any(camera != "render" for camera in self._cameras.values())
         self._mujoco = MujocoEnvs(self._single_envs(), sensors, decimation) if needs_mujoco else None
         if self.autoreset == AutoresetMode.SAME_STEP and (self._cameras or sensors):
-            raise ValueError("RecordEpisodes: cameras and sensors do not see the last state of an episode with AutoresetMode.SAME_STEP; use NEXT_STEP")
+            raise ValueError(
+                "RecordEpisodes: cameras and sensors do not see the last state of an episode with AutoresetMode.SAME_STEP; use NEXT_STEP"
+            )
         name = getattr(env.spec, "id", None) or type(env.unwrapped).__name__
         self._settings = {"env": name, "cameras": self._cameras, "camera_size": self._size, **(settings or {})}
         self._scene = {"task_description": name, "policy_dt_ms": float(1000 / self._fps)}
@@ -167,7 +178,14 @@ class EpisodeRecording:
         self._record(steps, seeds)
 
     def step(
-        self, action: Any, observation: Any, reward: Any, terminated: Any, truncated: Any, infos: Sequence[Mapping[str, Any]], final: Any = None
+        self,
+        action: Any,
+        observation: Any,
+        reward: Any,
+        terminated: Any,
+        truncated: Any,
+        infos: Sequence[Mapping[str, Any]],
+        final: Any = None,
     ) -> None:
         """All environments have made a step.
 
@@ -176,7 +194,9 @@ class EpisodeRecording:
         """
         steps, begun, after = {}, {}, {}
         if np.size(reward) != self._worlds:
-            raise ValueError(f"RecordEpisodes: the reward has the shape {np.shape(reward)}, expected one number for each environment")
+            raise ValueError(
+                f"RecordEpisodes: the reward has the shape {np.shape(reward)}, expected one number for each environment"
+            )
         for w in range(self._worlds):
             seen = self.of_world(observation, "observation", w)
             if self.autoreset == AutoresetMode.NEXT_STEP and w in self._ended:
@@ -228,7 +248,11 @@ class EpisodeRecording:
             self._write(world, steps[world], images[world])
         chosen = [steps[w] for w in worlds]
         self._core.append(
-            worlds, [s.reward for s in chosen], [s.terminated for s in chosen], [s.truncated for s in chosen], [s.success for s in chosen]
+            worlds,
+            [s.reward for s in chosen],
+            [s.terminated for s in chosen],
+            [s.truncated for s in chosen],
+            [s.success for s in chosen],
         )
         for world, step in zip(worlds, chosen):
             if world in self._running and (step.terminated or step.truncated):
@@ -252,29 +276,45 @@ class EpisodeRecording:
 
     def _open(self, images: Mapping[str, np.ndarray]) -> Any:
         streams, written = WrittenRows(self._worlds), self._written
-        texts = {"observation": "Observation of the environment.", "actions/action": "Action that led to this row; 0 in the first row."}
+        texts = {
+            "observation": "Observation of the environment.",
+            "actions/action": "Action that led to this row; 0 in the first row.",
+        }
         names: set[str] = set()
         for name, rows in self._rows.items():
             for row in rows:
                 low, high = row.bounds()
                 stream, shape = self._stream_of(name, row), row.shape
                 if stream in names:
-                    raise ValueError(f"RecordEpisodes: two images of the observation would be the video '{stream}': rename one, or pass image_videos=False")
+                    raise ValueError(
+                        f"RecordEpisodes: two images of the observation would be the video '{stream}': rename one, or pass image_videos=False"
+                    )
                 names.add(stream)
                 video = self._is_video(name, row)
                 if video:
                     low, high, shape = 0.0, 255.0, shape if shape[2] == _RGB else (*shape[1:], _RGB)
                 written[stream] = streams.add(stream, row.kept, shape, texts[name], low=low, high=high, video=video)
-        written["info"] = streams.add("info", "uint8", [self._info_bytes], "Infos of the environment.", is_dict=True, low=0.0, high=255.0)
+        written["info"] = streams.add(
+            "info", "uint8", [self._info_bytes], "Infos of the environment.", is_dict=True, low=0.0, high=255.0
+        )
         for name, image in images.items():
             about = f"Image of the camera '{self._cameras[name]}'."
             written[name] = streams.add(name, "uint8", image.shape, about, low=0.0, high=255.0, frame="pixels", video=True)
         attached = self._mujoco.attached if self._mujoco is not None else None
-        handles = [*streams.handles, *(recorded_handle(sensor) for sensor in (attached.sensors.values() if attached is not None else ()))]
+        handles = [
+            *streams.handles,
+            *(recorded_handle(sensor) for sensor in (attached.sensors.values() if attached is not None else ())),
+        ]
         return _core.Recorder(
-            None if attached is None else attached.simulation._core, self._worlds, handles, str(self.path.parent), self._fps.numerator,
-            self._fps.denominator, json.dumps(self._settings, sort_keys=True), {**self._options},
-        )  # fmt: skip
+            None if attached is None else attached.simulation._core,
+            self._worlds,
+            handles,
+            str(self.path.parent),
+            self._fps.numerator,
+            self._fps.denominator,
+            json.dumps(self._settings, sort_keys=True),
+            {**self._options},
+        )
 
     def _is_video(self, name: str, row: Row) -> bool:
         """Whether a row of the observation is an RGB image that becomes a video."""
@@ -289,13 +329,17 @@ class EpisodeRecording:
             for i, row in enumerate(self._rows[name]):
                 value: Any = 0 if values is None else values[i]
                 if values is not None and np.shape(value) != row.shape:
-                    raise ValueError(f"RecordEpisodes: '{'/'.join((name, *row.path))}' has the shape {np.shape(value)}, expected {row.shape} as in its space")
+                    raise ValueError(
+                        f"RecordEpisodes: '{'/'.join((name, *row.path))}' has the shape {np.shape(value)}, expected {row.shape} as in its space"
+                    )
                 if values is not None and self._is_video(name, row) and row.shape[2] != _RGB:
                     value = np.moveaxis(value, 0, -1)
                 self._written[self._stream_of(name, row)][world] = value
         for name, image in images.items():
             if image.shape != self._written[name].shape[1:]:
-                raise ValueError(f"RecordEpisodes: the image of '{name}' was {self._written[name].shape[1:]} and is now {image.shape}")
+                raise ValueError(
+                    f"RecordEpisodes: the image of '{name}' was {self._written[name].shape[1:]} and is now {image.shape}"
+                )
             self._written[name][world] = image
         text = self._info_text(step.info)
         row = self._written["info"][world]

@@ -46,9 +46,27 @@ def frames_of(video: Path, descriptor: int, options: Sequence[str], output: Sequ
         raise RuntimeError(f"Reading the video {video} needs PyAV or ffmpeg: pip install 'mjsense[dataset]'")
     kind = "matroska" if video.suffix == ".mkv" else "mov"
     command = [
-        program, "-nostdin", "-v", "error", *options, "-protocol_whitelist", "file", "-f", kind, "-codec_whitelist", "h264,ffv1", "-threads", "1",
-        "-i", f"/proc/{os.getpid()}/fd/{descriptor}", "-an", "-sn", "-dn", *output, "-",
-    ]  # fmt: skip
+        program,
+        "-nostdin",
+        "-v",
+        "error",
+        *options,
+        "-protocol_whitelist",
+        "file",
+        "-f",
+        kind,
+        "-codec_whitelist",
+        "h264,ffv1",
+        "-threads",
+        "1",
+        "-i",
+        f"/proc/{os.getpid()}/fd/{descriptor}",
+        "-an",
+        "-sn",
+        "-dn",
+        *output,
+        "-",
+    ]
     cpu_s = _MIN_CPU_S + os.fstat(descriptor).st_size // _BYTES_PER_CPU_S
     try:
         return _core.run_process([os.fsencode(word) for word in command], _SILENCE_S, cpu_s, _MEMORY, max_bytes)

@@ -39,7 +39,9 @@ class MujocoEnvs:
             model, data = getattr(model, "_model", model), getattr(data, "_data", data)  # robosuite and dm_control wrap them
             if model is not None and hasattr(data, "qpos"):
                 return model, data
-        raise TypeError(f"RecordEpisodes: {env} has no MuJoCo `model` and `data`, which sensors and cameras need; 'render' needs none")
+        raise TypeError(
+            f"RecordEpisodes: {env} has no MuJoCo `model` and `data`, which sensors and cameras need; 'render' needs none"
+        )
 
     def sense(self, begun: Sequence[int]) -> None:
         """Makes the sensors current; episodes have begun in these worlds."""

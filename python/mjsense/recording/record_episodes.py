@@ -64,7 +64,20 @@ class _Recorded:
     ) -> None:
         super().__init__(env)  # pyright: ignore[reportCallIssue]  # Gymnasium's
         self.recording = EpisodeRecording(
-            env, out, episodes, cameras, sensors, camera_size, decimation, fps, resume, keep_partial, image_videos, info_bytes, settings, options
+            env,
+            out,
+            episodes,
+            cameras,
+            sensors,
+            camera_size,
+            decimation,
+            fps,
+            resume,
+            keep_partial,
+            image_videos,
+            info_bytes,
+            settings,
+            options,
         )
 
     def __enter__(self) -> Any:

@@ -22,7 +22,15 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
 
-FILE_OPTIONS: dict[str, Any] = {"episodes": 1, "resume": False, "append": False, "overwrite": False, "house": 0, "batches": 0, "gzip": 4}
+FILE_OPTIONS: dict[str, Any] = {
+    "episodes": 1,
+    "resume": False,
+    "append": False,
+    "overwrite": False,
+    "house": 0,
+    "batches": 0,
+    "gzip": 4,
+}
 """Options of the C++ recorder for the files, with their defaults."""
 VIDEO_OPTIONS: dict[str, Any] = {"ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
 """Its options for the videos that it encodes."""
@@ -109,9 +117,20 @@ class Recorder(KnownAttributes):
         self._rows = None if isinstance(simulation, Simulation) else simulation._host_rows(chosen)
         rate = _rate(fps, simulation)
         options = {
-            "episodes": episodes, "resume": resume, "append": append, "overwrite": overwrite, "house": house, "batches": batches, "gzip": gzip, "ffmpeg": ffmpeg, "crf": crf,
-            "preset": preset, "tune": tune, "keyint": keyint, "molmospaces_depth": molmospaces_depth,
-        }  # fmt: skip
+            "episodes": episodes,
+            "resume": resume,
+            "append": append,
+            "overwrite": overwrite,
+            "house": house,
+            "batches": batches,
+            "gzip": gzip,
+            "ffmpeg": ffmpeg,
+            "crf": crf,
+            "preset": preset,
+            "tune": tune,
+            "keyint": keyint,
+            "molmospaces_depth": molmospaces_depth,
+        }
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
         self._core = _core.Recorder(
             None if self._rows else simulation._core,
@@ -180,7 +199,9 @@ class Recorder(KnownAttributes):
             self._simulation.refresh(self.sensors)
             self._rows.read()
         flags = {"terminated": terminated, "truncated": truncated, "success": success}
-        self._core.append(ids, column("reward", reward, np.float64), *(column(name, value, bool) for name, value in flags.items()))
+        self._core.append(
+            ids, column("reward", reward, np.float64), *(column(name, value, bool) for name, value in flags.items())
+        )
 
     def finish_episode(self, world: int, obs_scene: Mapping[str, Any] | str | None = None, outcome: str = "") -> None:
         """Ends the episode of this world and keeps it.

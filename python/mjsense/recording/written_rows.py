@@ -28,8 +28,17 @@ class WrittenRows:
         Returns:
             The array ``[B, *shape]`` to write the current rows to.
         """
-        spec = {"dtype": dtype, "shape": [*shape], "low": -np.inf, "high": np.inf, "is_dict": False, "unit": "", "frame": "",
-                "description": description, **more}  # fmt: skip
+        spec = {
+            "dtype": dtype,
+            "shape": [*shape],
+            "low": -np.inf,
+            "high": np.inf,
+            "is_dict": False,
+            "unit": "",
+            "frame": "",
+            "description": description,
+            **more,
+        }
         return self.add_spec(name, spec)
 
     def add_spec(self, name: str, spec: dict[str, Any]) -> np.ndarray:

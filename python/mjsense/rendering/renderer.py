@@ -57,7 +57,9 @@ _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
 """Element type and channels by kind of image."""
 
 _NO_POSES = "`data` has no poses yet, and no geoms are drawn: call mujoco.mj_forward(model, data)"
-_NO_CAMERA = "the image is empty, because its camera has no pose: call mujoco.mj_forward(model, data) and update_scene(data) before"
+_NO_CAMERA = (
+    "the image is empty, because its camera has no pose: call mujoco.mj_forward(model, data) and update_scene(data) before"
+)
 
 
 def _has_poses(data: mujoco.MjData) -> bool:
@@ -158,7 +160,9 @@ class Renderer:
         self._depth = self._segmentation = self._point_lights = False
         self._sizes = self._sizes_of(model)
         flag = mujoco.mjtRndFlag
-        self._flags = {name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)}
+        self._flags = {
+            name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)
+        }
         """Indices into the scene's flags."""
         self._native: Any = self._make_native()
 
@@ -419,6 +423,7 @@ class Renderer:
         images = np.empty(shape, np.uint8) if out is None else out
         if images.shape != shape or images.dtype != np.uint8 or not images.flags.c_contiguous or not images.flags.writeable:
             raise ValueError(f"Renderer.render_batch: out must be a contiguous, writable uint8 array of shape {shape}")
+
         def draw(pool: _Pool, index: int) -> None:
             renderer = pool.take()
             try:

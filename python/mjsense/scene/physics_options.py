@@ -18,10 +18,23 @@ PREFIX = "opt."
 
 _POSITIVE = {"impratio"}
 _AT_LEAST = {
-    "density": 0, "viscosity": 0, "tolerance": 0, "ls_tolerance": 0, "noslip_tolerance": 0, "ccd_tolerance": 0, "sleep_tolerance": 0,
-    "o_margin": 0, "o_friction": 0, "iterations": 1, "ls_iterations": 1, "noslip_iterations": 0, "ccd_iterations": 1,
-    "sdf_initpoints": 1, "sdf_iterations": 1, "disableactuator": 0,
-}  # fmt: skip
+    "density": 0,
+    "viscosity": 0,
+    "tolerance": 0,
+    "ls_tolerance": 0,
+    "noslip_tolerance": 0,
+    "ccd_tolerance": 0,
+    "sleep_tolerance": 0,
+    "o_margin": 0,
+    "o_friction": 0,
+    "iterations": 1,
+    "ls_iterations": 1,
+    "noslip_iterations": 0,
+    "ccd_iterations": 1,
+    "sdf_initpoints": 1,
+    "sdf_iterations": 1,
+    "disableactuator": 0,
+}
 _COMPILED = ("sleep", "ipc")
 """Enable flags for which MuJoCo prepares the data when it is made."""
 
@@ -29,7 +42,9 @@ _COMPILED = ("sleep", "ipc")
 def check_option(name: str) -> None:
     """Raises ValueError for an option that is the same in all worlds."""
     if name == "timestep":
-        raise ValueError("opt.timestep: the same in all worlds; set sim.options.timestep at the beginning of an episode of all worlds")
+        raise ValueError(
+            "opt.timestep: the same in all worlds; set sim.options.timestep at the beginning of an episode of all worlds"
+        )
 
 
 def option_values(name: str, values: Any) -> Any:
@@ -63,8 +78,10 @@ def check_option_values(name: str, values: np.ndarray, before: np.ndarray) -> No
     if name == "enableflags":
         for flag in _COMPILED:
             if ((values ^ before) & (1 << words.index(flag))).any():
-                raise ValueError(f"opt.enableflags: '{flag}' cannot change in a simulation; set it before the scene is compiled: "
-                                 f"SceneCfg(options=MujocoCfg(enableflags=(\"{flag}\",)))")  # fmt: skip
+                raise ValueError(
+                    f"opt.enableflags: '{flag}' cannot change in a simulation; set it before the scene is compiled: "
+                    f'SceneCfg(options=MujocoCfg(enableflags=("{flag}",)))'
+                )
 
 
 class Owner(Protocol):

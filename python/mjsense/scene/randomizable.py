@@ -11,23 +11,70 @@ from mjsense.core import mujoco_names
 from mjsense.scene.physics_options import PREFIX, check_option, check_option_values, option_values
 from mjsense.scene.written_values import numbers
 
-_IDS = {"geom_matid": "nmat", "site_matid": "nmat", "flex_matid": "nmat", "skin_matid": "nmat", "tendon_matid": "nmat", "mat_texid": "ntex"}
+_IDS = {
+    "geom_matid": "nmat",
+    "site_matid": "nmat",
+    "flex_matid": "nmat",
+    "skin_matid": "nmat",
+    "tendon_matid": "nmat",
+    "mat_texid": "ntex",
+}
 """Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
 _WHOLE = {
-    "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_group", "geom_matid", "geom_castshadow",
-    "geom_dataid", "site_group", "site_matid", "jnt_group", "jnt_limited", "jnt_actfrclimited", "jnt_actgravcomp",
-    "light_active", "light_castshadow", "light_type", "cam_projection", "flex_contype", "flex_conaffinity", "flex_condim",
-    "flex_priority", "flex_group", "flex_matid", "flex_selfcollide", "skin_group", "skin_matid", "mat_texid",
-    "mat_texuniform", "eq_active0", "tendon_group", "tendon_matid", "tendon_limited", "tendon_actfrclimited",
-    "actuator_group", "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "actuator_actearly",
+    "geom_contype",
+    "geom_conaffinity",
+    "geom_condim",
+    "geom_priority",
+    "geom_group",
+    "geom_matid",
+    "geom_castshadow",
+    "geom_dataid",
+    "site_group",
+    "site_matid",
+    "jnt_group",
+    "jnt_limited",
+    "jnt_actfrclimited",
+    "jnt_actgravcomp",
+    "light_active",
+    "light_castshadow",
+    "light_type",
+    "cam_projection",
+    "flex_contype",
+    "flex_conaffinity",
+    "flex_condim",
+    "flex_priority",
+    "flex_group",
+    "flex_matid",
+    "flex_selfcollide",
+    "skin_group",
+    "skin_matid",
+    "mat_texid",
+    "mat_texuniform",
+    "eq_active0",
+    "tendon_group",
+    "tendon_matid",
+    "tendon_limited",
+    "tendon_actfrclimited",
+    "actuator_group",
+    "actuator_ctrllimited",
+    "actuator_forcelimited",
+    "actuator_actlimited",
+    "actuator_actearly",
     "geom_type",
-}  # fmt: skip
+}
 """Integer and boolean model fields that may differ between worlds. All others are sizes and addresses, which MuJoCo uses to index
 memory."""
 _FIXED = {
-    "actuator_delay", "sensor_delay", "sensor_interval", "efm0_L", "bvh_aabb", "oct_aabb", "oct_coeff", "numeric_data",
+    "actuator_delay",
+    "sensor_delay",
+    "sensor_interval",
+    "efm0_L",
+    "bvh_aabb",
+    "oct_aabb",
+    "oct_coeff",
+    "numeric_data",
     "tuple_objprm",
-}  # fmt: skip
+}
 """Floating-point model fields that may not differ between worlds: buffer sizes and data structures depend on them."""
 
 _NOT_NEGATIVE = {"body_mass", "body_inertia", "geom_size", "site_size"}
@@ -38,7 +85,11 @@ def field_of(model: Any, field: str) -> Any:
     if not field.startswith(PREFIX):
         return getattr(model, field, None)
     value = getattr(model.opt, field.removeprefix(PREFIX), None)
-    return np.array(value, np.int32 if isinstance(value, int) else np.float64) if isinstance(value, (int, float, np.ndarray)) else None
+    return (
+        np.array(value, np.int32 if isinstance(value, int) else np.float64)
+        if isinstance(value, (int, float, np.ndarray))
+        else None
+    )
 
 
 def is_randomizable(model: Any, field: str) -> bool:

@@ -15,10 +15,44 @@ from mjsense.core import libmujoco, mujoco_views
 from mjsense.scene.randomizable import is_randomizable
 
 _ELEMENTS = (
-    "actuator", "bind", "body", "cam", "camera", "eq", "equality", "exclude", "geom", "hfield", "jnt", "joint", "key", "keyframe", "light",
-    "mat", "material", "mesh", "numeric", "pair", "sensor", "site", "skin", "ten", "tendon", "tex", "texture", "tuple",
-)  # fmt: skip
-_FIELDS = {"camera": "cam", "equality": "eq", "joint": "jnt", "keyframe": "key", "material": "mat", "ten": "tendon", "texture": "tex"}
+    "actuator",
+    "bind",
+    "body",
+    "cam",
+    "camera",
+    "eq",
+    "equality",
+    "exclude",
+    "geom",
+    "hfield",
+    "jnt",
+    "joint",
+    "key",
+    "keyframe",
+    "light",
+    "mat",
+    "material",
+    "mesh",
+    "numeric",
+    "pair",
+    "sensor",
+    "site",
+    "skin",
+    "ten",
+    "tendon",
+    "tex",
+    "texture",
+    "tuple",
+)
+_FIELDS = {
+    "camera": "cam",
+    "equality": "eq",
+    "joint": "jnt",
+    "keyframe": "key",
+    "material": "mat",
+    "ten": "tendon",
+    "texture": "tex",
+}
 """Methods whose elements' fields have another prefix in mjModel."""
 
 
@@ -107,7 +141,13 @@ def _read_only_class() -> Any:
 
     members: dict[str, Any] = {name: element(name) for name in _ELEMENTS if hasattr(base, name)}
     members |= {name: part(name) for name in ("opt", "stat", "vis")}
-    members |= {"__slots__": (), "__setattr__": set_attribute, "__reduce_ex__": reduce, "__module__": "mujoco", "__doc__": base.__doc__}
+    members |= {
+        "__slots__": (),
+        "__setattr__": set_attribute,
+        "__reduce_ex__": reduce,
+        "__module__": "mujoco",
+        "__doc__": base.__doc__,
+    }
     return type("MjModel", (base,), members)
 
 

@@ -79,8 +79,7 @@ class Scene(KnownAttributes):
         self._finish()
 
     def _prepare(self, cfg: SceneCfg) -> tuple[list[Any], Callable[[], None]]:
-        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final edit.
-        """
+        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final edit."""
         cfg.__post_init__()  # it may have been changed after its construction
         self.cfg = cfg
         self.spec = cfg._base_spec()
@@ -222,7 +221,9 @@ class Scene(KnownAttributes):
         configured, found = [], []
         for sensor in self._sensors.values():
             (configured if isinstance(sensor, Sensor) or sensor.cfg is not None else found).append(sensor._repr_html_())
-        return representations.block(repr(self), "".join(configured), {f"{len(found)} sensors of the models": "".join(found)} if found else None)
+        return representations.block(
+            repr(self), "".join(configured), {f"{len(found)} sensors of the models": "".join(found)} if found else None
+        )
 
     @property
     def sensors(self) -> Mapping[str, Any]:
@@ -243,7 +244,8 @@ class Scene(KnownAttributes):
         for name in self.cfg.entities:
             prefix = name + "/"
             described: dict[str, Any] = {
-                f"{kind}_names": tuple(name[len(prefix) :] for name in found if name.startswith(prefix)) for kind, found in names.items()
+                f"{kind}_names": tuple(name[len(prefix) :] for name in found if name.startswith(prefix))
+                for kind, found in names.items()
             }
             described["fixed_base"] = "mocap_base" in described["body_names"]
             entities[name] = Entity(name, described)

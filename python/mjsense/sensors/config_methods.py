@@ -77,7 +77,9 @@ class SceneFileCfg(Config):
 
     def __post_init__(self) -> None:
         if not (self.models is None or callable(self.models)):
-            raise TypeError(f"SceneFileCfg '{self.name}': models must be a function that makes a mjsense.SceneCfg, not {self.models!r}")
+            raise TypeError(
+                f"SceneFileCfg '{self.name}': models must be a function that makes a mjsense.SceneCfg, not {self.models!r}"
+            )
         super().__post_init__()
 
 

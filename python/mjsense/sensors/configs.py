@@ -120,8 +120,8 @@ class TerrainCfg(config_methods.Config):
     seed: int = 0
     """Seed of the tile shapes and of the worlds' start tiles."""
     daylight: bool = True
-    """Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none. False: MuJoCo's headlight is
-    the only light."""
+    """Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none; lights that a robot carries,
+    or that follow a body, do not count. False: MuJoCo's headlight is the only light that is added."""
 
 
 @dataclass
@@ -283,7 +283,7 @@ class CameraVizCfg(config_methods.Config):
 
 @dataclass
 class CameraSensorCfg(SensorCfg):
-    """A camera of the model (``camera_name``) or a new camera. ``data`` is a :class:`mjsense.CameraData`."""
+    """A camera of the model (``camera_name``) or a new camera. ``data`` is a :class:`mjsense.sensors.CameraData`."""
 
     kind: ClassVar[str] = "camera"
     camera_name: str | None = None
@@ -330,6 +330,8 @@ class CameraSensorCfg(SensorCfg):
     """Distance of the far plane from the camera plane; 0: no limit. [m]"""
     clip_near: Literal["none", "model"] = "none"
     """model: clip at the near plane of MuJoCo's renderers, ``visual/map/znear`` times the model's extent."""
+    clip_far: Literal["none", "model"] = "none"
+    """model: clip at the far plane of MuJoCo's renderers, ``visual/map/zfar`` times the model's extent."""
     update_period: float = 0.0
     """Time between images; 0: a new image at every read. [s]"""
     phase: float = 0.0
@@ -410,7 +412,7 @@ class ContactVizCfg(config_methods.Config):
 
 @dataclass
 class ContactSensorCfg(SensorCfg):
-    """Contacts of primaries, optionally with one secondary only. ``data`` is a :class:`mjsense.ContactData`.
+    """Contacts of primaries, optionally with one secondary only. ``data`` is a :class:`mjsense.sensors.ContactData`.
 
     The normal points from the primary to the secondary; forces are what the **primary exerts on the secondary**: a
     box on the floor reads (0, 0, -m g) in the world frame.
@@ -507,7 +509,8 @@ class ImuModel(config_methods.Config):
 
 @dataclass
 class ImuSensorCfg(SensorCfg):
-    """Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an :class:`mjsense.ImuData`.
+    """Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an
+    :class:`mjsense.sensors.ImuData`.
 
     The clean values are the built-in sensors ``<name>_acc`` and ``<name>_gyro``.
     """
@@ -564,7 +567,7 @@ class RayCastVizCfg(config_methods.Config):
 
 @dataclass
 class RayCastSensorCfg(SensorCfg):
-    """Casts rays from frames against all visible geoms. ``data`` is a :class:`mjsense.RayCastData`."""
+    """Casts rays from frames against all visible geoms. ``data`` is a :class:`mjsense.sensors.RayCastData`."""
 
     kind: ClassVar[str] = "raycast"
     frame: ObjRef | Sequence[ObjRef] = ()
@@ -616,8 +619,8 @@ class SpinningScanCfg(config_methods.Config):
 
 @dataclass
 class LidarSensorCfg(RayCastSensorCfg):
-    """A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.RayCastData` with points and
-    intensity. ``pattern`` does not apply, and hit ids are always reported."""
+    """A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.sensors.RayCastData` with points
+    and intensity. ``pattern`` does not apply, and hit ids are always reported."""
 
     kind: ClassVar[str] = "lidar"
     max_distance: float = 100.0

@@ -15,7 +15,7 @@ from mjsense.sensors.native_sensor import NativeSensor
 
 @checked
 class ContactSensor(NativeSensor):
-    """Contacts of its primaries; ``data`` is a :class:`mjsense.ContactData`."""
+    """Contacts of its primaries; ``data`` is a :class:`mjsense.sensors.ContactData`."""
 
     if TYPE_CHECKING:
 

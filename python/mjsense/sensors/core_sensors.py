@@ -292,7 +292,9 @@ class ImagePointsSensor(CoreSensor):
     """Up to ten pixels that show each object in each camera: fields ``<object>/<camera>/points`` float32 ``[B, 10, 2]``
     (fractions of the image size; unused entries are NaN) and ``num_points`` int32 ``[B, 1]``."""
 
-    def __init__(self, objects: Mapping[str, str], cameras: Sequence[str], thin: Sequence[str] = (), uuid: str = "object_image_points") -> None:
+    def __init__(
+        self, objects: Mapping[str, str], cameras: Sequence[str], thin: Sequence[str] = (), uuid: str = "object_image_points"
+    ) -> None:
         """
         Args:
             objects: Full names of bodies by object key.
@@ -335,7 +337,9 @@ class GraspStateSensor(CoreSensor):
 
 def _robot(sim: Any, sensor: CoreSensor) -> _core.TaskView:
     if sim._view is None:
-        raise ValueError(f"sensor '{sensor.name}' needs a robot, which simulations of recordings and make_vec have: name it yourself")
+        raise ValueError(
+            f"sensor '{sensor.name}' needs a robot, which simulations of recordings and make_vec have: name it yourself"
+        )
     return sim._view
 
 

@@ -18,7 +18,9 @@ def as_sensor(thing: Any) -> Any:
         raise TypeError(f"not a sensor but a class: make one, {thing.__name__}(...)")
     if (wrapped := provided("foreign_sensor")(thing)) is not None:
         return wrapped
-    raise TypeError(f"not a sensor: {thing!r} is not a mjsense.Sensor, nor has it a uuid and get_observation(env, task, batch_index)")
+    raise TypeError(
+        f"not a sensor: {thing!r} is not a mjsense.Sensor, nor has it a uuid and get_observation(env, task, batch_index)"
+    )
 
 
 def list_of_sensors(made: Any) -> list[Any]:

@@ -9,7 +9,7 @@ from mjsense.sensors.native_sensor import NativeSensor
 
 
 class ImuSensor(NativeSensor):
-    """An IMU; ``data`` is an :class:`mjsense.ImuData`."""
+    """An IMU; ``data`` is an :class:`mjsense.sensors.ImuData`."""
 
     if TYPE_CHECKING:
 

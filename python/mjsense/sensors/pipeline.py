@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds
+from mjsense.core.old_names import old_argument
 from mjsense.sensors import effects
 
 
@@ -22,6 +24,7 @@ class _Settings(SimpleNamespace):
 _Settings.__name__ = "ObservationPipeline"  # name in messages
 
 
+@old_argument("num_envs", "num_worlds")
 @checked
 class ObservationPipeline(KnownAttributes):
     """Noise, bias, clip, scale, NaN policy, delay and history, in this order: call ``pipeline(values)`` with ``[B, D]`` once per
@@ -32,7 +35,7 @@ class ObservationPipeline(KnownAttributes):
 
     def __init__(
         self,
-        num_envs: int,
+        num_worlds: int,
         *,
         enable_corruption: bool = True,
         bias: float | Sequence[float] | None = None,
@@ -74,19 +77,25 @@ class ObservationPipeline(KnownAttributes):
             ValueError: A setting is out of range.
         """
         settings = dict(locals())
-        del settings["self"], settings["num_envs"], settings["seed"]
+        del settings["self"], settings["num_worlds"], settings["seed"]
         settings["scale"] = 1.0 if scale is None else scale
-        self.num_envs = num_envs
-        self._pipeline = _core.ObservationPipeline(_Settings(**settings), num_envs, seed)
+        self.num_worlds = num_worlds
+        self._pipeline = _core.ObservationPipeline(_Settings(**settings), num_worlds, seed)
         self._complete = True
+
+    @property
+    def num_envs(self) -> int:
+        """The old name of ``num_worlds``."""
+        warnings.warn("ObservationPipeline.num_envs is now num_worlds", DeprecationWarning, stacklevel=2)
+        return self.num_worlds
 
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
         """Clears the history and the state of the effects in these worlds: ids, a mask, or None for all."""
-        self._pipeline.reset(None if world_ids is None else ids_of_worlds(world_ids, self.num_envs).tolist())
+        self._pipeline.reset(None if world_ids is None else ids_of_worlds(world_ids, self.num_worlds).tolist())
 
     def __call__(self, values: Any) -> np.ndarray:
         """Processes the next rows and returns float32 ``[B, D]``, or ``[B, history * D]`` or ``[B, history, D]``."""
         rows = np.ascontiguousarray(values, dtype=np.float32)
         if rows.ndim != 2:
-            raise ValueError(f"shape {rows.shape}: expected ({self.num_envs}, D)")
+            raise ValueError(f"shape {rows.shape}: expected ({self.num_worlds}, D)")
         return self._pipeline.apply(rows)

@@ -15,7 +15,7 @@ from mjsense.sensors.native_sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):
-    """Rays cast from frames; ``data`` is a :class:`mjsense.RayCastData`."""
+    """Rays cast from frames; ``data`` is a :class:`mjsense.sensors.RayCastData`."""
 
     if TYPE_CHECKING:
 
@@ -55,7 +55,7 @@ class LidarSensor(RayCastSensor):
 
 
 class CameraSensor(NativeSensor):
-    """A camera; ``data`` is a :class:`mjsense.CameraData`."""
+    """A camera; ``data`` is a :class:`mjsense.sensors.CameraData`."""
 
     @property
     def data(self) -> CameraData:

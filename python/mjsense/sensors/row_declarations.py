@@ -83,7 +83,9 @@ class Row:
             info = np.iinfo(self.dtype)
             low, high = int(array.min()), int(array.max())
             if low < info.min or high > info.max:
-                raise ValueError(f"{self._what()}{low if low < info.min else high} does not fit the observation_space's {self.dtype}")
+                raise ValueError(
+                    f"{self._what()}{low if low < info.min else high} does not fit the observation_space's {self.dtype}"
+                )
         return array.astype(self.dtype)
 
     def outside(self, rows: np.ndarray) -> Iterator[tuple[int, str]]:
@@ -167,7 +169,9 @@ def leaves(value: Any, rows: list[Row]) -> list[Any]:
     if missing or surplus:
         raise ValueError(
             "keys are not the observation_space's: "
-            + "; ".join(f"{word} {', '.join(sorted(some))}" for word, some in (("missing", missing), ("unknown", surplus)) if some)
+            + "; ".join(
+                f"{word} {', '.join(sorted(some))}" for word, some in (("missing", missing), ("unknown", surplus)) if some
+            )
         )
     return [flat[row.path] for row in rows]
 

@@ -107,7 +107,9 @@ class Sensor(Generic[T]):
     def _mjs_about(self) -> list[representations.Row]:
         worlds = [len(self._mjs_rows[0])] if self._mjs_rows else []
         return [
-            representations.Row(spec["name"], spec["dtype"], (*worlds, *spec["shape"]), self.unit, self.frame, spec["description"])
+            representations.Row(
+                spec["name"], spec["dtype"], (*worlds, *spec["shape"]), self.unit, self.frame, spec["description"]
+            )
             for spec in (self._mjs_row_specs() if self.uuid else [])
         ]
 
@@ -361,8 +363,17 @@ class Sensor(Generic[T]):
                 kept = row.kept
             except ValueError as error:
                 raise ValueError(f"sensor '{self.uuid}': {error}") from None
-            specs.append({
-                "name": row.name, "dtype": kept, "shape": list(row.shape), "low": low, "high": high, "is_dict": self.is_dict,
-                "unit": self.unit, "frame": self.frame, "description": description,
-            })  # fmt: skip
+            specs.append(
+                {
+                    "name": row.name,
+                    "dtype": kept,
+                    "shape": list(row.shape),
+                    "low": low,
+                    "high": high,
+                    "is_dict": self.is_dict,
+                    "unit": self.unit,
+                    "frame": self.frame,
+                    "description": description,
+                }
+            )
         return specs

@@ -94,7 +94,9 @@ class SensorSuite(KnownAttributes):
         """
         sim = getattr(env, "sim", env)
         if not hasattr(sim, "refresh"):
-            raise TypeError(f"SensorSuite.get_observations(): env must be a Simulation, or an object with one as its sim, not {env!r:.100}")
+            raise TypeError(
+                f"SensorSuite.get_observations(): env must be a Simulation, or an object with one as its sim, not {env!r:.100}"
+            )
         add_missing(sim, self.sensors.values())
         if batch_index is None:
             sim.refresh(list(self.sensors.values()))

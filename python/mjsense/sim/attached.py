@@ -20,11 +20,26 @@ from mjsense.sim import foreign_model
 from mjsense.sim.simulation import Simulation
 
 _STATE = (
-    "time", "qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "qacc_warmstart",
+    "time",
+    "qpos",
+    "qvel",
+    "act",
+    "ctrl",
+    "qfrc_applied",
+    "xfrc_applied",
+    "eq_active",
+    "mocap_pos",
+    "mocap_quat",
+    "qacc_warmstart",
     "userdata",
-)  # fmt: skip
+)
 """Fields of mjData that determine what sensors measure."""
-_ELEMENTS = (("geom_xpos", "ngeom", "geoms"), ("site_xpos", "nsite", "sites"), ("cam_xpos", "ncam", "cameras"), ("xpos", "nbody", "bodies"))
+_ELEMENTS = (
+    ("geom_xpos", "ngeom", "geoms"),
+    ("site_xpos", "nsite", "sites"),
+    ("cam_xpos", "ncam", "cameras"),
+    ("xpos", "nbody", "bodies"),
+)
 """Fields of mjData and of the model by which data of a model that was compiled anew is recognised."""
 _WRITTEN_STATE = -2
 """Keyframe of a reset to the state as it is."""
@@ -50,13 +65,17 @@ class Attached(KnownAttributes):
         seed: Seed = 0,
     ) -> None:
         self._guard = OneThread("attached sensors: another thread is updating them; update them in one thread")
-        self.datas: tuple[Any, ...] = tuple(getattr(one, "_data", one) for one in (data if isinstance(data, (list, tuple)) else [data]))
+        self.datas: tuple[Any, ...] = tuple(
+            getattr(one, "_data", one) for one in (data if isinstance(data, (list, tuple)) else [data])
+        )
         """The user's data, by world."""
         if not self.datas:
             raise ValueError("attach(): data is empty: pass one MjData, or a list with one for each world")
         given = model if isinstance(model, (list, tuple)) else [model] * len(self.datas)
         if len(given) != len(self.datas):
-            raise ValueError(f"attach(): got {len(given)} models for {len(self.datas)} data: pass one model, or one for each data")
+            raise ValueError(
+                f"attach(): got {len(given)} models for {len(self.datas)} data: pass one model, or one for each data"
+            )
         self.models: tuple[Any, ...] = tuple(getattr(one, "_model", one) for one in given)
         """The user's model of each world."""
         packages = [foreign_model.package_of(one) for one in self.models]
@@ -92,7 +111,9 @@ class Attached(KnownAttributes):
         for name, columns in self._columns.items():
             found, expected = np.size(getattr(data, name)), columns.stop - columns.start
             if found != expected:
-                raise ValueError(f"{what} belongs to another model: its {name} has {found} numbers, and this model's has {expected}")
+                raise ValueError(
+                    f"{what} belongs to another model: its {name} has {found} numbers, and this model's has {expected}"
+                )
         for name, size, kind in _ELEMENTS:
             found, expected = len(getattr(data, name)), getattr(self.models[0], size)
             if found != expected:
@@ -143,8 +164,10 @@ class Attached(KnownAttributes):
                 self._warned = True
                 warnings.warn(
                     f"attached sensors show data[{world}] at {before:g} s, and it is at {now:g} s: call update() after mj_step, or reset() when an "
-                    "episode has begun", RuntimeWarning, stacklevel=4,
-                )  # fmt: skip
+                    "episode has begun",
+                    RuntimeWarning,
+                    stacklevel=4,
+                )
                 return
 
     @property
@@ -183,7 +206,9 @@ class Attached(KnownAttributes):
         timestep = self._sim.physics_dt
         for model in {id(model): model for model in self.models}.values():
             if model.opt.timestep != timestep:
-                raise ValueError(f"update(): the model's time step was {timestep:g} s and is now {model.opt.timestep:g} s: attach again")
+                raise ValueError(
+                    f"update(): the model's time step was {timestep:g} s and is now {model.opt.timestep:g} s: attach again"
+                )
         moved: dict[int, list[int]] = {}
         for world, (before, now) in enumerate(zip(self._times, times)):
             steps = (now - before) / timestep
@@ -249,7 +274,7 @@ class Attached(KnownAttributes):
         self.reset([world])
 
     def add(self, sensor: Any) -> Any:
-        """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.PoseSensor`. Returns it."""
+        """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.sensors.PoseSensor`. Returns it."""
         return self._sim.add(sensor)
 
     # ---------------------------------------------------------------------------------------------------------- states
@@ -265,7 +290,9 @@ class Attached(KnownAttributes):
             groups.setdefault((id(model), id(self._edited[world])), []).append(world)
         edited, writes = [*self._edited], []
         for worlds in groups.values():
-            values, rows = self._changes(self.models[worlds[0]], self._edited[worlds[0]], f"{call}: {{}} of the model of data[{worlds[0]}]")
+            values, rows = self._changes(
+                self.models[worlds[0]], self._edited[worlds[0]], f"{call}: {{}} of the model of data[{worlds[0]}]"
+            )
             writes += [(target, worlds, new) for target, new in rows]
             for world in worlds:
                 edited[world] = values
@@ -290,7 +317,9 @@ class Attached(KnownAttributes):
         for name, now in foreign_model.values_of(copy, sim.model).items():
             old = known[name] if name in known else self._base[name][: len(now)]
             if now.shape != old.shape:
-                raise ValueError(f"{what.format(name)} has the shape {now.shape} instead of {old.shape}: it needs its own attach()")
+                raise ValueError(
+                    f"{what.format(name)} has the shape {now.shape} instead of {old.shape}: it needs its own attach()"
+                )
             if np.array_equal(now, old, equal_nan=now.dtype.kind == "f"):
                 continue
             try:

@@ -24,9 +24,22 @@ _NEW_SENSORS = {"mjSENS_TENDONACTFRC": 17, "mjSENS_INSIDESITE": 38, "mjSENS_CONT
 """Types of sensors that were inserted after 3.3.0, with their numbers; those of the types after them were smaller before."""
 
 _DEFAULTS: dict[str, Any] = {
-    "actuator_ctrlnum": 1, "actuator_outnum": 1, "actuator_historyadr": -1, "cam_output": 1, "dof_length": 1.0, "geom_castshadow": True,
-    "jnt_actuatorid": -1, "jnt_plasticadr": -1, "light_softness": 0.2, "light_texid": -1, "sensor_historyadr": -1, "site_dataid": -1, "tendon_actuatorid": -1, "tendon_plasticadr": -1, "tex_contenttypeadr": -1,
-}  # fmt: skip
+    "actuator_ctrlnum": 1,
+    "actuator_outnum": 1,
+    "actuator_historyadr": -1,
+    "cam_output": 1,
+    "dof_length": 1.0,
+    "geom_castshadow": True,
+    "jnt_actuatorid": -1,
+    "jnt_plasticadr": -1,
+    "light_softness": 0.2,
+    "light_texid": -1,
+    "sensor_historyadr": -1,
+    "site_dataid": -1,
+    "tendon_actuatorid": -1,
+    "tendon_plasticadr": -1,
+    "tex_contenttypeadr": -1,
+}
 """Values of fields that older series lack; all others are 0."""
 
 _GONE = ("flex", "cam_orthographic", "light_directional")
@@ -51,9 +64,13 @@ def is_our_series(mujoco: Any) -> bool:
 def values_of(model: Any, like: Any) -> dict[str, np.ndarray]:
     """The arrays of a model, without names, and its options, as ``opt.gravity``; `like` has all fields of mjsense's MuJoCo."""
     fields = _core.model_fields(like._address)
-    names = [name for name, place in fields.items() if isinstance(place, tuple) and place[2] != () and not name.startswith("name")]
+    names = [
+        name for name, place in fields.items() if isinstance(place, tuple) and place[2] != () and not name.startswith("name")
+    ]
     arrays = {name: value for name in names if isinstance(value := getattr(model, name, None), np.ndarray)}
-    options = {f"opt.{name}": np.atleast_1d(np.array(getattr(model.opt, name), kind)) for name, (_, kind, _) in fields["opt"].items()}
+    options = {
+        f"opt.{name}": np.atleast_1d(np.array(getattr(model.opt, name), kind)) for name, (_, kind, _) in fields["opt"].items()
+    }
     return {**arrays, **options}
 
 
@@ -63,7 +80,9 @@ def copy_of(model: Any) -> Any:
     version = mujoco.mj_versionString()
     for size, what in (("nflex", "flexes"), ("nplugin", "plugins"), ("nhistory", "histories of sensors or actuators")):
         if getattr(model, size, 0):
-            raise ValueError(f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {libmujoco.REQUIREMENT}")
+            raise ValueError(
+                f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {libmujoco.REQUIREMENT}"
+            )
     view = mujoco_views.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
     _refuse_unknown(model, view, version)
     for name, place in _core.model_fields(view._address).items():
@@ -102,12 +121,19 @@ def _refuse_unknown(model: Any, view: Any, version: str) -> None:
         if name[0] != "_" and name not in view._fields and not name.startswith(_GONE):
             value = getattr(model, name, None)
             if isinstance(value, np.ndarray) and value.any():
-                raise ValueError(f"attach(): the model of MuJoCo {version} has {name}, which mjsense's MuJoCo {'.'.join(map(str, libmujoco.SERIES))} does not know")
+                raise ValueError(
+                    f"attach(): the model of MuJoCo {version} has {name}, which mjsense's MuJoCo {'.'.join(map(str, libmujoco.SERIES))} does not know"
+                )
 
 
 def _sizes(model: Any) -> dict[str, int]:
-    names = [name for name, place in _core.model_fields(_core.OwnedModel.take(_core.make_model({"nbody": 1, "nnames_map": 2})).address).items()
-             if isinstance(place, tuple) and place[2] == () and name.startswith("n")]  # fmt: skip
+    names = [
+        name
+        for name, place in _core.model_fields(
+            _core.OwnedModel.take(_core.make_model({"nbody": 1, "nnames_map": 2})).address
+        ).items()
+        if isinstance(place, tuple) and place[2] == () and name.startswith("n")
+    ]
     sizes = {name: int(getattr(model, name)) for name in names if hasattr(model, name)}
     new = {"nactuator": model.nu, "nout": model.nu}
     if not hasattr(model, "nJten"):
@@ -221,11 +247,16 @@ def _compute(view: Any, model: Any) -> None:
 
 def _copy_structs(view: Any, model: Any, mujoco: Any) -> None:
     pairs = [(view.opt, model.opt), (view.stat, model.stat)]
-    pairs += [(getattr(view.vis, group), getattr(model.vis, group, None) or getattr(model.vis, f"{group}_", None)) for group in view.vis._fields]
+    pairs += [
+        (getattr(view.vis, group), getattr(model.vis, group, None) or getattr(model.vis, f"{group}_", None))
+        for group in view.vis._fields
+    ]
     for to, from_ in pairs:
         for name in to._fields:
             value = getattr(from_, name, None)
-            if value is not None and np.shape(value) == np.shape(getattr(to, name)):  # some of MuJoCo's bindings of colours are empty
+            if value is not None and np.shape(value) == np.shape(
+                getattr(to, name)
+            ):  # some of MuJoCo's bindings of colours are empty
                 setattr(to, name, value)
     multiccd = getattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD", None)
     if multiccd is not None:  # now a flag that disables

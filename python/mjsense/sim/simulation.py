@@ -71,9 +71,18 @@ class Simulation(KnownAttributes):
         return provided("warp_simulation")(*args, **options) if backend == "warp" else super().__new__(cls)
 
     def __init__(
-        self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
-        backend: Literal["cpu", "warp"] = "cpu", device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        scene: Scene,
+        num_worlds: int | None = None,
+        decimation: int = 1,
+        threads: int = 0,
+        seed: Seed = 0,
+        *,
+        backend: Literal["cpu", "warp"] = "cpu",
+        device: str | None = None,
+        nconmax: int | None = None,
+        njmax: int | None = None,
+    ) -> None:
         """
         Args:
             scene: The scene. Its sensors belong to this simulation from now on, so that a second simulation needs its own scene.
@@ -159,14 +168,21 @@ class Simulation(KnownAttributes):
         """HTML for notebooks: the worlds, user-defined sensors, and the scene, folded."""
         if self._core.closed:
             return representations.block(repr(self), "")
-        facts = [("worlds", self.num_worlds), ("control step", f"{self.step_dt:g} s, {self.decimation} substeps"),
-                 ("time of world 0", f"{self.time[0]:g} s"), ("entities", ", ".join(self.scene.entities)), ("seed", self.seed)]  # fmt: skip
+        facts = [
+            ("worlds", self.num_worlds),
+            ("control step", f"{self.step_dt:g} s, {self.decimation} substeps"),
+            ("time of world 0", f"{self.time[0]:g} s"),
+            ("entities", ", ".join(self.scene.entities)),
+            ("seed", self.seed),
+        ]
         facts += [
             (f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {np.count_nonzero(counts)} worlds")
             for name, counts in self.warning_counts.items()
         ]
         own = "".join(sensor._repr_html_() for sensor in self._python)
-        return representations.block("simulation", representations.grid(("", ""), facts) + own, {"scene and its sensors": self.scene._repr_html_()})
+        return representations.block(
+            "simulation", representations.grid(("", ""), facts) + own, {"scene and its sensors": self.scene._repr_html_()}
+        )
 
     def __enter__(self) -> Simulation:
         return self
@@ -314,7 +330,9 @@ class Simulation(KnownAttributes):
     def _set_timestep(self, seconds: float) -> None:
         """See :attr:`Options.timestep`."""
         if self._stepped_elsewhere:
-            raise ValueError("timestep: it cannot change in environments and recordings, whose control periods are multiples of it; set sim_dt_ms")
+            raise ValueError(
+                "timestep: it cannot change in environments and recordings, whose control periods are multiples of it; set sim_dt_ms"
+            )
         self._core.set_timestep(seconds)
         self.physics_dt, self.step_dt = self._core.physics_dt, self._core.step_dt
         self._models.timestep_changed()
@@ -375,7 +393,7 @@ class Simulation(KnownAttributes):
     def add(self, sensor: Any) -> Any:
         """Adds a sensor that is not part of the scene, for use in suites, and returns it.
 
-        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.PoseSensor`), or an object of another
+        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.sensors.PoseSensor`), or an object of another
         library with a ``uuid`` and ``get_observation(env, task, batch_index)``; the latter is wrapped, and the wrapper is
         returned.
         """

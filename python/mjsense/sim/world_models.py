@@ -62,7 +62,9 @@ class WorldModels:
             if not isinstance(like, np.ndarray):
                 if name.startswith(physics_options.PREFIX):
                     option = name.removeprefix(physics_options.PREFIX)
-                    raise AttributeError(f"MuJoCo has no option '{option}'{did_you_mean(option, physics_options.names(), 'there are')}")
+                    raise AttributeError(
+                        f"MuJoCo has no option '{option}'{did_you_mean(option, physics_options.names(), 'there are')}"
+                    )
                 arrays = [field for field in dir(self.shared) if isinstance(getattr(self.shared, field, None), np.ndarray)]
                 raise AttributeError(f"mjModel has no array '{name}'{did_you_mean(name, arrays)}")
             values = self._core.model_field(name)

@@ -10,6 +10,16 @@ from typing import TYPE_CHECKING, Any
 from mjsense._core import robot_names
 
 if TYPE_CHECKING:
+    from mjsense.sensors.configs import (
+        SceneFileCfg,
+        SceneHeadlightCfg,
+        SceneMoodCfg,
+        SceneObjectCfg,
+        SceneRegionCfg,
+        SceneRobotCfg,
+        SceneSkyCfg,
+        SceneVaryCfg,
+    )
     from mjsense.tasks.env import TaskEnv, make
     from mjsense.tasks.policy import Policy, policy_names, register_policy
     from mjsense.tasks.record_job import RecordProgress, RecordSummary
@@ -20,25 +30,60 @@ if TYPE_CHECKING:
     from mjsense.tasks.vector import TaskVectorEnv, make_vec
 
 _NAMES = {
-    "env": ("TaskEnv", "make"),
-    "policy": ("Policy", "policy_names", "register_policy"),
-    "record_job": ("RecordProgress", "RecordSummary"),
-    "recording": ("record",),
-    "robot": ("MoveGroup", "Robot", "RobotCamera"),
-    "task": ("Task", "WorldState", "register_task", "task_names"),
-    "teleoperation": ("Teleoperation", "play"),
-    "vector": ("TaskVectorEnv", "make_vec"),
+    "sensors.configs": (
+        "SceneFileCfg",
+        "SceneHeadlightCfg",
+        "SceneMoodCfg",
+        "SceneObjectCfg",
+        "SceneRegionCfg",
+        "SceneRobotCfg",
+        "SceneSkyCfg",
+        "SceneVaryCfg",
+    ),
+    "tasks.env": ("TaskEnv", "make"),
+    "tasks.policy": ("Policy", "policy_names", "register_policy"),
+    "tasks.record_job": ("RecordProgress", "RecordSummary"),
+    "tasks.recording": ("record",),
+    "tasks.robot": ("MoveGroup", "Robot", "RobotCamera"),
+    "tasks.task": ("Task", "WorldState", "register_task", "task_names"),
+    "tasks.teleoperation": ("Teleoperation", "play"),
+    "tasks.vector": ("TaskVectorEnv", "make_vec"),
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
-    "MoveGroup", "Policy", "RecordProgress", "RecordSummary", "Robot", "RobotCamera", "Task", "TaskEnv", "TaskVectorEnv",
-    "Teleoperation", "WorldState", "make", "make_vec", "play", "policy_names", "record", "register_policy", "register_task",
-    "robot_names", "task_names",
-]  # fmt: skip
+    "MoveGroup",
+    "Policy",
+    "RecordProgress",
+    "RecordSummary",
+    "Robot",
+    "RobotCamera",
+    "Task",
+    "TaskEnv",
+    "TaskVectorEnv",
+    "Teleoperation",
+    "WorldState",
+    "SceneFileCfg",
+    "SceneHeadlightCfg",
+    "SceneMoodCfg",
+    "SceneObjectCfg",
+    "SceneRegionCfg",
+    "SceneRobotCfg",
+    "SceneSkyCfg",
+    "SceneVaryCfg",
+    "make",
+    "make_vec",
+    "play",
+    "policy_names",
+    "record",
+    "register_policy",
+    "register_task",
+    "robot_names",
+    "task_names",
+]
 
 
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
+    return getattr(importlib.import_module(f"mjsense.{_MODULES[name]}"), name)

@@ -62,7 +62,12 @@ class TaskEnv(gymnasium.Env):
             raise gymnasium.error.ResetNeeded(f"{call}(): the episode has ended ({self._ended}): call reset() first")
 
     def _single(
-        self, observation: dict[str, Any], reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, infos: dict[str, Any]
+        self,
+        observation: dict[str, Any],
+        reward: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+        infos: dict[str, Any],
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         info: dict[str, Any] = {"success": bool(infos["success"][0])}
         if "fault" in infos:

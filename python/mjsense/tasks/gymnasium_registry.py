@@ -18,7 +18,12 @@ def register(task: str, robot: str | None = None) -> None:
         return
     kwargs = {"task": task} if robot is None else {"task": task, "robot": robot}
     gymnasium.register(
-        env_id(task, robot), entry_point="mjsense.tasks.env:make", vector_entry_point="mjsense.tasks.vector:make_vec", kwargs=kwargs, order_enforce=False)
+        env_id(task, robot),
+        entry_point="mjsense.tasks.env:make",
+        vector_entry_point="mjsense.tasks.vector:make_vec",
+        kwargs=kwargs,
+        order_enforce=False,
+    )
 
 
 def register_all() -> None:

@@ -53,8 +53,16 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
     of_robot = [member(sensor) for sensor in robot_sensors]
     code: Code = {}
     if "resume" in options:
-        owners = {"task": composed or task, "policy": policy, **{f"sensor '{sensor.uuid}'": sensor for sensor in (*given, *of_robot)}}
-        code = {place: checksums(owner, place, options["resume"] or options["append"]) for place, owner in owners.items() if owner is not None}
+        owners = {
+            "task": composed or task,
+            "policy": policy,
+            **{f"sensor '{sensor.uuid}'": sensor for sensor in (*given, *of_robot)},
+        }
+        code = {
+            place: checksums(owner, place, options["resume"] or options["append"])
+            for place, owner in owners.items()
+            if owner is not None
+        }
     if composed is None or not options.get("use_sensors", True):
         return task, policy, given, scene, code, of_robot, None
     return task, policy, Composition(composed, given), scene, code, of_robot, composed._mjs_select

@@ -135,7 +135,9 @@ class Policy:
 class FunctionPolicy(Policy):
     """A function ``obs -> actions`` as a policy."""
 
-    def __init__(self, function: Callable[[dict[str, Any]], Any], name: str = "", observation: Sequence[str] | None = None) -> None:
+    def __init__(
+        self, function: Callable[[dict[str, Any]], Any], name: str = "", observation: Sequence[str] | None = None
+    ) -> None:
         self.name = name or snake_case(getattr(function, "__name__", type(function).__name__).strip("<>"))
         self.observation = observation
         self._function = function

@@ -47,7 +47,11 @@ class RecordProgress:
 def of_recording(p: RecordProgress) -> str:
     """``3/10 episodes  75 % success  412 steps/s  0:41 left``, as the program shows it."""
     ended, seconds = p.succeeded + p.failed, max(p.seconds, 1e-9)
-    parts = [f"{p.kept}/{p.wanted} episodes", f"{100 * p.succeeded / ended:.0f} % success" if ended else "", f"{p.steps / seconds:.0f} steps/s"]
+    parts = [
+        f"{p.kept}/{p.wanted} episodes",
+        f"{100 * p.succeeded / ended:.0f} % success" if ended else "",
+        f"{p.steps / seconds:.0f} steps/s",
+    ]
     parts.append(f"{p.frames / seconds:.0f} frames/s" if p.frames else "")
     parts.append(f"{clock(p.seconds_left)} left" if p.seconds_left == p.seconds_left and p.kept < p.wanted else "")
     return "  ".join(filter(None, parts))
@@ -73,12 +77,21 @@ class RecordSummary(RecordProgress):
     def _repr_html_(self) -> str:
         """HTML for notebooks: the numbers, and the reasons of failures."""
         ended = self.succeeded + self.failed
-        facts = [("episodes on disk", f"{self.kept} of {self.wanted}"), ("attempts of this run", f"{ended}, {self.succeeded} successful"),
-                 ("steps", f"{self.steps} in {self.seconds:.1f} s"), ("size", f"{self.published_bytes / 1e6:.1f} MB"), ("folder", self.path)]  # fmt: skip
-        failures = representations.grid(("attempts", "reason of the failure"), [(count, reason) for reason, count in self.failures.items()])
+        facts = [
+            ("episodes on disk", f"{self.kept} of {self.wanted}"),
+            ("attempts of this run", f"{ended}, {self.succeeded} successful"),
+            ("steps", f"{self.steps} in {self.seconds:.1f} s"),
+            ("size", f"{self.published_bytes / 1e6:.1f} MB"),
+            ("folder", self.path),
+        ]
+        failures = representations.grid(
+            ("attempts", "reason of the failure"), [(count, reason) for reason, count in self.failures.items()]
+        )
         times = representations.grid(("activity", "s"), [(name, f"{seconds:.2f}") for name, seconds in self.times.items()])
         state = " (interrupted)" if self.interrupted else ""
-        return representations.block(f"recording{state}", representations.grid(("", ""), facts) + (failures if self.failures else ""), {"times": times})
+        return representations.block(
+            f"recording{state}", representations.grid(("", ""), facts) + (failures if self.failures else ""), {"times": times}
+        )
 
 
 def check_names(options: Iterable[str]) -> None:
@@ -89,7 +102,9 @@ def check_names(options: Iterable[str]) -> None:
             raise UnknownNameError(f"record: unknown option '{name}'{did_you_mean(name, known)}")
 
 
-def record_here(options: dict[str, Any], sensors: Iterable[Any] = (), progress: bool | Callable[[RecordProgress], None] | None = None) -> RecordSummary:
+def record_here(
+    options: dict[str, Any], sensors: Iterable[Any] = (), progress: bool | Callable[[RecordProgress], None] | None = None
+) -> RecordSummary:
     """Records episodes. See :func:`mjsense.record`.
 
     Args:

@@ -10,10 +10,12 @@ from typing import Any, Literal
 
 from mjsense.core.arguments import Seed, checked
 from mjsense.core.later_rooms import provided
+from mjsense.core.old_names import old_argument
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks
 from mjsense.tasks.record_job import RecordProgress, RecordSummary, record_here
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def record(
     task: Tasks = "pick",
@@ -25,7 +27,7 @@ def record(
     # options of a recording
     arm_controller: str = "",
     split: Literal["", "train", "test"] = "",
-    worlds: int = 4,
+    num_worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
     camera_system: str = "",
@@ -44,7 +46,7 @@ def record(
     perturb: float = 0.0,
     instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
-    max_penetration: float = 0.004,
+    max_penetration: float | None = None,
     episodes: int = 1,
     max_attempts: int = 0,
     num_attempts: int = 0,
@@ -92,7 +94,7 @@ def record(
             ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
         split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
             or ``@test`` after the scene's name.
-        worlds: Number of worlds that run in parallel.
+        num_worlds: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.
@@ -116,7 +118,8 @@ def record(
             distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
         max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
-            any depth. Pairs of geoms that are deeper at the start do not count. [m]
+            any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
+            deeper at the start do not count. [m]
         episodes: Number of episodes to keep.
         max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
         num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
@@ -144,8 +147,8 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
-        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.export_lerobot`.
+        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
         trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
         keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
             data set is complete.
@@ -159,7 +162,11 @@ def record(
         del options[name]
     if ray is not None:
         given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
-        if refused := [name for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording") if given[name]]:
+        if refused := [
+            name
+            for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording")
+            if given[name]
+        ]:
             raise ValueError(f"record: {refused[0]} cannot be combined with ray")
         return provided("record_on_ray")({**options, "format": format, "sensors": sensors}, ray, progress)
     if format == "mjsense":
@@ -170,6 +177,8 @@ def record(
         raise ValueError(f"record: shard, append and overwrite cannot be combined with format={format!r}")
     from mjsense.exporting.record_lerobot import converted
 
-    with converted(out, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False) as folder:
+    with converted(
+        out, format=format, resume=resume, map=map, trim_idle=trim_idle, keep_recording=keep_recording, quiet=progress is False
+    ) as folder:
         summary = record_here({**options, "out": folder}, sensors, progress)
     return replace(summary, path=Path(out))

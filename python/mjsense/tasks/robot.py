@@ -139,9 +139,7 @@ class Robot(KnownAttributes):
         """
         return np.array(self._core.fk(group, self._values(qpos)))
 
-    def ik(
-        self, group: str, pose: Sequence[float], max_iterations: int = 1000, **qpos: Sequence[float]
-    ) -> np.ndarray | None:
+    def ik(self, group: str, pose: Sequence[float], max_iterations: int = 1000, **qpos: Sequence[float]) -> np.ndarray | None:
         """Inverse kinematics: positions of the group that bring its tool frame to ``pose`` ``[7]``; the other groups do not move.
 
         The search starts at ``qpos``, by default the initial positions, and restarts from other positions every 100 iterations.

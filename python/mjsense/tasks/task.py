@@ -412,5 +412,7 @@ def task_of(task: Any) -> tuple[str, Task | None]:
         raise TypeError(f"task must be a mjsense.Task or the name of one ({', '.join(task_names())}), not {task!r}")
     if type(task).evaluate is Task.evaluate:
         own = [name for name in dir(task) if name[0] != "_" and name not in dir(Task)]
-        raise TypeError(f"{type(task).__name__} has no method evaluate(sim), which returns reward and success{did_you_mean('evaluate', own)}")
+        raise TypeError(
+            f"{type(task).__name__} has no method evaluate(sim), which returns reward and success{did_you_mean('evaluate', own)}"
+        )
     return task._mjs_name(), task

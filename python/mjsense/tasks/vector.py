@@ -16,6 +16,7 @@ from gymnasium.vector.utils import batch_space
 from mjsense import _core
 from mjsense.core import mujoco_names
 from mjsense.core.arguments import Seed, checked
+from mjsense.core.errors import did_you_mean
 from mjsense.core.installed_files import use_installed_meshes
 from mjsense.core.later_rooms import provided
 from mjsense.scene.scene import Scene
@@ -45,7 +46,8 @@ class TaskVectorEnv(VectorEnv):
     - ``next_step``: the next step starts a new episode and ignores its action;
     - ``same_step``: the new episode has started when ``step`` returns; ``infos["final_obs"]`` and ``infos["final_info"]`` are
       those of the end of the old episode;
-    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``.
+    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``. Until then each step returns the flags of its end
+      again, its last observation and the reward 0. A step in which no world can move raises ``gymnasium.error.ResetNeeded``.
 
     ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` is the mask of the worlds it applies to, as in gymnasium.
     """
@@ -91,14 +93,13 @@ class TaskVectorEnv(VectorEnv):
         """Number of control steps after which an episode is truncated."""
         self._next_episode = 0
         self._ended = np.zeros(self.num_envs, bool)
+        self._ends = (self._ended, self._ended)  # terminated, truncated
         self._started = False
         layout = self._rollout.action_layout()
         self.action_groups: dict[str, slice] = group_slices(layout)
         """Columns of an action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
         low[low <= -mujoco_names.MAXVAL], high[high >= mujoco_names.MAXVAL] = -np.inf, np.inf  # no limit
-        if action_space not in ("commands", "normalised"):
-            raise ValueError(f"action_space must be 'commands' or 'normalised', not {action_space!r}")
         self._command_range = _command_range(self.action_groups, low, high) if action_space == "normalised" else None
         if self._command_range is not None:
             low, high = np.full_like(low, -1), np.full_like(high, 1)
@@ -122,8 +123,10 @@ class TaskVectorEnv(VectorEnv):
             try:
                 copy.deepcopy(value)
             except Exception as error:
-                raise TypeError(f"this environment cannot be copied or pickled, because its argument {name} cannot: {error}; "
-                                "make it with the name or the class instead of an object") from None  # fmt: skip
+                raise TypeError(
+                    f"this environment cannot be copied or pickled, because its argument {name} cannot: {error}; "
+                    "make it with the name or the class instead of an object"
+                ) from None
         return self._arguments
 
     _arguments: dict[str, Any] | None = None
@@ -229,6 +232,9 @@ class TaskVectorEnv(VectorEnv):
 
     def _play(self, play: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         resting = self._ended.copy()
+        stays = self.autoreset_mode == AutoresetMode.DISABLED
+        if stays and resting.all():
+            raise gymnasium.error.ResetNeeded("step(): the episodes of all worlds have ended: call reset() first")
         for world in np.flatnonzero(resting):
             self._rollout.stop(int(world))
         if not resting.all():
@@ -237,19 +243,21 @@ class TaskVectorEnv(VectorEnv):
         if resting.any():
             for values in (reward, success, terminated, truncated):
                 values[resting] = 0
-        for world in faults:
-            truncated[world] = not resting[world]
-        infos: dict[str, Any] = {"success": success, "_success": ~resting}
+            if stays:
+                for values, last in zip((terminated, truncated), self._ends, strict=True):
+                    values[resting & last] = 1
         broken = [world for world in faults if not resting[world]]
+        for world in broken:
+            truncated[world] = 1
+        infos: dict[str, Any] = {"success": success, "_success": ~resting}
         if broken:
             infos["fault"], infos["_fault"] = np.full(self.num_envs, "", object), np.zeros(self.num_envs, bool)
             for world in broken:
                 infos["fault"][world], infos["_fault"][world] = faults[world], True
-        self._ended = self._on_host(terminated | truncated).copy()
+        self._ends = self._on_host(terminated).copy(), self._on_host(truncated).copy()
+        self._ended = self._ends[0] | self._ends[1]
         if self.autoreset_mode == AutoresetMode.NEXT_STEP and resting.any():
             self._begin(np.flatnonzero(resting))
-        elif self.autoreset_mode == AutoresetMode.DISABLED:
-            self._ended |= resting
         elif self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             over = self._ended.copy()
             last = self._observe()
@@ -265,6 +273,8 @@ class TaskVectorEnv(VectorEnv):
         """Actions of the policy given to ``make_vec(..., policy="planner")`` for the current state, ``[num_envs, n]``; sets
         ``expert_done``."""
         self._check_open()
+        if not self._has_policy:
+            raise ValueError("expert_action(): the environment has no policy: make it with policy='planner', or another one")
         self._rollout.act()
         actions, done = self._rollout.actions()
         self.expert_done = np.array(done, bool)
@@ -333,7 +343,7 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
         return mode
     words = [known.name.lower() for known in AutoresetMode]
     if mode not in words:
-        raise ValueError(f"autoreset_mode must be one of {', '.join(words)}, not {mode!r}")
+        raise ValueError(f"autoreset_mode must be one of {', '.join(words)}, not {mode!r}{did_you_mean(mode, words)}")
     return AutoresetMode[mode.upper()]
 
 
@@ -357,9 +367,25 @@ def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
 
 
 _WITH_WARP = {
-    "task", "num_envs", "seed", "horizon", "policy_dt_ms", "terminate_upon_success", "observations", "sensors", "use_sensors",
-    "instructions", "shadows", "meshes", "autoreset_mode", "action_space", "backend", "device", "nconmax", "njmax",
-}  # fmt: skip
+    "task",
+    "num_envs",
+    "seed",
+    "horizon",
+    "policy_dt_ms",
+    "terminate_upon_success",
+    "observations",
+    "sensors",
+    "use_sensors",
+    "instructions",
+    "shadows",
+    "meshes",
+    "autoreset_mode",
+    "action_space",
+    "backend",
+    "device",
+    "nconmax",
+    "njmax",
+}
 """Arguments of make_vec() that have an effect, or no meaning, with backend="warp"."""
 
 
@@ -407,7 +433,7 @@ def make_vec(
     perturb: float = 0.0,
     instructions: Literal["varied", "canonical"] = "varied",
     terminate_upon_success: bool = False,
-    max_penetration: float = 0.004,
+    max_penetration: float | None = None,
     # end of options
     use_sensors: bool = True,
     autoreset_mode: str | AutoresetMode = "next_step",
@@ -460,7 +486,8 @@ def make_vec(
             distinguishes them in that episode; ``canonical``: one sentence per task and object.
         terminate_upon_success: End an episode at its first success.
         max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
-            any depth. Pairs of geoms that are deeper at the start do not count. [m]
+            any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
+            deeper at the start do not count. [m]
         Others:
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.

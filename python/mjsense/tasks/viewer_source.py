@@ -66,7 +66,11 @@ class TaskSource(LiveSource):
         return action
 
     def _sensor_rows(self) -> dict[str, tuple[str, np.ndarray]]:
-        own = {name: (self._env.specs[name].unit, rows) for name, rows in self._env.rows.items() if rows.dtype.kind in "fiub" and rows.ndim < 4}
+        own = {
+            name: (self._env.specs[name].unit, rows)
+            for name, rows in self._env.rows.items()
+            if rows.dtype.kind in "fiub" and rows.ndim < 4
+        }
         return {**own, **{name: ("", rows) for name, rows in self._results.items()}, **super()._sensor_rows()}
 
     def _row(self, name: str) -> np.ndarray | None:
@@ -80,8 +84,11 @@ class TaskSource(LiveSource):
         return np.concatenate([self._env.rows[one][world] for one in names]) if names else None
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:
-        return {name: (spec.frame, self._env.rows[name]) for name, spec in self._env.specs.items()
-                if spec.unit == POSE and PoseStream.can_draw(spec.frame)}  # fmt: skip
+        return {
+            name: (spec.frame, self._env.rows[name])
+            for name, spec in self._env.specs.items()
+            if spec.unit == POSE and PoseStream.can_draw(spec.frame)
+        }
 
     def _planned(self, world: int) -> list[np.ndarray]:
         return [points for _, points in self._env.planned_paths(world)]
@@ -89,8 +96,11 @@ class TaskSource(LiveSource):
     def controls(self) -> list[Control]:
         space: Any = self._env.single_action_space
         low, high = (np.nan_to_num(limit.astype(np.float64), posinf=1.0, neginf=-1.0) for limit in (space.low, space.high))
-        return [Control(f"{group} {i - columns.start}", float(low[i]), float(high[i]))
-                for group, columns in self._env.action_groups.items() for i in range(columns.start, columns.stop)]  # fmt: skip
+        return [
+            Control(f"{group} {i - columns.start}", float(low[i]), float(high[i]))
+            for group, columns in self._env.action_groups.items()
+            for i in range(columns.start, columns.stop)
+        ]
 
     def control(self, world: int) -> np.ndarray:
         return self._action[world]

@@ -3,21 +3,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mjsense.core.arguments import Seed, checked
+from mjsense.core.old_names import old_argument
+from mjsense.viewer.plots import plot
+from mjsense.viewer.viewer import Viewer
 
-if TYPE_CHECKING:
-    from mjsense.viewer.viewer import Viewer
+__all__ = ["Viewer", "plot", "view"]
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def view(
     thing: Any,
     *,
     world: int = 0,
     episode: int = 0,
-    worlds: int = 1,
+    num_worlds: int = 1,
     seed: Seed = 0,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -35,7 +38,7 @@ def view(
             a scene or a task.
         world: World to show first.
         episode: Position of a recording's episode to show first.
-        worlds: Number of worlds, if ``thing`` is a path or a name.
+        num_worlds: Number of worlds, if ``thing`` is a path or a name.
         seed: Seed of the first episode, if ``thing`` is a path or a name.
         host: Address that the server is bound to; the default is reachable from this computer only. The page opens with the printed address
             (:attr:`Viewer.url`), which contains a token.
@@ -53,7 +56,14 @@ def view(
     """
     from mjsense.viewer.open import source_of, viewer_of
 
-    viewer = viewer_of(source_of(thing, worlds=max(worlds, world + 1), seed=seed, **options), world=world, episode=episode, seed=seed, host=host, port=port)
+    viewer = viewer_of(
+        source_of(thing, num_worlds=max(num_worlds, world + 1), seed=seed, **options),
+        world=world,
+        episode=episode,
+        seed=seed,
+        host=host,
+        port=port,
+    )
     if block:
         viewer.run(open_browser)
     else:

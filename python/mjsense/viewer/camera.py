@@ -65,7 +65,9 @@ def _turned(point: np.ndarray, yaw: float) -> np.ndarray:
     return np.array([c * point[0] - s * point[1], s * point[0] + c * point[1], point[2]])
 
 
-def _boxes(model: Any, xpos: np.ndarray, xmat: np.ndarray, skipped: set[int], target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _boxes(
+    model: Any, xpos: np.ndarray, xmat: np.ndarray, skipped: set[int], target: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Bounding boxes of the geoms that can be in the way: centres, rotations and half sides."""
     centres, turns, halves = [np.zeros((0, 3))], [np.zeros((0, 3, 3))], [np.zeros((0, 3))]
     for geom in range(model.ngeom):

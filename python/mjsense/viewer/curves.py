@@ -35,8 +35,14 @@ class Curves:
         now: Returns the row that the scene shows, which gets a dot; used with ``rows``.
     """
 
-    def __init__(self, gui: Any, streams: dict[str, StreamInfo], later: Callable[[Any, Callable[[], None]], None],
-                 rows: Callable[[str], tuple[np.ndarray, np.ndarray]] | None = None, now: Callable[[], int] | None = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        gui: Any,
+        streams: dict[str, StreamInfo],
+        later: Callable[[Any, Callable[[], None]], None],
+        rows: Callable[[str], tuple[np.ndarray, np.ndarray]] | None = None,
+        now: Callable[[], int] | None = None,
+    ) -> None:
         self._gui, self._streams, self._rows, self._now = gui, streams, rows, now
         self._charts: list[tuple[str, Any] | None] = [None] * _CHARTS
         self._history: dict[str, list[tuple[float, np.ndarray]]] = {}
@@ -95,14 +101,25 @@ class Curves:
         if name == _NONE:
             return
         info = self._streams[name]
-        series: list[dict[str, Any]] = [{"label": "s"}] + [{"label": f"{i}" if info.width > 1 else label(name.rsplit("/", 1)[-1]), "stroke": COLOURS[i % len(COLOURS)], "width": 1.5}
-                                     for i in range(info.width)]  # fmt: skip
+        series: list[dict[str, Any]] = [{"label": "s"}] + [
+            {
+                "label": f"{i}" if info.width > 1 else label(name.rsplit("/", 1)[-1]),
+                "stroke": COLOURS[i % len(COLOURS)],
+                "width": 1.5,
+            }
+            for i in range(info.width)
+        ]
         if self._now is not None:
-            series.append({"label": "now", "stroke": "#000000", "width": 0, "points": {"show": True, "size": 8, "fill": "#000000"}})
+            series.append(
+                {"label": "now", "stroke": "#000000", "width": 0, "points": {"show": True, "size": 8, "fill": "#000000"}}
+            )
         self._folders[slot].label = label(f"{name} [{info.unit}]" if info.unit else name)
         with self._folders[slot]:
             data = self._data(name)
-            scales = {"x": {"time": False, "auto": True}, "y": {"auto": True} if self._rows is None else {"range": _range(data[1:])}}
+            scales = {
+                "x": {"time": False, "auto": True},
+                "y": {"auto": True} if self._rows is None else {"range": _range(data[1:])},
+            }
             chart = self._gui.add_uplot(data, tuple(series), scales=scales, height=180)
         self._charts[slot] = name, chart
 

@@ -12,13 +12,14 @@ import numpy as np
 from mjsense.core.progress_line import tracked
 from mjsense.core.rotations import rotation_of
 from mjsense.dataset import Dataset, Episode
+from mjsense.exporting.rerun import RerunFile, body_entity, geom_entity
 from mjsense.viewer import surfaces
 from mjsense.viewer.camera import first_view
 from mjsense.viewer.curves import MAX_CURVES
 from mjsense.viewer.server import serve, stop
 from mjsense.viewer.soft import fields_of
 from mjsense.viewer.source import LiveSource
-from mjsense.viewer.stage import MIN_REACH, VISIBLE_GROUPS, Stage, node
+from mjsense.viewer.stage import MIN_REACH, VISIBLE_GROUPS, Stage
 
 
 class Moment(NamedTuple):
@@ -35,11 +36,19 @@ class Moment(NamedTuple):
     images: dict[str, np.ndarray]
 
 
-def export(source: LiveSource | Dataset, path: str | Path, *, world: int = 0, episode: int = 0, seconds: float = 10.0, progress: bool | None = None) -> None:
+def export(
+    source: LiveSource | Dataset,
+    path: str | Path,
+    *,
+    world: int = 0,
+    episode: int = 0,
+    seconds: float = 10.0,
+    progress: bool | None = None,
+) -> None:
     """Writes an episode of a recording, or some seconds of a live world, to a file.
 
     Args:
-        path: A file that ends in ``.viser`` (shapes only) or ``.rrd`` (with streams and images; needs rerun-sdk).
+        path: A file that ends in ``.viser`` (shapes only) or ``.rrd`` (with streams and images; ``mjsense[rerun]``).
         seconds: Length of the export of a live world. [s]
         progress: Show the progress on stderr; by default where it is a terminal or a notebook.
     """
@@ -74,13 +83,21 @@ def _recorded(dataset: Dataset, episode: Episode, full: bool) -> Iterator[Moment
     model = episode.model()
     rows, videos = {}, {}
     if full:
-        names = [n for n, s in dataset.streams.items() if s.kind != "video" and s.dtype.kind in "fiub" and 0 < np.prod(s.shape) <= MAX_CURVES]
+        names = [
+            n
+            for n, s in dataset.streams.items()
+            if s.kind != "video" and s.dtype.kind in "fiub" and 0 < np.prod(s.shape) <= MAX_CURVES
+        ]
         rows = {name: episode[name] for name in names if name in episode}
         videos = {name: episode.video(name) for name, stream in dataset.streams.items() if stream.kind == "video"}
     for t, data in episode.replay(model=model):
-        yield Moment(t / float(dataset.fps), None if t else model, {name: getattr(data, name).copy() for name in fields_of(model)},
-                     {name: np.asarray(values[t], np.float64).reshape(-1) for name, values in rows.items()},
-                     {name: video[t] for name, video in videos.items()})  # fmt: skip
+        yield Moment(
+            t / float(dataset.fps),
+            None if t else model,
+            {name: getattr(data, name).copy() for name in fields_of(model)},
+            {name: np.asarray(values[t], np.float64).reshape(-1) for name, values in rows.items()},
+            {name: video[t] for name, video in videos.items()},
+        )
 
 
 def _write_viser(moments: Iterator[Moment], period: float, path: Path) -> None:
@@ -104,45 +121,43 @@ def _write_viser(moments: Iterator[Moment], period: float, path: Path) -> None:
 
 
 def _write_rerun(moments: Iterator[Moment], period: float, path: Path) -> None:
-    try:
-        import rerun as rr  # pyright: ignore[reportMissingImports]  # optional
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"Files for Rerun need rerun-sdk: pip install rerun-sdk ({error})", name=error.name) from error
-    recording = rr.RecordingStream("mjsense")
-    recording.save(path)
-    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    bodies: list[str] = []
-    sent = np.zeros((0, 7))
-    for moment in moments:
-        recording.set_time("time", duration=moment.time)
-        if moment.model is not None:
-            bodies = _log_model(recording, rr, moment.model)
-            sent = np.full((len(bodies), 7), np.nan)
-        poses = np.concatenate([moment.fields["xpos"], moment.fields["xquat"]], 1)
-        for body in np.flatnonzero((poses != sent).any(1)).tolist():
-            recording.log(bodies[body], rr.Transform3D(translation=poses[body, :3], quaternion=rr.Quaternion(xyzw=poses[body, [4, 5, 6, 3]])))
-        sent = poses
-        for name, values in moment.values.items():
-            recording.log(f"streams/{name}", rr.Scalars(values))
-        for name, image in moment.images.items():
-            depth = image.dtype.kind == "f"
-            logged = rr.DepthImage(image.reshape(image.shape[:2]), meter=1.0) if depth else rr.Image(image).compress() if image.dtype == np.uint8 else None
-            if logged is not None:
-                recording.log(f"images/{name}", logged)
-    recording.disconnect()
+    with RerunFile(path) as file:
+        bodies: list[str] = []
+        sent = np.zeros((0, 7))
+        for step, moment in enumerate(moments):
+            file.at(step, moment.time)
+            if moment.model is not None:
+                bodies = _log_model(file, moment.model)
+                sent = np.full((len(bodies), 7), np.nan)
+            poses = np.concatenate([moment.fields["xpos"], moment.fields["xquat"]], 1)
+            for body in np.flatnonzero((poses != sent).any(1)).tolist():
+                file.pose(bodies[body], poses[body, :3], poses[body, 3:])
+            sent = poses
+            for name, values in moment.values.items():
+                file.curve(name, values)
+            for name, image in moment.images.items():
+                file.image(name, image)
 
 
-def _log_model(recording: Any, rr: Any, model: Any) -> list[str]:
-    """Logs the geoms below one entity for each body, and returns the entities."""
-    bodies = [f"world/{node(model, 'body', body)}" for body in range(model.nbody)]
+def _log_model(file: RerunFile, model: Any) -> list[str]:
+    """Logs the visible geoms, and returns the entities of the bodies."""
+    bodies = [body_entity(body, model.body(body).name) for body in range(model.nbody)]
     reach = max(MIN_REACH, 2 * float(model.stat.extent))
     for geom in range(model.ngeom):
         surface = surfaces.of_geom(model, geom, reach) if int(model.geom_group[geom]) in VISIBLE_GROUPS else None
         if surface is None:
             continue
-        name, shape = f"{bodies[int(model.geom_bodyid[geom])]}/{node(model, 'geom', geom)}", surface.shape
-        turn = model.geom_quat[geom][[1, 2, 3, 0]]
-        recording.log(name, rr.Transform3D(translation=model.geom_pos[geom], quaternion=rr.Quaternion(xyzw=turn)))
-        recording.log(name, rr.Mesh3D(vertex_positions=shape.vertices, triangle_indices=shape.faces, vertex_normals=shape.normals,
-                                      vertex_texcoords=shape.uv, albedo_texture=surface.texture, albedo_factor=surface.rgba))  # fmt: skip
+        shape, body = surface.shape, int(model.geom_bodyid[geom])
+        place = geom_entity(bodies[body], geom - int(model.body_geomadr[body]), model.geom(geom).name or f"geom_{geom}")
+        file.mesh(
+            place,
+            model.geom_pos[geom],
+            model.geom_quat[geom],
+            vertices=shape.vertices,
+            faces=shape.faces,
+            vertex_normals=shape.normals,
+            vertex_texcoords=shape.uv,
+            albedo_texture=surface.texture,
+            albedo_factor=surface.rgba,
+        )
     return bodies

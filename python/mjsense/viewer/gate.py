@@ -35,7 +35,11 @@ def _quiet_log() -> logging.Logger:
     """websockets' log without the lines about connections that are refused, do not speak HTTP or end."""
     log = logging.getLogger("mjsense.view")
     if not log.filters:
-        log.addFilter(lambda record: not record.getMessage().startswith(("opening handshake failed", "connection rejected", "keepalive ping failed")))
+        log.addFilter(
+            lambda record: (
+                not record.getMessage().startswith(("opening handshake failed", "connection rejected", "keepalive ping failed"))
+            )
+        )
     return log
 
 
@@ -55,8 +59,13 @@ class Gate:
 
     def options(self, given: dict[str, Any]) -> dict[str, Any]:
         """The arguments of websockets' ``serve`` in place of those that were given."""
-        gated = {"sock": self._listening.socket, "process_request": self._asked(given["process_request"]), "create_connection": _connection(self),
-                 "max_size": MAX_MESSAGE, "logger": _quiet_log()}  # fmt: skip
+        gated = {
+            "sock": self._listening.socket,
+            "process_request": self._asked(given["process_request"]),
+            "create_connection": _connection(self),
+            "max_size": MAX_MESSAGE,
+            "logger": _quiet_log(),
+        }
         return {**given, **gated}
 
     def _refusal(self, headers: Any, token: str) -> str:

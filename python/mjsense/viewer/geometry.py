@@ -147,7 +147,10 @@ def _unit_box() -> Triangles:
             normals.append(np.eye(3)[axis] * sign * np.ones((4, 1)))
             uv.append(0.5 + 0.5 * corners * (1, -1))
     return Triangles(
-        np.concatenate(vertices), np.array(faces, np.uint32), np.concatenate(normals).astype(np.float32), np.concatenate(uv).astype(np.float32)
+        np.concatenate(vertices),
+        np.array(faces, np.uint32),
+        np.concatenate(normals).astype(np.float32),
+        np.concatenate(uv).astype(np.float32),
     )
 
 
@@ -176,7 +179,12 @@ def _height_field(model: Any, field: int) -> Triangles:
     spacing = 2 * rx / max(columns - 1, 1), 2 * ry / max(rows - 1, 1)
     normals = np.stack([-dx / spacing[0], -dy / spacing[1], np.ones_like(heights)], -1).reshape(-1, 3)
     uv = np.stack([vertices[..., 0] * (0.5 / rx), vertices[..., 1] * (-0.5 / ry)], -1) - 0.5
-    return Triangles(vertices.reshape(-1, 3).astype(np.float32), _grid_faces(*heights.shape), _unit(normals), uv.reshape(-1, 2).astype(np.float32))
+    return Triangles(
+        vertices.reshape(-1, 3).astype(np.float32),
+        _grid_faces(*heights.shape),
+        _unit(normals),
+        uv.reshape(-1, 2).astype(np.float32),
+    )
 
 
 def _mesh(model: Any, mesh: int, mapped: bool) -> Triangles | None:

@@ -49,16 +49,29 @@ def glb(shape: Triangles, image: bytes, mime: str, rgba: np.ndarray, roughness: 
         "TEXCOORD_0": array(np.ascontiguousarray(shape.uv, "<f4"), "VEC2", _FLOAT, _VERTICES),
     }
     indices = array(np.ascontiguousarray(shape.faces, "<u4").reshape(-1), "SCALAR", _UINT, _FACES)
-    material: dict[str, object] = {"pbrMetallicRoughness": {"baseColorFactor": [*linear(rgba[:3]), float(rgba[3])], "baseColorTexture": {"index": 0},
-                                         "metallicFactor": 0.0, "roughnessFactor": roughness}}  # fmt: skip
+    material: dict[str, object] = {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*linear(rgba[:3]), float(rgba[3])],
+            "baseColorTexture": {"index": 0},
+            "metallicFactor": 0.0,
+            "roughnessFactor": roughness,
+        }
+    }
     if rgba[3] < 1:
         material["alphaMode"] = "BLEND"
     document = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}], "materials": [material],
-        "textures": [{"source": 0}], "images": [{"bufferView": add(image), "mimeType": mime}],
-        "bufferViews": views, "accessors": accessors, "buffers": [{"byteLength": len(data)}],
-    }  # fmt: skip
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
+        "materials": [material],
+        "textures": [{"source": 0}],
+        "images": [{"bufferView": add(image), "mimeType": mime}],
+        "bufferViews": views,
+        "accessors": accessors,
+        "buffers": [{"byteLength": len(data)}],
+    }
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     data.extend(b"\0" * (-len(data) % 4))

@@ -31,12 +31,16 @@ class Listening:
             raise ValueError(f"port is {port}: must be in [0, 65535]; 0 takes any free port")
         host = host.strip().removeprefix("[").removesuffix("]")
         if not host:
-            raise ValueError("host is empty: must be an address of this computer, such as 127.0.0.1, or 0.0.0.0 for all its networks")
+            raise ValueError(
+                "host is empty: must be an address of this computer, such as 127.0.0.1, or 0.0.0.0 for all its networks"
+            )
         try:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
         except (OSError, UnicodeError) as error:
-            raise ValueError(f"host is '{plain(host, 60)}', which is not a known name or address ({error}): must be an address of this computer, such as "
-                             "127.0.0.1, or 0.0.0.0 for all its networks") from None  # fmt: skip
+            raise ValueError(
+                f"host is '{plain(host, 60)}', which is not a known name or address ({error}): must be an address of this computer, such as "
+                "127.0.0.1, or 0.0.0.0 for all its networks"
+            ) from None
         family, _, _, _, address = min(found, key=lambda one: one[0] != socket.AF_INET)
         self._host = host
         self.socket: socket.socket = _bound(family, address, host, port)
@@ -77,9 +81,13 @@ def _bound(family: int, address: tuple[Any, ...], host: str, port: int) -> socke
             if error.errno == errno.EADDRINUSE:
                 continue
             if error.errno == errno.EACCES:
-                raise ValueError(f"port is {candidate}: this user may not listen there ({error.strerror}); choose one from 1024 to 65535") from None
-            raise ValueError(f"host is '{plain(host, 60)}': this computer cannot listen there ({error.strerror}); must be one of its own addresses, such as "
-                             "127.0.0.1, or 0.0.0.0 for all its networks") from None  # fmt: skip
+                raise ValueError(
+                    f"port is {candidate}: this user may not listen there ({error.strerror}); choose one from 1024 to 65535"
+                ) from None
+            raise ValueError(
+                f"host is '{plain(host, 60)}': this computer cannot listen there ({error.strerror}); must be one of its own addresses, such as "
+                "127.0.0.1, or 0.0.0.0 for all its networks"
+            ) from None
     raise ValueError(f"port is {port}: it and all ports up to {last} are taken")
 
 

@@ -35,12 +35,16 @@ class LiveViewer(Viewer):
             self._later(gui.add_button("Step", hint="One control step."), self._step_once)
             self._speed = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
             self._later(self._speed, self._start)
-            self._picker = gui.add_number("World", world, min=0, max=source.num_worlds - 1, step=1, disabled=source.num_worlds == 1)
+            self._picker = gui.add_number(
+                "World", world, min=0, max=source.num_worlds - 1, step=1, disabled=source.num_worlds == 1
+            )
             self._later(self._picker, self._pick)
             self._seed = gui.add_number("Seed", seed, min=0, max=2**53, step=1)
             self._later(gui.add_button("Reset", hint="Start the first episode of this seed in all worlds."), self._reset)
             if source.policy is not None:
-                self._policy = gui.add_checkbox("Policy", initial_value=source.policy, hint="Off: the sliders of the page Control act.")
+                self._policy = gui.add_checkbox(
+                    "Policy", initial_value=source.policy, hint="Off: the sliders of the page Control act."
+                )
                 self._later(self._policy, self._switch)
         with tabs.add_tab("Show"):
             self._add_groups(gui)
@@ -48,7 +52,9 @@ class LiveViewer(Viewer):
             for box in self._drawn.values():
                 self._later(box, self._draw)
         with tabs.add_tab("Cameras"):
-            self._pictures = Pictures(gui, source.pictures(), self._later, self._show, points=lambda name: source.image_points(name, self._world))
+            self._pictures = Pictures(
+                gui, source.pictures(), self._later, self._show, points=lambda name: source.image_points(name, self._world)
+            )
         with tabs.add_tab("Curves"):
             self._curves = Curves(gui, source.streams(), self._later)
         with tabs.add_tab("Control"):
@@ -63,7 +69,13 @@ class LiveViewer(Viewer):
         source = self._source
         self._controls, self._joints = [], []
         for title, made, controls, values, write in (
-            ("Actions" if source.policy is not None else "Actuators", self._controls, source.controls(), source.control, source.set_control),
+            (
+                "Actions" if source.policy is not None else "Actuators",
+                self._controls,
+                source.controls(),
+                source.control,
+                source.set_control,
+            ),
             ("Joints", self._joints, source.joints(), source.joint_positions, source.set_joint),
         ):
             if not controls:

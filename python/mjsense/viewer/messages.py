@@ -26,14 +26,26 @@ class Messages:
         import msgspec.msgpack  # a dependency of viser
 
         self._viser, self._gui, self._scene = viser, server.gui, server.scene
-        private = {"_gui_input_handle_from_uuid": server.gui, "_command_handle_from_uuid": server.gui, "_handle_from_transform_controls_name": server.scene}
+        private = {
+            "_gui_input_handle_from_uuid": server.gui,
+            "_command_handle_from_uuid": server.gui,
+            "_handle_from_transform_controls_name": server.scene,
+        }
         if missing := [name for name, owner in private.items() if not hasattr(owner, name)]:
-            raise RuntimeError(f"viser {plain(viser.__version__)} has no {missing[0]}, which the viewer reads: install viser 1.1.1")
+            raise RuntimeError(
+                f"viser {plain(viser.__version__)} has no {missing[0]}, which the viewer reads: install viser 1.1.1"
+            )
         self._codec: Any = msgspec.msgpack
         self._error: type[Exception] = msgspec.MsgspecError
-        self._kinds = {"GuiUpdateMessage": self._value, "CommandTriggerMessage": self._command, "ViewerCameraMessage": self._camera,
-                       "TransformControlsUpdateMessage": self._pose, "TransformControlsDragStartMessage": self._handle,
-                       "TransformControlsDragEndMessage": self._handle, "GetRenderResponseMessage": self._render}  # fmt: skip
+        self._kinds = {
+            "GuiUpdateMessage": self._value,
+            "CommandTriggerMessage": self._command,
+            "ViewerCameraMessage": self._camera,
+            "TransformControlsUpdateMessage": self._pose,
+            "TransformControlsDragStartMessage": self._handle,
+            "TransformControlsDragEndMessage": self._handle,
+            "GetRenderResponseMessage": self._render,
+        }
 
     def __call__(self, raw: bytes | str) -> bytes | None:
         """The message made again of checked values; None: it is ignored."""
@@ -81,15 +93,21 @@ class Messages:
         return {"name": name, "owner": ""} if known else None
 
     def _pose(self, message: dict[Any, Any]) -> dict[str, Any] | None:
-        handle, position, wxyz = self._handle(message), _numbers(message.get("position"), 3, _SPACE), _numbers(message.get("wxyz"), 4, 1.1)
+        handle, position, wxyz = (
+            self._handle(message),
+            _numbers(message.get("position"), 3, _SPACE),
+            _numbers(message.get("wxyz"), 4, 1.1),
+        )
         length = math.hypot(*wxyz) if wxyz else 0.0
         if handle is None or position is None or wxyz is None or not 0.9 < length < 1.1:
             return None
         return {**handle, "position": position, "wxyz": [component / length for component in wxyz]}
 
     def _camera(self, message: dict[Any, Any]) -> dict[str, Any] | None:
-        found: dict[str, Any] = {name: _numbers(message.get(name), count, _CAMERA) for name, count in
-                                 (("wxyz", 4), ("position", 3), ("look_at", 3), ("up_direction", 3))}  # fmt: skip
+        found: dict[str, Any] = {
+            name: _numbers(message.get(name), count, _CAMERA)
+            for name, count in (("wxyz", 4), ("position", 3), ("look_at", 3), ("up_direction", 3))
+        }
         found |= {name: _number(message.get(name), 0, _CAMERA, None, float) for name in ("fov", "near", "far")}
         found |= {name: _number(message.get(name), 0, _IMAGE, None, int) for name in ("image_height", "image_width")}
         return None if any(value is None for value in found.values()) else found

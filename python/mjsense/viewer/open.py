@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from mjsense.core.errors import unexpected_keyword
 from mjsense.core.later_rooms import provided
 from mjsense.dataset import Dataset
 from mjsense.dataset.files import INDEX
@@ -34,7 +35,7 @@ def options_of(given: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> LiveSource | Dataset:
+def source_of(thing: Any, *, num_worlds: int = 1, seed: int = 0, **options: Any) -> LiveSource | Dataset:
     """What a viewer can show.
 
     Args:
@@ -42,6 +43,8 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
             of a scene or a task.
         options: Options of :func:`mjsense.make_vec`, for tasks and scenes.
     """
+    if "num_envs" in options:
+        raise unexpected_keyword("view()", "num_envs", ["num_worlds"])
     if isinstance(thing, (LiveSource, Dataset)):
         return thing
     if isinstance(thing, Simulation):
@@ -49,7 +52,7 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
     if hasattr(thing, "warp_model"):
         raise NotImplementedError("mjs.view is not available with backend='warp'; use backend='cpu'")
     if not isinstance(thing, (str, Path)):
-        return provided("task_source")(thing, worlds, seed, options)
+        return provided("task_source")(thing, num_worlds, seed, options)
     if is_address(thing):
         return Dataset(thing)
     if isinstance(thing, Path) or (Path(thing).exists() and thing not in provided("task_names")()):
@@ -57,8 +60,8 @@ def source_of(thing: Any, *, worlds: int = 1, seed: int = 0, **options: Any) -> 
         if is_recording(path):
             return Dataset(path)
         if path.suffix in (".xml", ".mjcf"):
-            return _model(path, worlds, seed)
-    return provided("task_source")(thing, worlds, seed, options)
+            return _model(path, num_worlds, seed)
+    return provided("task_source")(thing, num_worlds, seed, options)
 
 
 def _model(path: Path, worlds: int, seed: int) -> LiveSource:

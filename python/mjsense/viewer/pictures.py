@@ -38,8 +38,15 @@ def with_points(pixels: np.ndarray, points: np.ndarray) -> np.ndarray:
 class Pictures:
     """Images that the user chooses by name. Only these are read."""
 
-    def __init__(self, gui: Any, names: list[str], later: Callable[[Any, Callable[[], None]], None], chosen: Callable[[], None], shown: int = 1,
-                 points: Callable[[str], np.ndarray | None] = lambda _: None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        gui: Any,
+        names: list[str],
+        later: Callable[[Any, Callable[[], None]], None],
+        chosen: Callable[[], None],
+        shown: int = 1,
+        points: Callable[[str], np.ndarray | None] = lambda _: None,
+    ) -> None:
         """
         Args:
             chosen: Called after the choice has changed.
@@ -56,7 +63,9 @@ class Pictures:
             self._boxes[name] = box
         self._points, self._points_box = points, None
         if any(points(name) is not None for name in names):
-            self._points_box = gui.add_checkbox("Image points", initial_value=False, hint="Pixels on objects: object_image_points.")
+            self._points_box = gui.add_checkbox(
+                "Image points", initial_value=False, hint="Pixels on objects: object_image_points."
+            )
             later(self._points_box, chosen)
         self._folder = gui.add_folder("Images") if names else None
         if not names:

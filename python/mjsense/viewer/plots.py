@@ -99,7 +99,11 @@ def _expand(names: Iterable[str], known: Iterable[str]) -> list[str]:
 
 def _recorded(dataset: Dataset, names: Sequence[str], episodes: Sequence[int]) -> _Tracks:
     streams = dataset.streams
-    usable = [name for name, s in streams.items() if s.kind == "video" or (s.dtype.kind in "fiub" and np.prod(s.shape, dtype=int) <= MAX_CURVES)]
+    usable = [
+        name
+        for name, s in streams.items()
+        if s.kind == "video" or (s.dtype.kind in "fiub" and np.prod(s.shape, dtype=int) <= MAX_CURVES)
+    ]
     chosen = _expand(names, usable)
     tracks = _Tracks({name: streams[name].unit for name in chosen}, {name for name in chosen if streams[name].kind == "video"})
     period = 1 / float(dataset.fps)
@@ -126,7 +130,9 @@ def _live(source: LiveSource, names: Sequence[str], world: int, seconds: float) 
         raise ValueError(f"world {world}: must be in [0, {source.num_worlds})")
     streams, pictures = source.streams(), source.pictures()
     chosen = _expand(names, [*streams, *pictures])
-    tracks = _Tracks({name: streams[name].unit if name in streams else "" for name in chosen}, {name for name in chosen if name in pictures})
+    tracks = _Tracks(
+        {name: streams[name].unit if name in streams else "" for name in chosen}, {name for name in chosen if name in pictures}
+    )
     count = max(1, round(seconds / source.period))
     kept = set(np.linspace(0, count - 1, _FRAMES).round().astype(int).tolist())
     episodes, last = 0, np.inf
@@ -149,7 +155,9 @@ def _live(source: LiveSource, names: Sequence[str], world: int, seconds: float) 
 def _drawn(make: Any, tracks: _Tracks) -> Any:
     groups: list[list[str]] = []  # streams of one axis
     for name, unit in tracks.units.items():
-        same = next((g for g in groups if name not in tracks.images and g[0] not in tracks.images and tracks.units[g[0]] == unit), None)
+        same = next(
+            (g for g in groups if name not in tracks.images and g[0] not in tracks.images and tracks.units[g[0]] == unit), None
+        )
         if same is None:
             groups.append([name])
         else:
@@ -182,7 +190,15 @@ def _drawn(make: Any, tracks: _Tracks) -> Any:
         for start, text in tracks.marks:
             axis.axvline(start, color="0.4", linewidth=0.8, linestyle="--")
             if axis is axes[0]:
-                axis.annotate(text, (start, 1), xycoords=("data", "axes fraction"), xytext=(3, 3), textcoords="offset points", fontsize=7, color="0.3")
+                axis.annotate(
+                    text,
+                    (start, 1),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(3, 3),
+                    textcoords="offset points",
+                    fontsize=7,
+                    color="0.3",
+                )
     axes[-1].set_xlabel("time [s]", fontsize=9)
     for axis in axes:
         axis.tick_params(labelsize=8)
@@ -207,7 +223,14 @@ def _film(axis: Any, name: str, tracks: _Tracks, end: float) -> None:
         pixels = coloured(image[..., None] if image.ndim == 2 else image)
         if pixels is not None:
             axis.imshow(pixels, extent=(k * width, (k + 0.97) * width, 0, 1), aspect="auto")
-        axis.text((k + 0.03) * width, 0.03, f"{present[i][0]:.2f} s", fontsize=6, color="white", bbox={"facecolor": "black", "pad": 1, "linewidth": 0})
+        axis.text(
+            (k + 0.03) * width,
+            0.03,
+            f"{present[i][0]:.2f} s",
+            fontsize=6,
+            color="white",
+            bbox={"facecolor": "black", "pad": 1, "linewidth": 0},
+        )
     axis.set_xlim(0, end)
     axis.set_ylim(0, 1)
     axis.set_yticks([])

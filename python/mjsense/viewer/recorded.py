@@ -51,26 +51,45 @@ class RecordingViewer(Viewer):
         tabs = gui.add_tab_group()
         with tabs.add_tab("Episodes"):
             self._outcomes = labels(sorted({one.outcome for one in dataset.episodes}))
-            self._outcome = gui.add_dropdown("Outcome", [_ALL, *self._outcomes], initial_value=_ALL, visible=len(self._outcomes) > 1)
+            self._outcome = gui.add_dropdown(
+                "Outcome", [_ALL, *self._outcomes], initial_value=_ALL, visible=len(self._outcomes) > 1
+            )
             self._text = gui.add_text("Task contains", "", hint="Only episodes whose instruction contains this text.")
             self._choice = gui.add_dropdown("Episode", ["0"])
             self._about = gui.add_html("")
             self._add_play(gui)
             self._time = gui.add_slider("Step", min=0, max=1, step=1, initial_value=0)
             self._speed = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
-            for handle, action in ((self._outcome, self._filter), (self._text, self._filter), (self._choice, self._choose),
-                                   (self._time, self._show), (self._speed, self._start)):  # fmt: skip
+            for handle, action in (
+                (self._outcome, self._filter),
+                (self._text, self._filter),
+                (self._choice, self._choose),
+                (self._time, self._show),
+                (self._speed, self._start),
+            ):
                 self._later(handle, action)
         with tabs.add_tab("Show"):
             self._add_groups(gui)
-            self._poses = {name: gui.add_checkbox(label(name.removeprefix("obs/extra/")), initial_value=False)
-                           for name, stream in dataset.streams.items() if stream.unit == POSE and PoseStream.can_draw(stream.frame)}  # fmt: skip
+            self._poses = {
+                name: gui.add_checkbox(label(name.removeprefix("obs/extra/")), initial_value=False)
+                for name, stream in dataset.streams.items()
+                if stream.unit == POSE and PoseStream.can_draw(stream.frame)
+            }
             for box in self._poses.values():
                 self._later(box, self._draw)
         # Colour images first.
-        videos = sorted((stream for stream in dataset.streams.values() if stream.kind == "video"), key=lambda stream: stream.dtype.kind != "u")
+        videos = sorted(
+            (stream for stream in dataset.streams.values() if stream.kind == "video"), key=lambda stream: stream.dtype.kind != "u"
+        )
         with tabs.add_tab("Videos"):
-            self._pictures = Pictures(gui, [stream.name.removeprefix(VIDEOS) for stream in videos], self._later, self._show, shown=2, points=self._image_points)
+            self._pictures = Pictures(
+                gui,
+                [stream.name.removeprefix(VIDEOS) for stream in videos],
+                self._later,
+                self._show,
+                shown=2,
+                points=self._image_points,
+            )
         with tabs.add_tab("Curves"):
             self._curves = Curves(gui, curve_streams(dataset), self._later, self._rows, lambda: max(self._shown, 0))
         self._filter(episode)
@@ -121,7 +140,9 @@ class RecordingViewer(Viewer):
                 self._look(*first_view(self._model, self._data.xpos, self._data.xmat))
         if missing and self._shown < 0:
             print(plain(missing, 1000), flush=True)
-        self._about.content = panel_text(episode.task, f"{episode.outcome}, {episode.length} observations, seed {episode.seed}", missing)
+        self._about.content = panel_text(
+            episode.task, f"{episode.outcome}, {episode.length} observations, seed {episode.seed}", missing
+        )
         self._time.max = max(episode.length - 1, 1)
         self._time.value = 0
         self._curves.reload()
@@ -134,7 +155,13 @@ class RecordingViewer(Viewer):
 
     def _image_points(self, camera: str) -> np.ndarray | None:
         names = point_streams(camera, self._dataset.streams)
-        return np.concatenate([self._episode[name][max(self._shown, 0)] for name in names if name in self._episode] or [np.zeros((0, 2))]) if names else None
+        return (
+            np.concatenate(
+                [self._episode[name][max(self._shown, 0)] for name in names if name in self._episode] or [np.zeros((0, 2))]
+            )
+            if names
+            else None
+        )
 
     def _rows(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         rows = np.asarray(self._episode[name], np.float64) if name in self._episode else np.zeros((0, 1))
@@ -190,5 +217,7 @@ class RecordingViewer(Viewer):
             return
         shapes = DebugShapes(0, float(self._model.stat.meansize))
         for name in names:
-            PoseStream(name, self._dataset.streams[name].frame).draw(shapes, self._episode[name][self._shown], self._model, self._data.xpos, self._data.xmat)
+            PoseStream(name, self._dataset.streams[name].frame).draw(
+                shapes, self._episode[name][self._shown], self._model, self._data.xpos, self._data.xmat
+            )
         self._layer.show(shapes)

@@ -27,7 +27,9 @@ def import_viser() -> Any:
         warnings.simplefilter("ignore")
         viser = optional("viser", "view", "The viewer")
     if not viser.__version__.startswith(_SERIES):
-        raise RuntimeError(f"The viewer needs viser {_SERIES}*, and viser {plain(viser.__version__)} is installed: pip install 'mjsense[view]'")
+        raise RuntimeError(
+            f"The viewer needs viser {_SERIES}*, and viser {plain(viser.__version__)} is installed: pip install 'mjsense[view]'"
+        )
     return viser
 
 

@@ -21,7 +21,10 @@ _PULLEY = -2  # in MjData.wrap_obj
 
 def fields_of(model: Any) -> list[str]:
     """The fields of MjData that a picture of a model depends on."""
-    flexes, tendons = ["flexvert_xpos"] * bool(model.nflex), ["ten_wrapadr", "ten_wrapnum", "wrap_obj", "wrap_xpos"] * bool(model.ntendon)
+    flexes, tendons = (
+        ["flexvert_xpos"] * bool(model.nflex),
+        ["ten_wrapadr", "ten_wrapnum", "wrap_obj", "wrap_xpos"] * bool(model.ntendon),
+    )
     return ["xpos", "xquat", *flexes, *tendons]
 
 
@@ -57,7 +60,9 @@ class SoftParts:
             vertices = surface.vertices(read)
             rgb = tuple((np.clip(surface.rgba[:3], 0, 1) * 255).round().astype(int).tolist())
             opacity = float(surface.rgba[3]) if surface.rgba[3] < 1 else None
-            handle = self._server.scene.add_mesh_simple(surface.name, vertices, surface.faces, color=rgb, opacity=opacity, side="double")
+            handle = self._server.scene.add_mesh_simple(
+                surface.name, vertices, surface.faces, color=rgb, opacity=opacity, side="double"
+            )
             self._drawn.append((surface, handle, vertices))
         self._waiting = []
         for i, (surface, handle, sent) in enumerate(self._drawn):
@@ -83,8 +88,14 @@ def _flexes(model: Any, groups: Collection[int]) -> list[_Surface]:
             start, number = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
             faces = model.flex_elem[start : start + (dim + 1) * number].reshape(number, dim + 1)
             faces = faces if dim == 2 else faces[:, [0, 1, 1]]
-        found.append(_Surface(f"/flexes/{flex}", np.array(faces, np.uint32).reshape(-1, 3), np.array(model.flex_rgba[flex]),
-                              lambda read, part=slice(first, first + count): read("flexvert_xpos")[part].astype(np.float32)))  # fmt: skip
+        found.append(
+            _Surface(
+                f"/flexes/{flex}",
+                np.array(faces, np.uint32).reshape(-1, 3),
+                np.array(model.flex_rgba[flex]),
+                lambda read, part=slice(first, first + count): read("flexvert_xpos")[part].astype(np.float32),
+            )
+        )
     return found
 
 

@@ -84,7 +84,11 @@ class LiveSource:
 
     def streams(self) -> dict[str, StreamInfo]:
         """Streams that can be drawn as curves, by name."""
-        own = {name: (sensor.unit, rows) for name, (sensor, rows) in self._user_rows().items() if rows.ndim < 4 and rows.dtype.kind in "fiub"}
+        own = {
+            name: (sensor.unit, rows)
+            for name, (sensor, rows) in self._user_rows().items()
+            if rows.ndim < 4 and rows.dtype.kind in "fiub"
+        }
         found = {name: StreamInfo(unit, rows[0].size) for name, (unit, rows) in {**own, **self._sensor_rows()}.items()}
         for name, unit in (("qpos", "m, rad"), ("qvel", "m/s, rad/s"), ("ctrl", "")):
             found.setdefault(name, StreamInfo(unit, getattr(self.sim, name).shape[1]))
@@ -117,8 +121,12 @@ class LiveSource:
 
     def _user_rows(self) -> dict[str, tuple[Sensor, np.ndarray]]:
         """Rows of the sensors that are written in Python, as they were last computed."""
-        return {f"{sensor.uuid}/{spec['name']}".removesuffix("/"): (sensor, rows) for sensor in self.sim._python if sensor._mjs_rows
-                for spec, rows in zip(sensor._mjs_row_specs(), sensor._mjs_rows)}  # fmt: skip
+        return {
+            f"{sensor.uuid}/{spec['name']}".removesuffix("/"): (sensor, rows)
+            for sensor in self.sim._python
+            if sensor._mjs_rows
+            for spec, rows in zip(sensor._mjs_row_specs(), sensor._mjs_rows)
+        }
 
     def _user_row(self, name: str) -> np.ndarray | None:
         found = self._user_rows().get(name)
@@ -183,7 +191,9 @@ class LiveSource:
         if _CONTACTS in names:
             for contact in self._contacts(world):
                 shapes.add_sphere(contact[:3], 0.05 * shapes.meansize, _CONTACT_COLOUR)
-                shapes.add_arrow(contact[:3], contact[:3] + 0.5 * shapes.meansize * contact[3:], _CONTACT_COLOUR, 0.02 * shapes.meansize)
+                shapes.add_arrow(
+                    contact[:3], contact[:3] + 0.5 * shapes.meansize * contact[3:], _CONTACT_COLOUR, 0.02 * shapes.meansize
+                )
         return shapes
 
     def _pose_rows(self) -> dict[str, tuple[str, np.ndarray]]:

@@ -126,14 +126,25 @@ class Stage:
             handle = scene.add_glb(name, surface.glb, position=pose[0], wxyz=pose[1])
         else:
             rgb, alpha = (np.clip(surface.rgba[:3], 0, 1) * 255).round().astype(int), float(surface.rgba[3])
-            handle = scene.add_mesh_simple(name, surface.shape.vertices, surface.shape.faces, color=tuple(rgb.tolist()),
-                                           opacity=alpha if alpha < 1 else None, position=pose[0], wxyz=pose[1])  # fmt: skip
+            handle = scene.add_mesh_simple(
+                name,
+                surface.shape.vertices,
+                surface.shape.faces,
+                color=tuple(rgb.tolist()),
+                opacity=alpha if alpha < 1 else None,
+                position=pose[0],
+                wxyz=pose[1],
+            )
         self._solids[kind, index] = handle, key
 
     def _set_lights(self, model: Any) -> None:
         names = ("active", "type", "pos", "dir", "ambient", "diffuse", "castshadow", "bodyid")
         head = model.vis.headlight
-        key = b"".join(getattr(model, f"light_{name}").tobytes() for name in names) + head.ambient.tobytes() + head.diffuse.tobytes()
+        key = (
+            b"".join(getattr(model, f"light_{name}").tobytes() for name in names)
+            + head.ambient.tobytes()
+            + head.diffuse.tobytes()
+        )
         if key == self._light_key:
             return
         self._light_key = key
@@ -146,7 +157,11 @@ class Stage:
             # The light at the camera becomes one from all sides that is brighter from above.
             bright = _light(np.array(head.diffuse))
             ground = tuple(component // 2 for component in bright["color"])
-            self._lights.append(scene.add_light_hemisphere("/lights/head", sky_color=bright["color"], ground_color=ground, intensity=bright["intensity"]))
+            self._lights.append(
+                scene.add_light_hemisphere(
+                    "/lights/head", sky_color=bright["color"], ground_color=ground, intensity=bright["intensity"]
+                )
+            )
         for light in np.flatnonzero(model.light_active).tolist():
             ambient += model.light_ambient[light]
             direction, directional = model.light_dir[light], int(model.light_type[light]) == _DIRECTIONAL
@@ -158,8 +173,16 @@ class Stage:
             else:
                 parent = self._frame(model, int(model.light_bodyid[light]))
                 angle = min(np.radians(float(model.light_cutoff[light])), np.pi / 2)
-                made = scene.add_light_spot(f"{parent}{name}", **bright, cast_shadow=shadow, direction=tuple(direction), decay=0.0,
-                                            angle=angle, penumbra=0.5, position=model.light_pos[light])  # fmt: skip
+                made = scene.add_light_spot(
+                    f"{parent}{name}",
+                    **bright,
+                    cast_shadow=shadow,
+                    direction=tuple(direction),
+                    decay=0.0,
+                    angle=angle,
+                    penumbra=0.5,
+                    position=model.light_pos[light],
+                )
             self._lights.append(made)
         self._lights.append(scene.add_light_ambient("/lights/ambient", **_light(ambient)))
 

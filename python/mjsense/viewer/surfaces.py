@@ -47,9 +47,21 @@ class SitesAsGeoms:
 def key_of(model: Any, geom: int) -> tuple[Any, ...]:
     """The values of the model that the surface of a geom depends on."""
     material = int(model.geom_matid[geom])
-    of_material = () if material < 0 else tuple(
-        getattr(model, f"mat_{name}")[material].tobytes() for name in ("rgba", "texid", "texrepeat", "texuniform", "shininess", "specular"))  # fmt: skip
-    return (int(model.geom_type[geom]), int(model.geom_dataid[geom]), model.geom_size[geom].tobytes(), rgba_of(model, geom).tobytes(), *of_material)
+    of_material = (
+        ()
+        if material < 0
+        else tuple(
+            getattr(model, f"mat_{name}")[material].tobytes()
+            for name in ("rgba", "texid", "texrepeat", "texuniform", "shininess", "specular")
+        )
+    )
+    return (
+        int(model.geom_type[geom]),
+        int(model.geom_dataid[geom]),
+        model.geom_size[geom].tobytes(),
+        rgba_of(model, geom).tobytes(),
+        *of_material,
+    )
 
 
 def rgba_of(model: Any, geom: int) -> np.ndarray:
@@ -176,5 +188,9 @@ def _cube_mapped(model: Any, geom: int, shape: Triangles) -> Triangles:
     face = 2 * axis + negative
     uv = np.stack([u, (face[:, None] + v) / 6], -1).reshape(-1, 2).astype(np.float32)
     count = len(shape.faces)
-    return Triangles(shape.vertices[shape.faces].reshape(-1, 3), np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
-                     shape.normals[shape.faces].reshape(-1, 3), uv)  # fmt: skip
+    return Triangles(
+        shape.vertices[shape.faces].reshape(-1, 3),
+        np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
+        shape.normals[shape.faces].reshape(-1, 3),
+        uv,
+    )

@@ -41,8 +41,11 @@ class Viewer:
         if self.port != port and port:
             print(f"Port {port} is taken: the viewer uses port {self.port}.", flush=True)
         if not listening.local:
-            print(f"The viewer listens at {listening.address}: every person on the network who has the address below, with this computer's name in it, "
-                  "can watch and drive, and the connection is not encrypted.", flush=True)  # fmt: skip
+            print(
+                f"The viewer listens at {listening.address}: every person on the network who has the address below, with this computer's name in it, "
+                "can watch and drive, and the connection is not encrypted.",
+                flush=True,
+            )
         self._server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         self._stage, self._layer = Stage(self._server), ShapeLayer(self._server)
         self._events: dict[int, Callable[[], None]] = {}
@@ -103,7 +106,9 @@ class Viewer:
         try:
             action()
         except (ValueError, RuntimeError, OSError, KeyError) as error:
-            print(f"The viewer cannot do this: {plain(' '.join([str(error), *getattr(error, '__notes__', ())]), 1000)}", flush=True)
+            print(
+                f"The viewer cannot do this: {plain(' '.join([str(error), *getattr(error, '__notes__', ())]), 1000)}", flush=True
+            )
 
     @property
     def watched(self) -> bool:

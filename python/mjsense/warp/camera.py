@@ -158,7 +158,7 @@ class Camera(WarpSensor):
             "depth_noise": cfg.depth_noise != "none",
             "renderer='opengl'": cfg.renderer != "rays",
             "near": cfg.near > 0 or cfg.clip_near != "none",
-            "far": cfg.far > 0,
+            "far": cfg.far > 0 or cfg.clip_far != "none",
             "enabled_site_groups": bool(cfg.enabled_site_groups),
             "enabled_tendon_groups": bool(cfg.enabled_tendon_groups),
             "orthographic with camera_name": cfg.orthographic and bool(cfg.camera_name),

@@ -111,9 +111,13 @@ def _needs_forces(cfg: Any) -> bool:
     """As ContactSensor::needs() in C++."""
     strongest = cfg.reduce == "maxforce"
     return (
-        cfg.latch or cfg.friction_split or cfg.secondary_policy == "each" or cfg.reduce == "netforce" or (strongest and cfg.other_ids)
+        cfg.latch
+        or cfg.friction_split
+        or cfg.secondary_policy == "each"
+        or cfg.reduce == "netforce"
+        or (strongest and cfg.other_ids)
         or any(field in ("force", "torque") or (field != "found" and strongest) for field in cfg.fields)
-    )  # fmt: skip
+    )
 
 
 def _members(model: Any, match: Any, names: tuple[str, ...]) -> np.ndarray:

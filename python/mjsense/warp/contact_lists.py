@@ -16,9 +16,14 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.kernel
 def _count(
-    room: int, total: wp.array(dtype=wp.int32), kind: wp.array(dtype=wp.int32), world: wp.array(dtype=wp.int32),
-    counts: wp.array(dtype=wp.int32), last: wp.array(dtype=wp.int32), previous: wp.array(dtype=wp.int32),
-):  # fmt: skip
+    room: int,
+    total: wp.array(dtype=wp.int32),
+    kind: wp.array(dtype=wp.int32),
+    world: wp.array(dtype=wp.int32),
+    counts: wp.array(dtype=wp.int32),
+    last: wp.array(dtype=wp.int32),
+    previous: wp.array(dtype=wp.int32),
+):
     """Counts the contacts of each world, and links them in a list that ends at ``last``."""
     c = wp.tid()
     if c < wp.min(total[0], room) and (kind[c] & wp.static(int(types.ContactType.CONSTRAINT))) != 0:
@@ -29,7 +34,7 @@ def _count(
 @wp.func
 def _before(
     a: int, b: int, geoms: wp.array(dtype=wp.vec2i), number: wp.array(dtype=wp.int32), body: wp.array(dtype=wp.int32)
-) -> bool:  # fmt: skip
+) -> bool:
     a1, a2, b1, b2 = int(0), int(0), int(0), int(0)
     if geoms[a][0] >= 0:
         a1 = body[geoms[a][0]]
@@ -54,10 +59,15 @@ def _before(
 
 @wp.kernel
 def _sort(
-    geoms: wp.array(dtype=wp.vec2i), number: wp.array(dtype=wp.int32), body: wp.array(dtype=wp.int32),
-    counts: wp.array(dtype=wp.int32), ends: wp.array(dtype=wp.int32), last: wp.array(dtype=wp.int32),
-    previous: wp.array(dtype=wp.int32), index: wp.array(dtype=wp.int32),
-):  # fmt: skip
+    geoms: wp.array(dtype=wp.vec2i),
+    number: wp.array(dtype=wp.int32),
+    body: wp.array(dtype=wp.int32),
+    counts: wp.array(dtype=wp.int32),
+    ends: wp.array(dtype=wp.int32),
+    last: wp.array(dtype=wp.int32),
+    previous: wp.array(dtype=wp.int32),
+    index: wp.array(dtype=wp.int32),
+):
     """Writes the sorted list of a world into its part of ``index``."""
     world = wp.tid()
     begin = ends[world] - counts[world]

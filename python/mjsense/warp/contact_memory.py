@@ -56,9 +56,13 @@ def _clear_step(state: State, w: int, p: int):
 
 @wp.kernel
 def _substep(
-    state: State, count: wp.array2d(dtype=wp.int32), norm: wp.array2d(dtype=wp.float32), force: wp.array2d(dtype=wp.vec3),
-    dist: wp.array2d(dtype=wp.float32), pos: wp.array2d(dtype=wp.vec3),
-):  # fmt: skip
+    state: State,
+    count: wp.array2d(dtype=wp.int32),
+    norm: wp.array2d(dtype=wp.float32),
+    force: wp.array2d(dtype=wp.vec3),
+    dist: wp.array2d(dtype=wp.float32),
+    pos: wp.array2d(dtype=wp.vec3),
+):
     """``norm`` and so on are those of the strongest contact of this substep."""
     w, p = wp.tid()
     if state.substep[w, p] == 0:

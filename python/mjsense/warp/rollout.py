@@ -28,7 +28,7 @@ _WRITTEN = ("qpos", "qvel", "ctrl", "mocap_pos", "mocap_quat")
 
 
 class WarpTaskVectorEnv(TaskVectorEnv):
-    """A :class:`mjsense.TaskVectorEnv` in worlds on mujoco_warp. Observations, rewards and the ends of episodes are torch tensors on
+    """A :class:`mjsense.tasks.TaskVectorEnv` in worlds on mujoco_warp. Observations, rewards and the ends of episodes are torch tensors on
     the device; actions may be. Infos are NumPy arrays, except the observations in ``final_obs``.
 
     A world whose episode has ended continues to move until its next episode begins.
@@ -56,7 +56,7 @@ class WarpTaskVectorEnv(TaskVectorEnv):
 
 
 class WarpRollout:
-    """What :class:`mjsense.TaskVectorEnv` calls: the episodes of a task in all worlds (``rollout::Rollout`` in C++)."""
+    """What :class:`mjsense.tasks.TaskVectorEnv` calls: the episodes of a task in all worlds (``rollout::Rollout`` in C++)."""
 
     def __init__(self, options: dict[str, Any], objects: Any) -> None:
         if torch() is None:

@@ -17,7 +17,17 @@ from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, unsupported
 from mjsense.warp.stepper import Stepper
 from mjsense.warp.user import UserSensor
 
-__all__ = ["SceneSensors", "builtin", "camera", "contact", "effect_sensor", "imu", "lidar", "rays", "terrain_height"]  # each registers its sensors
+__all__ = [
+    "SceneSensors",
+    "builtin",
+    "camera",
+    "contact",
+    "effect_sensor",
+    "imu",
+    "lidar",
+    "rays",
+    "terrain_height",
+]  # each registers its sensors
 
 
 class SceneSensors:

@@ -18,8 +18,13 @@ if TYPE_CHECKING:
     from mjsense.sim.simulation import Simulation
 
 DTYPES: dict[str, Any] = {
-    "float32": wp.float32, "float64": wp.float64, "int32": wp.int32, "int64": wp.int64, "uint8": wp.uint8, "bool": wp.bool,
-}  # fmt: skip
+    "float32": wp.float32,
+    "float64": wp.float64,
+    "int32": wp.int32,
+    "int64": wp.int64,
+    "uint8": wp.uint8,
+    "bool": wp.bool,
+}
 """Warp's type for each dtype of a sensor's field."""
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mjsense.scene.scene import Scene
     from mjsense.sim.simulation import Simulation
 
+
 @checked
 class WarpSimulation(KnownAttributes):
     """B parallel worlds of a scene on mujoco_warp, made by ``mjs.Simulation(scene, num_worlds, backend="warp", device="cuda:0")``.
@@ -351,7 +352,9 @@ class WarpSimulation(KnownAttributes):
         """
         self._check_open()
         if field.startswith(PREFIX):
-            raise NotImplementedError(f"randomize('{field}') is not available with backend='warp': set SceneCfg(options=...), or use backend='cpu'")
+            raise NotImplementedError(
+                f"randomize('{field}') is not available with backend='warp': set SceneCfg(options=...), or use backend='cpu'"
+            )
         check_randomizable(self._compiled.model, field)
         self._models.array(field)
         for sensor in self._sensors.by_name.values():

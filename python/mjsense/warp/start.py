@@ -36,9 +36,16 @@ def _module(name: str) -> Any:
 
 @partial(checked, context="Simulation()")
 def simulation(
-    scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0, *,
-    device: str | None = None, nconmax: int | None = None, njmax: int | None = None,
-) -> Any:  # fmt: skip
+    scene: Scene,
+    num_worlds: int | None = None,
+    decimation: int = 1,
+    threads: int = 0,
+    seed: Seed = 0,
+    *,
+    device: str | None = None,
+    nconmax: int | None = None,
+    njmax: int | None = None,
+) -> Any:
     """The simulation of this scene on mujoco_warp."""
     warp = _module("simulation")
     if scene._simulation is not None:

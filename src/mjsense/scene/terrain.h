@@ -110,8 +110,9 @@ void visit_fields(V& v, TerrainCfg& c) {
       .at_least(-1);
   v("seed", c.seed, "Seed of the tile shapes and of the worlds' start tiles.");
   v("daylight", c.daylight,
-    "Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none. False: "
-    "MuJoCo's headlight is the only light.");
+    "Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none; lights "
+    "that a robot carries, or that follow a body, do not count. False: MuJoCo's headlight is the "
+    "only light that is added.");
 }
 
 void validate(const TerrainCfg& cfg, std::string_view context);

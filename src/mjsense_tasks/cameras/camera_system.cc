@@ -209,20 +209,20 @@ std::string CameraSystem::place_cameras(const World& world, std::uint64_t seed,
     // The stream is that of the camera's name: its draws do not depend on the other cameras.
     Rng rng(seed, 0, stream_of("camera/" + c.name), episode);
     Lens lens = rest_[i];
+    std::string why;
     if (c.mount == MountKind::kOrbit) {
       lens.fovy += around(rng, c.fovy_noise);
-      std::string why = orbit(camera, world, rng, centre, objects, -1, lens);
-      if (!why.empty()) return why;
+      why = orbit(camera, world, rng, centre, objects, -1, lens);
     } else {
       lens = with_noise(camera, rng);
-      std::string why = make_visible(camera, world, rng, centre, objects, lens);
-      if (!why.empty()) return why;
+      why = make_visible(camera, world, rng, centre, objects, lens);
     }
     const std::size_t at = static_cast<std::size_t>(world.id) * world.model->ncam + ids_[i];
     write_vec(lens.pose.p, pos_ + 3 * at);
     write_quat(lens.pose.q, quat_ + 4 * at);
     fovy_[at] = lens.fovy;
     now_[world.id * ids_.size() + i] = lens;
+    if (!why.empty()) return why;
   }
   return "";
 }

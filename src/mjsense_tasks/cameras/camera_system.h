@@ -73,8 +73,8 @@ class CameraSystem {
 
   // Draws poses and fields of view for an episode and writes them to the world's own model. The
   // world's data must be current. Orbiting cameras are placed around `centre` (m, world frame) and
-  // must see `objects` (bodies). Returns "", or why there is no pose for a camera. Accesses this
-  // world only, so that worlds can be placed in parallel.
+  // must see `objects` (bodies). Returns "", or why there is no pose for a camera, which then has
+  // the best one that was tried. Accesses this world only, so that worlds can be placed in parallel.
   std::string place_cameras(const World& world, std::uint64_t seed, std::uint64_t episode,
                             Vec3 centre, std::span<const int> objects);
 

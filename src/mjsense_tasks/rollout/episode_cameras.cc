@@ -122,26 +122,26 @@ sensors::CameraSensorCfg camera_sensor_cfg(const cameras::CameraSystem& system, 
   return out;
 }
 
-sensors::CameraSensorCfg default_view(const episode::Task& task, const RolloutCfg& cfg) {
+cameras::CameraSystem default_view(const episode::Task& task, const RolloutCfg& cfg) {
   const robots::RobotCfg& robot = task.cfg().robot;
-  sensors::CameraSensorCfg out;
-  out.name = kDefaultView;
-  out.width = cfg.width.value_or(robot.image_width);
-  out.height = cfg.height.value_or(robot.image_height);
-  out.use_shadows = cfg.shadows;
-  out.shadow_samples = cfg.shadow_samples;
-  out.samples = cfg.samples;
-  if (robot.name.empty()) return out;
-  // m, in the robot's base frame: x forward, z up.
-  const Vec3 eye{1.5, -1.2, 1.5}, target{0.4, 0, 0.6};
-  const Vec3 back = normalized(eye - target);
-  const Vec3 right = normalized(cross(Vec3{0, 0, 1}, back));
-  const Vec3 up = cross(back, right);
-  const double axes[9] = {right.x, up.x, back.x, right.y, up.y, back.y, right.z, up.z, back.z};
-  out.parent_body = std::string(robots::Robot::kPrefix) + robot.base_body;
-  write_vec(eye, out.pos.data());
-  mju_mat2Quat(out.quat.data(), axes);
-  return out;
+  cameras::CameraMountCfg view;
+  view.name = kDefaultView;
+  if (robot.name.empty()) {
+    view.mount = cameras::MountKind::kFixed;
+    view.target = {1, 0, 0};
+  } else {
+    view.mount = cameras::MountKind::kLookAt;
+    view.pos = {1.5, -1.2, 1.5};
+    view.target = {0.4, 0, 0.6};
+    view.min_visible = 0.0005;  // 12 by 12 pixels of 640 x 480
+    view.distance_range = {1.0, 2.5};
+    view.max_attempts = 50;
+    view.height_range = {0.1, 1.0};
+  }
+  cameras::CameraSystemCfg system{.name = std::string(kDefaultView), .cameras = {view}};
+  system.width = cfg.width.value_or(robot.image_width);
+  system.height = cfg.height.value_or(robot.image_height);
+  return {std::move(system), std::string(robots::Robot::kPrefix), robot.base_body};
 }
 
 Vec3 middle_of(const episode::Task& task, const World& world) {

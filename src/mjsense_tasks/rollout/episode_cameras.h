@@ -28,7 +28,7 @@ sensors::CameraSensorCfg camera_sensor_cfg(const cameras::CameraSystem& system, 
 // grippers. World frame, m.
 Vec3 middle_of(const episode::Task& task, const World& world);
 
-// The camera of RolloutCfg::default_view.
-sensors::CameraSensorCfg default_view(const episode::Task& task, const RolloutCfg& cfg);
+// The camera of RolloutCfg::default_view. It must see the robot and the task's objects.
+cameras::CameraSystem default_view(const episode::Task& task, const RolloutCfg& cfg);
 
 }  // namespace mjsense::tasks::rollout

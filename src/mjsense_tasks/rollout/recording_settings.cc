@@ -138,6 +138,7 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
   const episode::TaskCfg& task = rollout.task().cfg();
   Json settings{{"cameras", cameras_of(rollout)},
                 {"horizon", task.horizon},
+                {"max_penetration", *rollout.cfg().max_penetration},
                 {"meshes", task.robot.edit_spec ? "real" : "shapes"},
                 {"policy_dt_ms", task.policy_dt_ms}};
   for (const FieldDecl& field : struct_of<RecordJobCfg>().fields) {

@@ -83,11 +83,15 @@ void drop_of_task(observe::SensorSuite& suite, std::span<const std::shared_ptr<S
 
 }  // namespace
 
+constexpr double kMaxPenetration = 0.004;  // m
+
 RolloutCfg resolved(RolloutCfg cfg) {
   // A user-defined task may have its robot in its scene.
   if (cfg.robot == kTaskRobot) cfg.robot = cfg.make_task ? "" : default_robot(cfg.task);
   if (cfg.scene.empty() && !cfg.make_scene && !cfg.make_task)
     cfg.scene = default_scene(task_components(cfg.task)[0]);
+  // A user-defined task may press objects into soft ground on purpose.
+  if (!cfg.max_penetration) cfg.max_penetration = cfg.make_task ? 0 : kMaxPenetration;
   if (!cfg.split.empty()) {
     check_fields(cfg, "");
     if (cfg.make_scene || cfg.scene.empty())
@@ -125,6 +129,7 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<episode::Task> task,
   cfg_.perturb = own.perturb;
   cfg_.instructions = own.instructions;
   cfg_.terminate_upon_success = own.terminate_upon_success;
+  if (!cfg_.max_penetration) cfg_.max_penetration = 0;
   check_fields(cfg_, "");
   make();
 }
@@ -138,9 +143,11 @@ void Rollout::make() {
     scene_cfg.sensors.push_back(std::make_shared<sensors::CameraSensorCfg>(
         camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));
   }
-  if (cfg_.default_view)
-    scene_cfg.sensors.push_back(
-        std::make_shared<sensors::CameraSensorCfg>(default_view(*task_, cfg_)));
+  if (cfg_.default_view) {
+    view_ = std::make_unique<cameras::CameraSystem>(default_view(*task_, cfg_));
+    scene_cfg.sensors.push_back(std::make_shared<sensors::CameraSensorCfg>(
+        camera_sensor_cfg(*view_, 0, recorded_cameras(*view_)[0], cfg_)));
+  }
   auto scene = std::make_shared<scene::Scene>(std::move(scene_cfg));
   simulation_ =
       std::make_shared<sim::Simulation>(scene, sim::SimulationCfg{.num_worlds = cfg_.num_worlds,
@@ -150,6 +157,7 @@ void Rollout::make() {
   simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
   camera_system_->initialize(*simulation_);
+  if (view_) view_->initialize(*simulation_);
   task_->bind(simulation_);
   if (policy_) policy_->bind(simulation_);
   task_->initialize(scene->model(), cfg_.num_worlds);
@@ -184,7 +192,7 @@ void Rollout::make() {
   faults_.resize(cfg_.num_worlds);
   active_.assign(cfg_.num_worlds, 0);
   refused_.assign(cfg_.num_worlds, 0);
-  depth_.emplace(cfg_.max_penetration, cfg_.num_worlds);
+  depth_.emplace(*cfg_.max_penetration, cfg_.num_worlds);
   for (int w = 0; w < cfg_.num_worlds; ++w)
     rows_.push_back(robots::state_row(simulation_->worlds(), w));
   ids_.reserve(cfg_.num_worlds);

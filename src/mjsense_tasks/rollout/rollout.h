@@ -52,8 +52,9 @@ inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real
 // Part of the scene for tests of generalisation; "": all of it.
 inline constexpr std::array<std::string_view, 3> kSplits{"", "train", "test"};
 
-// A camera next to the robot that looks at the workspace in front of it. In a scene that contains
-// its own robot, it is at the origin until its pose is set.
+// A camera next to the robot that looks at the workspace in front of it, or, if it does not see the
+// robot and the task's objects from there, around them. In a scene that contains its own robot, it
+// is at the origin until its pose is set.
 inline constexpr std::string_view kDefaultView = "default_view";
 
 // Value of RolloutCfg::robot for the task's default robot.
@@ -81,7 +82,7 @@ struct RolloutCfg {
   std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
   bool terminate_upon_success = false;
-  double max_penetration = 0.004;
+  std::optional<double> max_penetration;
   double perturb = 0;
   NamedEnum<episode::Instructions> instructions;
   bool use_sensors = true;
@@ -192,10 +193,11 @@ void visit_fields(V& v, RolloutCfg& c) {
       .decides_data();
   v("max_penetration", c.max_penetration,
     "Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: "
-    "any depth. Pairs of geoms that are deeper at the start do not count.")
+    "any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of "
+    "geoms that are deeper at the start do not count.")
       .unit("m")
       .at_least(0)
-      .decides_data();
+      .decides_data_as("max_penetration");
   v("use_sensors", c.use_sensors,
     "Add the sensors of the task, of the robot and of the policy. False: only the sensors that are "
     "passed in.")
@@ -312,6 +314,7 @@ class Rollout {
   std::shared_ptr<episode::Policy> policy_;  // outlives the task
   std::shared_ptr<episode::Task> task_;
   std::unique_ptr<cameras::CameraSystem> camera_system_;
+  std::unique_ptr<cameras::CameraSystem> view_;  // of RolloutCfg::default_view
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<policies::StartReach> reach_;  // null: any start is accepted
   std::unique_ptr<ActionLog> log_;

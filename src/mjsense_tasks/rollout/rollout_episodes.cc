@@ -141,7 +141,7 @@ void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> 
 
 // Computes the poses of cameras that vary between episodes.
 void Rollout::place_cameras(std::span<const int> worlds) {
-  if (!camera_system_->varies()) return;
+  if (!camera_system_->varies() && !(view_ && view_->varies())) return;
   std::vector<std::string> why(num_worlds());
   for_each(worlds, [&](const World& world) {
     if (!faults_[world.id].empty()) return;
@@ -149,9 +149,19 @@ void Rollout::place_cameras(std::span<const int> worlds) {
     for (const episode::TaskObject& object : task_->objects(world.id)) {
       if (object.body >= 0) objects.push_back(object.body);
     }
-    why[world.id] = camera_system_->place_cameras(world, cfg_.seed,
-                                                  static_cast<std::uint64_t>(episode(world.id)),
-                                                  middle_of(*task_, world), objects);
+    const auto number = static_cast<std::uint64_t>(episode(world.id));
+    const Vec3 centre = middle_of(*task_, world);
+    why[world.id] = camera_system_->place_cameras(world, cfg_.seed, number, centre, objects);
+    if (!view_ || !view_->varies()) return;
+    const robots::Robot& robot = task_->robot();
+    std::vector<int> parts{robot.base_body()};
+    for (const robots::MoveGroup& group : robot.groups()) {
+      if (group.kind == robots::GroupKind::kGripper) parts.push_back(group.root_body);
+    }
+    objects.insert(objects.end(), parts.begin(), parts.end());
+    if (view_->place_cameras(world, cfg_.seed, number, centre, objects).empty()) return;
+    // Targets of navigation may be behind walls.
+    view_->place_cameras(world, cfg_.seed, number, robot.base_pose(world).p, parts);
   });
   for (int w : worlds) {
     if (!why[w].empty()) set_fault(w, std::move(why[w]));

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the cells of a notebook with mjsense.Renderer as mujoco.Renderer, and compares its images with those of MuJoCo's.
+"""Runs the cells of a notebook with the images of mjsense, and compares them with those of the packages that the notebook uses.
 
-    python notebook.py NOTEBOOK PSNR [CHECKOUT...]
+    python notebook.py mujoco|dm_control NOTEBOOK PSNR [CHECKOUT...]
 
-Cells see the checkouts (folders of repositories that the notebook clones) in their working directory, and run even if an earlier one has
-failed. Ends with an error if a cell fails that does not fail with MuJoCo's renderer, or if an image differs.
+mujoco: mjsense.Renderer is mujoco.Renderer. dm_control: after mjsense.compat.dm_control.use(). Cells see the checkouts (folders of
+repositories that the notebook clones) in their working directory, and run even if an earlier one has failed. Simulated times and numbers of
+frames are a tenth of the notebook's. Lines for the shell and for IPython are left out and listed. Ends with an error if a cell fails that
+does not fail with the packages' own images, or if an image differs.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -20,7 +23,8 @@ from images import end, require_opengl
 
 require_opengl()
 import mujoco
-from compared import THEIRS, Compared
+import numpy as np
+from compared import EACH, FIRST, THEIRS, Compared, quality_of
 
 
 def stub(name, **members):
@@ -34,12 +38,16 @@ def stub(name, **members):
 
 def prepare():
     """What notebooks import in order to show images."""
+    os.environ["COLAB_NOTEBOOK_TEST"] = "1"  # dm_control's makes no videos then
     import matplotlib
     import pygments.formatters
     import pygments.lexers  # noqa: F401
 
     matplotlib.use("Agg")
-    stub("google")
+    with contextlib.suppress(ImportError):
+        import google.protobuf  # noqa: F401  # dm_control's soccer uses it
+    if "google" not in sys.modules:
+        stub("google")
     colab = stub("google.colab", files=None, output=stub("google.colab.output"))
     sys.modules["google"].colab = colab
     stub("mediapy")
@@ -48,15 +56,18 @@ def prepare():
 
 
 def code_of(source):
-    """The cell without commands of the shell and of IPython, and without tests of the machine's GPU."""
+    """The cell without commands of the shell and of IPython, and without tests of the machine's GPU; a tenth as long."""
     source = re.sub(r"^(\s*)[!%].*$", r"\1pass", source, flags=re.M)
+    source = re.sub(r"^(\s*(?:duration|n_seconds) *= *)([\d.]+)", lambda m: f"{m[1]}{float(m[2]) / 10}", source, flags=re.M)
+    source = re.sub(r"^(\s*n_frames *= *)(\d+)", lambda m: f"{m[1]}{max(2, int(m[2]) // 10)}", source, flags=re.M)
     source = re.sub(r"^if subprocess.run\('nvidia-smi'\).returncode:.*?(?=^\S)", "", source, flags=re.M | re.S)
     return re.sub(r"^NVIDIA_ICD_CONFIG_PATH = .*?^\"\"\"\)\n", "", source, flags=re.M | re.S)
 
 
-def run(cells, renderer, names):
+def run(cells, what):
     """Runs the cells, and returns the errors by cell."""
-    mujoco.Renderer = renderer
+    names = {"__name__": "__main__"}
+    np.random.seed(0)
     errors = {}
     for number, cell in enumerate(cells):
         Compared.cell = number
@@ -64,25 +75,73 @@ def run(cells, renderer, names):
             exec(compile(code_of(cell), f"cell {number}", "exec"), names)
         except BaseException as error:
             errors[number] = "".join(traceback.format_exception_only(error)).strip()[:300]
-            print(f"cell {number} with {renderer.__module__}: {errors[number]}", flush=True)
+            print(f"cell {number} {what}: {errors[number]}", flush=True)
     return errors
 
 
+def run_mujoco(cells):
+    """The errors with both renderers; those with MuJoCo's only if there are some with mjsense's."""
+    mujoco.Renderer = Compared
+    ours = run(cells, "with mjsense")
+    mujoco.Renderer = THEIRS
+    return ours, run(cells, "without mjsense") if ours else {}
+
+
+def run_dm_control(cells):
+    """The errors with the images of mjsense, and with dm_control's own."""
+    from dm_control.mujoco import engine
+
+    images = []
+
+    def keep():
+        """Keeps the first images of each cell and some of the others, by cell and number."""
+        found, count = {}, {}
+        for owner in (engine.Physics, engine.Camera):
+
+            def render(self, *args, _own=owner.render, **kwargs):
+                image = _own(self, *args, **kwargs)
+                number = count[Compared.cell] = count.get(Compared.cell, 0) + 1
+                if number <= FIRST or number % EACH == 0:
+                    found[Compared.cell, number] = image.copy()
+                return image
+
+            owner.render = render
+        images.append(found)
+
+    own = engine.Physics.render, engine.Camera.render
+    keep()
+    theirs = run(cells, "without mjsense")
+    engine.Physics.render, engine.Camera.render = own
+    from mjsense.compat import dm_control
+
+    dm_control.use()
+    keep()
+    ours = run(cells, "with mjsense")
+    assert images[0].keys() == images[1].keys() or ours.keys() - theirs.keys(), "cells have made other numbers of images"
+    for (cell, number), image in images[1].items():
+        if (cell, number) in images[0]:
+            Compared.images += 1
+            Compared.worst[cell] = min(Compared.worst.get(cell, 99), quality_of(image, images[0][cell, number]))
+    return ours, theirs
+
+
 def main():
-    notebook, psnr, checkouts = Path(sys.argv[1]).resolve(), float(sys.argv[2]), sys.argv[3:]
+    package, notebook, psnr, checkouts = sys.argv[1], Path(sys.argv[2]).resolve(), float(sys.argv[3]), sys.argv[4:]
     cells = ["".join(c["source"]) for c in json.loads(notebook.read_text())["cells"] if c["cell_type"] == "code"]
+    for number, cell in enumerate(cells):
+        for line in re.findall(r"^\s*([!%].*)$", cell, flags=re.M):
+            print(f"cell {number}, left out: {line}")
     with tempfile.TemporaryDirectory() as folder:
         for checkout in checkouts:
             os.symlink(Path(checkout).resolve(), Path(folder, Path(checkout).name))
         os.chdir(folder)
         prepare()
-        ours = run(cells, Compared, {"__name__": "__main__"})
-        theirs = run(cells, THEIRS, {"__name__": "__main__"}) if ours else {}
+        ours, theirs = {"mujoco": run_mujoco, "dm_control": run_dm_control}[package](cells)
         os.chdir("/")
     for number, quality in sorted(Compared.worst.items()):
         print(f"cell {number}: {quality:.1f} dB")
     print(f"{len(cells)} cells, {Compared.images} images compared")
-    assert not ours.keys() - theirs.keys(), "cells fail with mjsense.Renderer only"
+    assert not ours.keys() - theirs.keys(), "cells fail with mjsense only"
     assert Compared.images, "no image"
     assert min(Compared.worst.values()) >= psnr, "an image differs"
 

@@ -11,7 +11,7 @@ import mjsense as mjs
 from mjsense.cluster import Job, record_on_ray
 
 out, environment = sys.argv[1], json.loads(sys.argv[2])
-arguments = {"task": lab.Look, "policy": lab.Still, "sensors": [lab.Length()], "keep_failures": True, "cameras": [], "worlds": 1}
+arguments = {"task": lab.Look, "policy": lab.Still, "sensors": [lab.Length()], "keep_failures": True, "cameras": [], "num_worlds": 1}
 try:
     record_on_ray(Job(out, arguments), episodes=1, max_attempts=1, runtime_env=environment)
     episode = mjs.Dataset(out).episodes[0]

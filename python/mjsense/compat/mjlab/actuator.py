@@ -134,6 +134,10 @@ class XmlActuatorCfg(ActuatorCfg):
 
 
 __all__ = [
-    "ActuatorCfg", "BuiltinMotorActuatorCfg", "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg", "TransmissionType",
+    "ActuatorCfg",
+    "BuiltinMotorActuatorCfg",
+    "BuiltinPositionActuatorCfg",
+    "BuiltinVelocityActuatorCfg",
+    "TransmissionType",
     "XmlActuatorCfg",
-]  # fmt: skip
+]

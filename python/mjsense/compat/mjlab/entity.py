@@ -81,8 +81,11 @@ def _joints(spec: mujoco.MjSpec) -> list[str]:
 
 
 def _add_actuators(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
-    names = {TransmissionType.JOINT: _joints(spec), TransmissionType.TENDON: [t.name for t in spec.tendons],
-             TransmissionType.SITE: [s.name for s in spec.sites]}  # fmt: skip
+    names = {
+        TransmissionType.JOINT: _joints(spec),
+        TransmissionType.TENDON: [t.name for t in spec.tendons],
+        TransmissionType.SITE: [s.name for s in spec.sites],
+    }
     chosen: list[tuple[ActuatorCfg, str]] = []
     for actuator in cfg.articulation.actuators if cfg.articulation is not None else ():
         kind = TransmissionType(actuator.transmission_type)
@@ -116,7 +119,7 @@ def _add_keyframe(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
 
 
 class Entity:
-    """An attached entity: the local names of its elements in model order. ``native`` is the :class:`mjsense.Entity`."""
+    """An attached entity: the local names of its elements in model order. ``native`` is the :class:`mjsense.scene.Entity`."""
 
     def __init__(self, native: Any, cfg: Any) -> None:
         self.native = native

@@ -93,7 +93,9 @@ class Scene:
             camera.camera_idx = mujoco_names.name2id(self.native.model, mujoco_names.Obj.CAMERA, camera.camera_name)
         rays = [sensor for sensor in self._sensors.values() if isinstance(sensor, RayCastSensor)]
         self._context = SensorContext(cameras, rays) if cameras or rays else None
-        self._entities = {name: Entity(e, scene_cfg.entities.get(name, scene_cfg.terrain)) for name, e in self.native.entities.items()}
+        self._entities = {
+            name: Entity(e, scene_cfg.entities.get(name, scene_cfg.terrain)) for name, e in self.native.entities.items()
+        }
         _SCENES[id(self.native.model)] = _SCENES[id(self.native.spec)] = self
 
     def __getitem__(self, key: str) -> Any:

@@ -59,8 +59,17 @@ class Simulation:
     ``step()`` is one plain physics step: until ``forward()``, derived quantities belong to the state before the step.
     """
 
-    def __init__(self, num_envs: int, cfg: SimulationCfg, model: mujoco.MjModel | None = None, device: str = "cpu", *,
-                 spec: mujoco.MjSpec | None = None, threads: int = 0, backend: str | None = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        num_envs: int,
+        cfg: SimulationCfg,
+        model: mujoco.MjModel | None = None,
+        device: str = "cpu",
+        *,
+        spec: mujoco.MjSpec | None = None,
+        threads: int = 0,
+        backend: str | None = None,
+    ) -> None:
         """``backend`` is that of :class:`mjsense.Simulation`; by default ``"cpu"`` on the CPU and ``"warp"`` on other devices."""
         self.scene = scene_of(spec if model is None else model)
         self.cfg, self.num_envs, self.device = cfg, num_envs, str(device)

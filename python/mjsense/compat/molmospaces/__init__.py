@@ -22,5 +22,15 @@ from mjsense.compat.molmospaces.robots.abstract import Robot
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_string, dict_to_byte_array, is_camera_sensor
 
-__all__ = ["BaseMujocoTask", "BasePolicy", "PlannerPolicy", "Robot", "Sensor", "SensorSuite", "byte_array_to_string",
-           "dict_to_byte_array", "is_camera_sensor", *_sensors]  # fmt: skip
+__all__ = [
+    "BaseMujocoTask",
+    "BasePolicy",
+    "PlannerPolicy",
+    "Robot",
+    "Sensor",
+    "SensorSuite",
+    "byte_array_to_string",
+    "dict_to_byte_array",
+    "is_camera_sensor",
+    *_sensors,
+]

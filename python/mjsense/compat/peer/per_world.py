@@ -37,7 +37,9 @@ class PerWorldCalls(Calls):
 
     @classmethod
     def fits(cls, sensor: Sensor) -> bool:
-        return sensor._mjs_overrides("get_observation") and not (sensor._mjs_overrides("compute") or hasattr(sensor, "_compute_data"))
+        return sensor._mjs_overrides("get_observation") and not (
+            sensor._mjs_overrides("compute") or hasattr(sensor, "_compute_data")
+        )
 
     @property
     def first(self) -> Any:

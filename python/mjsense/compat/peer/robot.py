@@ -166,8 +166,18 @@ class RobotView:
         kinds = {"base": Base, "gripper": Gripper}
         self._groups = {group["name"]: kinds.get(group["kind"], MoveGroup)(self, group) for group in view.groups()}
         found = [group for group in self._groups.values() if isinstance(group, Base)]
-        nothing = {"name": "base", "kind": "base", "joints": [], "qpos": [], "dofs": [], "actuators": [], "leaf_site": -1,
-                   "root_body": self.base_body, "pad_sites": [-1, -1], "max_opening": 0.0}  # fmt: skip
+        nothing = {
+            "name": "base",
+            "kind": "base",
+            "joints": [],
+            "qpos": [],
+            "dofs": [],
+            "actuators": [],
+            "leaf_site": -1,
+            "root_body": self.base_body,
+            "pad_sites": [-1, -1],
+            "max_opening": 0.0,
+        }
         self.base: Base = found[0] if found else Base(self, nothing)
 
     @property
@@ -194,7 +204,9 @@ class RobotView:
     def get_gripper(self, gripper_group_id: str) -> Gripper:
         group = self._groups[gripper_group_id]
         if not isinstance(group, Gripper):
-            raise ValueError(f"move group '{gripper_group_id}' is not a gripper; grippers: {', '.join(self.get_gripper_movegroup_ids())}")
+            raise ValueError(
+                f"move group '{gripper_group_id}' is not a gripper; grippers: {', '.join(self.get_gripper_movegroup_ids())}"
+            )
         return group
 
     def _each(self, what: str, ids: list[str] | None) -> dict[str, np.ndarray]:
@@ -236,9 +248,13 @@ class PeerRobot:
         """Targets of the controlled groups, without noise; before the first action, the controllers' initial targets."""
         return self._task.targets(self._world)
 
-    def fk(self, move_group_qpos: dict[str, np.ndarray], base_pose: np.ndarray, rel_to_base: bool = False) -> dict[str, np.ndarray]:
+    def fk(
+        self, move_group_qpos: dict[str, np.ndarray], base_pose: np.ndarray, rel_to_base: bool = False
+    ) -> dict[str, np.ndarray]:
         """4x4 of every group's tool frame with its joints there: in the base frame, or in the world with the base at base_pose."""
-        poses = {name: matrix_of_pose(pose) for name, pose in self._task.fk({k: list(v) for k, v in move_group_qpos.items()}).items()}
+        poses = {
+            name: matrix_of_pose(pose) for name, pose in self._task.fk({k: list(v) for k, v in move_group_qpos.items()}).items()
+        }
         return poses if rel_to_base else {name: np.asarray(base_pose) @ pose for name, pose in poses.items()}
 
 

@@ -20,7 +20,7 @@ from mjsense.tasks.rl._numbers import Actions, Numbers, checked_env
 
 
 class RslRlVecEnv(VecEnv):
-    """A :class:`mjsense.TaskVectorEnv` for the runners of rsl-rl 5.
+    """A :class:`mjsense.tasks.TaskVectorEnv` for the runners of rsl-rl 5.
 
     Args:
         env: Result of ``make_vec(..., autoreset_mode="same_step")``.

@@ -21,7 +21,7 @@ from mjsense.tasks.rl._numbers import Actions, Numbers, checked_env, is_depth, s
 
 
 class SB3VecEnv(VecEnv):
-    """A :class:`mjsense.TaskVectorEnv` for the algorithms of Stable-Baselines3.
+    """A :class:`mjsense.tasks.TaskVectorEnv` for the algorithms of Stable-Baselines3.
 
     Observations are one row of float32 ``[n]`` (``MlpPolicy``), or with images a dict of ``"state"``, unless there are only images, and the
     images (``MultiInputPolicy``): uint8 ``[H, W, 3]``, and depth in metres, float32 ``[1, H, W]``, which Stable-Baselines3 treats as an image
@@ -125,4 +125,8 @@ class SB3VecEnv(VecEnv):
 
 def _image_space(spec: Any) -> gymnasium.spaces.Box:
     """The space of a colour or depth image."""
-    return gymnasium.spaces.Box(0, np.inf, (1, *spec.shape), np.float32) if is_depth(spec) else gymnasium.spaces.Box(0, 255, spec.shape, np.uint8)
+    return (
+        gymnasium.spaces.Box(0, np.inf, (1, *spec.shape), np.float32)
+        if is_depth(spec)
+        else gymnasium.spaces.Box(0, 255, spec.shape, np.uint8)
+    )

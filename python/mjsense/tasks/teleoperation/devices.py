@@ -43,7 +43,9 @@ class SpaceMouse:
             raise ModuleNotFoundError(f"The device 'spacemouse' needs pyspacemouse: pip install pyspacemouse ({error})") from None
         self._library: Any = pyspacemouse
         if not pyspacemouse.open():
-            raise RuntimeError("pyspacemouse finds no SpaceMouse: connect it, and allow access to its hidraw device (see pyspacemouse's page)")
+            raise RuntimeError(
+                "pyspacemouse finds no SpaceMouse: connect it, and allow access to its hidraw device (see pyspacemouse's page)"
+            )
         self._pressed = False
 
     def read(self, dt: float) -> Motion:

@@ -55,10 +55,17 @@ class DrivePage(Viewer):
         with gui.add_folder("Drive"):
             self._text = gui.add_html("")
             self._closed_box = gui.add_checkbox("Close gripper", initial_value=False, hint="Key: space")
-            self._paused = gui.add_checkbox("Pause", initial_value=False, hint="The world waits. Moving the target ends the pause.")
-            self._later(gui.add_button("End episode", hint="It counts as failed unless the task has succeeded. Key: enter"), self._finish)
-        gui.add_markdown("Drag the handle at the tool, or press keys: " + ", ".join(f"**{key}** {what.lower()}" for key, (what, _) in MOVES.items())
-                         + ", **space** gripper, **enter** end of the episode.")  # fmt: skip
+            self._paused = gui.add_checkbox(
+                "Pause", initial_value=False, hint="The world waits. Moving the target ends the pause."
+            )
+            self._later(
+                gui.add_button("End episode", hint="It counts as failed unless the task has succeeded. Key: enter"), self._finish
+            )
+        gui.add_markdown(
+            "Drag the handle at the tool, or press keys: "
+            + ", ".join(f"**{key}** {what.lower()}" for key, (what, _) in MOVES.items())
+            + ", **space** gripper, **enter** end of the episode."
+        )
         with gui.add_folder("Cameras"):
             self._pictures = Pictures(gui, self._source.pictures(), self._later, self._show)
         self._handle = self._server.scene.add_transform_controls("/target", scale=0.15, depth_test=False)

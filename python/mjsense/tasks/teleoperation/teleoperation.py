@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import Seed, checked
+from mjsense.core.old_names import old_argument
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
 from mjsense.tasks.recording import RecordSummary, record
@@ -31,9 +32,16 @@ class Teleoperation(Policy):
     observation: Sequence[str] | None = ("actions/ee_pose", "actions/joint_pos", "robot_base_pose")
 
     def __init__(
-        self, title: str, *, arm: str = "arm", gripper: str = "gripper", device: str = "keyboard", host: str = "127.0.0.1", port: int = 8080,
+        self,
+        title: str,
+        *,
+        arm: str = "arm",
+        gripper: str = "gripper",
+        device: str = "keyboard",
+        host: str = "127.0.0.1",
+        port: int = 8080,
         open_browser: bool = True,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """
         Args:
             title: Title of the page.
@@ -60,10 +68,14 @@ class Teleoperation(Policy):
     def initialize(self) -> None:
         for name in (self._arm, self._gripper):
             if name not in self.action_groups:
-                raise ValueError(f"teleoperation: the robot has no move group '{name}'; there are {', '.join(self.action_groups)}")
+                raise ValueError(
+                    f"teleoperation: the robot has no move group '{name}'; there are {', '.join(self.action_groups)}"
+                )
         columns = self.action_groups[self._arm]
         if columns.stop - columns.start != 7:
-            raise ValueError(f"teleoperation: the controller of move group '{self._arm}' must be ee_pose (arm_controller='ee_pose')")
+            raise ValueError(
+                f"teleoperation: the controller of move group '{self._arm}' must be ee_pose (arm_controller='ee_pose')"
+            )
         if self.num_worlds != 1:
             raise ValueError(f"teleoperation drives 1 world, not {self.num_worlds}")
         self._page = DrivePage(self.sim, self._title, *self._place)
@@ -100,8 +112,11 @@ class Teleoperation(Policy):
                 page.toggle_gripper()
         page._handle_events()
         grip = self._closed if page.gripper_closed else self._open
-        return {self._arm: self._possible(self._arm, page.target.row), self._gripper: self._possible(self._gripper, grip),
-                "done": np.array([page.finished])}  # fmt: skip
+        return {
+            self._arm: self._possible(self._arm, page.target.row),
+            self._gripper: self._possible(self._gripper, grip),
+            "done": np.array([page.finished]),
+        }
 
     def _possible(self, group: str, command: np.ndarray) -> np.ndarray:
         """Commands [1, n] within the bounds of the group's controller."""
@@ -117,6 +132,7 @@ class Teleoperation(Policy):
             self._page = None
 
 
+@old_argument("worlds", "num_worlds")
 @checked
 def play(
     task: Tasks = "pick",
@@ -159,10 +175,15 @@ def play(
         ModuleNotFoundError: viser, or the package of the device, is not installed.
     """
     title = task if isinstance(task, str) else getattr(task, "__name__", type(task).__name__)
-    policy = Teleoperation(
-        title, arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser
-    )
-    defaults = {"worlds": 1, "arm_controller": "ee_pose", "terminate_upon_success": True, "action_noise": False, "horizon": 6000, "max_attempts": 100 * episodes}
+    policy = Teleoperation(title, arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser)
+    defaults = {
+        "num_worlds": 1,
+        "arm_controller": "ee_pose",
+        "terminate_upon_success": True,
+        "action_noise": False,
+        "horizon": 6000,
+        "max_attempts": 100 * episodes,
+    }
     try:
         return record(task, robot, policy, out=out, scene=scene, episodes=episodes, seed=seed, **{**defaults, **options})
     finally:

@@ -101,8 +101,43 @@ TEST(CameraClip, ErrorsNameTheLimits) {
   EXPECT_NE(message(cfg).find("near is 0.1 m and clip_near is 'model'"), std::string::npos);
   cfg.near = 0;
   cfg.far = 0.03;
-  EXPECT_NE(message(cfg).find("clips at 0.04 m"), std::string::npos);
+  EXPECT_NE(message(cfg).find("clips at near 0.04 m and far 0.03 m"), std::string::npos);
+  cfg.clip_far = "model";
+  EXPECT_NE(message(cfg).find("far is 0.03 m and clip_far is 'model'"), std::string::npos);
+}
+
+// The far plane is at 2 m: it cuts the plates at 3 m, and a plate across it.
+TEST(CameraClip, ClipsAtTheModelsFarPlaneLikeOpenGL) {
+  const TestModel m(
+      R"(<mujoco><visual><map znear=".01" zfar=".5"/></visual><statistic extent="4" center="0 0 0"/>
+    <worldbody><light pos="0 0 3" diffuse=".6 .6 .6"/>
+    <geom type="box" size=".5 .5 .1" pos="0 .6 -3" rgba="1 0 0 1"/>
+    <geom type="box" size=".4 .4 .1" pos="0 -.4 -1.5" rgba="0 1 0 1"/>
+    <geom type="box" size=".1 .3 1" pos=".7 0 -2" euler="0 20 0" rgba="0 0 1 1"/>
+    <camera name="c" fovy="70"/></worldbody></mujoco>)");
+  CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation"});
+  cfg.clip_far = "model";
+  rays::RayScene rays(m.model, 1);
+  rays.update(m.world());
+  const auto clipped = testing::shoot(cfg, m, rays);
+  cfg.clip_far = "none";
+  const auto all = testing::shoot(cfg, m, rays);
+  cfg.far = 2;
+  const auto by_hand = testing::shoot(cfg, m, rays);
+  int farther = 0;
+  for (const float depth : clipped->field("depth").data.row<float>(0)) EXPECT_LE(depth, 2);
+  for (const float depth : all->field("depth").data.row<float>(0)) farther += depth > 2;
+  EXPECT_GT(farther, 500);
+  for (const Field& field : clipped->fields()) {
+    const Array& other = by_hand->field(field.name).data;
+    EXPECT_EQ(std::memcmp(field.data.data(), other.data(), other.bytes()), 0) << field.name;
+  }
   cfg.far = 0;
+  cfg.clip_far = "model";
+  const testing::Pair pair(cfg, m);
+  if (!pair.opengl) GTEST_SKIP() << pair.missing;
+  EXPECT_LT(pair.other_ids(), 0.006);
+  EXPECT_GT(pair.psnr(), 30);
 }
 
 }  // namespace

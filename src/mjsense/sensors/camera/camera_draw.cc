@@ -61,7 +61,7 @@ void CameraSensor::draw(const World& world, DebugShapes& shapes) {
   }
   if (!viz.show_frustum) return;
   const double far = viz.frustum_depth > 0 ? viz.frustum_depth
-                     : cfg_.far > 0        ? cfg_.far
+                     : far_ > 0            ? far_
                                            : 10 * shapes.meansize();
   constexpr double kCorners[5][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}};
   const auto line = [&](Vec3 from, Vec3 to) {

@@ -32,7 +32,7 @@ render::MarkerOptions marker_options(const CameraSensorCfg& cfg) {
   return {bits_of(cfg.enabled_site_groups), bits_of(cfg.enabled_tendon_groups), cfg.use_textures};
 }
 
-render::ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
+render::ViewOptions view_options(const CameraSensorCfg& cfg, double near, double far) {
   render::ViewOptions options;
   options.groups = bits_of(cfg.enabled_geom_groups);
   options.textures = cfg.use_textures;
@@ -41,7 +41,7 @@ render::ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
   options.shadow_samples = cfg.shadow_samples;
   options.reflections = colors;
   options.near = static_cast<float>(near);
-  options.far = static_cast<float>(cfg.far);
+  options.far = static_cast<float>(far);
   return options;
 }
 
@@ -85,13 +85,16 @@ void CameraSensor::initialize(const SensorInit& init) {
   camera_ = mj_name2id(model_, mjOBJ_CAMERA, camera.c_str());
   if (camera_ < 0)
     throw_unknown(context, "camera", camera, scene::model_names(model_, mjOBJ_CAMERA));
-  near_ =
-      cfg_.clip_near == ClipNear::kModel ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
-  if (cfg_.far > 0 && cfg_.far <= near_)
+  const auto plane = [&](ClipPlane clip, double at, double of_model) {
+    return clip == ClipPlane::kModel ? of_model * model_->stat.extent : at;
+  };
+  near_ = plane(cfg_.clip_near, cfg_.near, model_->vis.map.znear);
+  far_ = plane(cfg_.clip_far, cfg_.far, model_->vis.map.zfar);
+  if (far_ > 0 && far_ <= near_)
     throw ValueError(
-        fmt::format("{}: far is {} m, and clip_near 'model' clips at {:.6g} m (znear x "
-                    "extent): need near < far",
-                    context, cfg_.far, near_));
+        fmt::format("{}: clips at near {:.6g} m and far {:.6g} m ('model': znear and zfar times "
+                    "the extent {:.6g} m): need near < far",
+                    context, near_, far_, model_->stat.extent));
   assets_ =
       surface_assets_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
   workspace_.reset();
@@ -159,7 +162,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (rgb_ && cfg_.samples == 1 && fixed)
     fixed_layers_ =
         std::make_unique<render::FixedLayers>(model_, cfg_.width, cfg_.height, init.num_worlds);
-  render::ViewOptions options = view_options(cfg_, near_);
+  render::ViewOptions options = view_options(cfg_, near_, far_);
   options.markers = markers;
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);

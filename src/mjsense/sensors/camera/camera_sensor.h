@@ -82,7 +82,7 @@ class CameraSensor final : public Sensor {
   CameraSensorCfg cfg_;
   const mjModel* model_ = nullptr;
   int camera_ = -1;
-  double near_ = 0;  // m, near plane
+  double near_ = 0, far_ = 0;  // m, clipping planes; far 0: none
   std::vector<PerWorld> worlds_;
   std::vector<float> distorted_rays_;
   std::vector<int> due_;

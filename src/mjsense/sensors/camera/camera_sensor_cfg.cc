@@ -62,8 +62,10 @@ void validate(const CameraSensorCfg& cfg) {
   if (cfg.far > 0 && cfg.far <= cfg.near)
     fail(fmt::format("near {} and far {}: must satisfy 0 <= near < far, or far 0 for no limit",
                      cfg.near, cfg.far));
-  if (cfg.near > 0 && cfg.clip_near == ClipNear::kModel)
+  if (cfg.near > 0 && cfg.clip_near == ClipPlane::kModel)
     fail(fmt::format("near is {} m and clip_near is 'model': set only one of them", cfg.near));
+  if (cfg.far > 0 && cfg.clip_far == ClipPlane::kModel)
+    fail(fmt::format("far is {} m and clip_far is 'model': set only one of them", cfg.far));
   if (cfg.phase > 0 && cfg.update_period == 0)
     fail(fmt::format("phase is {} s, but there is no update_period: every reading is a new image",
                      cfg.phase));

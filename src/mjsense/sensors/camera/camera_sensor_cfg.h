@@ -113,8 +113,8 @@ constexpr std::array<std::string_view, 3> enum_names(DepthNoise) {
   return {"none", "d405", "d435"};
 }
 
-enum class ClipNear { kNone, kModel };
-constexpr std::array<std::string_view, 2> enum_names(ClipNear) { return {"none", "model"}; }
+enum class ClipPlane { kNone, kModel };
+constexpr std::array<std::string_view, 2> enum_names(ClipPlane) { return {"none", "model"}; }
 
 enum class CameraRenderer { kRays, kOpenGl };
 constexpr std::array<std::string_view, 2> enum_names(CameraRenderer) { return {"rays", "opengl"}; }
@@ -142,7 +142,7 @@ struct CameraSensorCfg : SensorCfg {
   std::vector<int> enabled_site_groups, enabled_tendon_groups;
   int max_lights = 8;
   double near = 0, far = 0;
-  NamedEnum<ClipNear> clip_near;
+  NamedEnum<ClipPlane> clip_near, clip_far;
   double update_period = 0, phase = 0;
   int samples = 1;
   NamedEnum<DepthKind> depth_kind;
@@ -159,7 +159,7 @@ template <class V>
 void visit_fields(V& v, CameraSensorCfg& c) {
   v.object("CameraSensorCfg",
            "A camera of the model (``camera_name``) or a new camera. ``data`` is a "
-           ":class:`mjsense.CameraData`.",
+           ":class:`mjsense.sensors.CameraData`.",
            "camera");
   v.extends(static_cast<SensorCfg&>(c));
   v("camera_name", c.camera_name,
@@ -216,6 +216,9 @@ void visit_fields(V& v, CameraSensorCfg& c) {
       .may_be_infinite();
   v("clip_near", c.clip_near,
     "model: clip at the near plane of MuJoCo's renderers, ``visual/map/znear`` times the model's "
+    "extent.");
+  v("clip_far", c.clip_far,
+    "model: clip at the far plane of MuJoCo's renderers, ``visual/map/zfar`` times the model's "
     "extent.");
   v("update_period", c.update_period, "Time between images; 0: a new image at every read.")
       .unit("s")

@@ -90,7 +90,7 @@ template <class V>
 void visit_fields(V& v, ContactSensorCfg& c) {
   v.object("ContactSensorCfg",
            "Contacts of primaries, optionally with one secondary only. ``data`` is a "
-           ":class:`mjsense.ContactData`.\n\n"
+           ":class:`mjsense.sensors.ContactData`.\n\n"
            "The normal points from the primary to the secondary; forces are what the **primary "
            "exerts on the secondary**: a box on the floor reads (0, 0, -m g) in the world frame.",
            "contact");

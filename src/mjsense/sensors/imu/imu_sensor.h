@@ -90,12 +90,11 @@ struct ImuSensorCfg : SensorCfg {
 };
 template <class V>
 void visit_fields(V& v, ImuSensorCfg& c) {
-  v.object(
-      "ImuSensorCfg",
-      "Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an "
-      ":class:`mjsense.ImuData`.\n\nThe clean values are the built-in sensors ``<name>_acc`` and "
-      "``<name>_gyro``.",
-      "imu");
+  v.object("ImuSensorCfg",
+           "Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an "
+           ":class:`mjsense.sensors.ImuData`.\n\nThe clean values are the built-in sensors "
+           "``<name>_acc`` and ``<name>_gyro``.",
+           "imu");
   v.extends(static_cast<SensorCfg&>(c));
   v("site", c.site, "The site on which the IMU is mounted.").or_none();
   v("preset", c.preset,

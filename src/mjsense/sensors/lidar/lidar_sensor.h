@@ -108,7 +108,8 @@ template <class V>
 void visit_fields(V& v, LidarSensorCfg& c) {
   v.object(
       "LidarSensorCfg",
-      "A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.RayCastData` "
+      "A lidar with a spinning scan or a table of rays. ``data`` is a "
+      ":class:`mjsense.sensors.RayCastData` "
       "with points and intensity. ``pattern`` does not apply, and hit ids are always reported.",
       "lidar");
   v.extends(static_cast<RayCastSensorCfg&>(c));

@@ -82,7 +82,7 @@ template <class V>
 void visit_fields(V& v, RayCastSensorCfg& c) {
   v.object("RayCastSensorCfg",
            "Casts rays from frames against all visible geoms. ``data`` is a "
-           ":class:`mjsense.RayCastData`.",
+           ":class:`mjsense.sensors.RayCastData`.",
            "raycast");
   v.extends(static_cast<SensorCfg&>(c));
   v("frame", c.frame,

@@ -18,6 +18,7 @@ constexpr episode::Phase kNavPhases[] = {{"navigate", 0}};
 constexpr double kLook = 0.4;        // rad, turn to each side
 constexpr double kElsewhere = 0.35;  // m, minimum distance from poses that were tried
 constexpr int kLooks = 2;
+constexpr double kSlack = 0.05;  // m, by which the base may miss a pose
 
 }  // namespace
 
@@ -46,6 +47,7 @@ void NavPlanner::initialize_planner() {
                     robot().name()));
   group_ = scenes::driving_base(robot());
   tried_.assign(task().num_worlds(), {});
+  enough_.assign(task().num_worlds(), 0);
 }
 
 bool NavPlanner::is_goal_pose(const World& world, const scenes::BasePose& there,
@@ -62,10 +64,13 @@ bool NavPlanner::is_goal_pose(const World& world, const scenes::BasePose& there,
 
 void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   auto& tried = tried_[world.id];
-  if (request.stage == 0 && request.attempt == 0) tried.clear();
+  if (request.stage == 0 && request.attempt == 0) {
+    tried.clear();
+    enough_[world.id] = cfg_.arrive + 0.2;
+  }
   const scenes::BasePose here = base_pose(world);
   const Pose camera_in_base = inverse(robot().base_pose(world)) * nav_->camera_pose(world);
-  if (nav_->distance(world, here.x, here.y) < cfg_.arrive + 0.2 &&
+  if (nav_->distance(world, here.x, here.y) < enough_[world.id] &&
       nav_->sees(world, nav_->camera_pose(world))) {
     plan.wait(0, 0.2);  // arrived
     return;
@@ -98,6 +103,7 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
         [&](double x, double y) {
           return std::max(0.0, nav_->distance(world, x, y) - wanted.arrive);
         });
+    enough_[world.id] = std::max(enough_[world.id], wanted.arrive + kSlack);
   }
   if (path.size() < 2) {
     plan.more = false;

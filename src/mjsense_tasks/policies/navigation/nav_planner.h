@@ -47,7 +47,8 @@ class NavPlanner final : public TaskPlanner {
   const tasks::NavToObjTask* nav_ = nullptr;
   int group_ = -1;  // move group of the base
   std::vector<std::vector<scenes::BasePose>>
-      tried_;  // [B] poses from which the object was not visible
+      tried_;                   // [B] poses from which the object was not visible
+  std::vector<double> enough_;  // [B] m, distance to the object at which the base has arrived
 };
 
 // Timed path of the base group's commands (x, y, yaw) through the poses `poses`.

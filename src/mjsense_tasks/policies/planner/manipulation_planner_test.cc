@@ -111,7 +111,7 @@ TEST(ManipulationPlanner, MotionsAreSmoothAndFreeOfCollisions) {
     MotionQuality quality(play.scene->model(), play.task->robot());
     play.run(0, episode, [&](const World& world) { quality.look(world); });
     EXPECT_LT(quality.speed, 2.0) << episode;
-    EXPECT_LT(quality.acceleration, 30) << episode << " at " << quality.accelerated_at;
+    EXPECT_LT(quality.acceleration, 30) << episode << ": " << quality.accelerated;
     EXPECT_LT(quality.depth, 0.001) << quality.deepest << ", episode " << episode;
     EXPECT_EQ(quality.self_collisions, 0) << episode;
   }

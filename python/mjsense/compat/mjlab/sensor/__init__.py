@@ -18,8 +18,27 @@ from mjsense.compat.mjlab.sensor.sensor_context import SensorContext
 from mjsense.compat.mjlab.sensor.terrain_height_sensor import TerrainHeightData, TerrainHeightSensor, TerrainHeightSensorCfg
 
 __all__ = [
-    "BuiltinSensor", "BuiltinSensorCfg", "CameraSensor", "CameraSensorCfg", "CameraSensorData", "ContactData", "ContactMatch",
-    "ContactSensor", "ContactSensorCfg", "GridPatternCfg", "ObjRef", "PatternCfg", "PinholeCameraPatternCfg", "RayCastData",
-    "RayCastSensor", "RayCastSensorCfg", "RingPatternCfg", "Sensor", "SensorCfg", "SensorContext", "TerrainHeightData",
-    "TerrainHeightSensor", "TerrainHeightSensorCfg",
-]  # fmt: skip
+    "BuiltinSensor",
+    "BuiltinSensorCfg",
+    "CameraSensor",
+    "CameraSensorCfg",
+    "CameraSensorData",
+    "ContactData",
+    "ContactMatch",
+    "ContactSensor",
+    "ContactSensorCfg",
+    "GridPatternCfg",
+    "ObjRef",
+    "PatternCfg",
+    "PinholeCameraPatternCfg",
+    "RayCastData",
+    "RayCastSensor",
+    "RayCastSensorCfg",
+    "RingPatternCfg",
+    "Sensor",
+    "SensorCfg",
+    "SensorContext",
+    "TerrainHeightData",
+    "TerrainHeightSensor",
+    "TerrainHeightSensorCfg",
+]

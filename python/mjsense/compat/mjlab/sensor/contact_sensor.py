@@ -50,7 +50,7 @@ class ContactSensorCfg(SensorCfg):
 
 @dataclass
 class ContactData:
-    """Like :class:`mjsense.ContactData`; fields that were not requested are None."""
+    """Like :class:`mjsense.sensors.ContactData`; fields that were not requested are None."""
 
     found: Any = None
     force: Any = None

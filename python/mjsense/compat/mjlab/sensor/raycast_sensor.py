@@ -65,8 +65,13 @@ class RingPatternCfg:
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
 
     @classmethod
-    def single_ring(cls, radius: float = 0.1, num_samples: int = 8, include_center: bool = True,
-                    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)) -> RingPatternCfg:  # fmt: skip
+    def single_ring(
+        cls,
+        radius: float = 0.1,
+        num_samples: int = 8,
+        include_center: bool = True,
+        direction: tuple[float, float, float] = (0.0, 0.0, -1.0),
+    ) -> RingPatternCfg:
         """One circle."""
         return cls((cls.Ring(radius, num_samples),), include_center, direction)
 
@@ -97,9 +102,15 @@ class RayCastSensorCfg(SensorCfg):
 
         def native(self) -> configs.RayCastVizCfg:
             return configs.RayCastVizCfg(
-                show_rays=self.show_rays, show_normals=self.show_normals, ray_color=self.hit_color, miss_color=self.miss_color,
-                hit_color=self.hit_sphere_color, hit_radius=self.hit_sphere_radius, normal_color=self.normal_color,
-                normal_length=self.normal_length)  # fmt: skip
+                show_rays=self.show_rays,
+                show_normals=self.show_normals,
+                ray_color=self.hit_color,
+                miss_color=self.miss_color,
+                hit_color=self.hit_sphere_color,
+                hit_radius=self.hit_sphere_radius,
+                normal_color=self.normal_color,
+                normal_length=self.normal_length,
+            )
 
     frame: ObjRef | tuple[ObjRef, ...]
     pattern: Any = field(default_factory=GridPatternCfg)
@@ -114,7 +125,12 @@ class RayCastSensorCfg(SensorCfg):
         frames = (self.frame,) if isinstance(self.frame, ObjRef) else self.frame
         if not frames:
             raise ValueError(f"sensor '{self.name}': frame is empty: name the bodies, sites or geoms that its rays start from")
-        values = {**vars(self), "frame": tuple(f.native() for f in frames), "pattern": self.pattern.native(), "viz": self.viz.native()}
+        values = {
+            **vars(self),
+            "frame": tuple(f.native() for f in frames),
+            "pattern": self.pattern.native(),
+            "viz": self.viz.native(),
+        }
         return self._native_class(**values)
 
     _native_class = configs.RayCastSensorCfg
@@ -125,7 +141,7 @@ class RayCastSensorCfg(SensorCfg):
 
 @dataclass
 class RayCastData:
-    """As :class:`mjsense.RayCastData`."""
+    """As :class:`mjsense.sensors.RayCastData`."""
 
     distances: Any
     normals_w: Any

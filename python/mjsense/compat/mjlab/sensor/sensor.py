@@ -74,7 +74,7 @@ class Sensor(Generic[T]):
     def reset(self, env_ids: Any = None) -> None:
         """Called when environments begin a new episode: a tensor of ids, or None for all."""
 
-    def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
+    def debug_vis(self, visualizer: mjsense.sensors.DebugShapes) -> None:
         """Draws the environment ``visualizer.env_idx``."""
 
     @property
@@ -154,7 +154,9 @@ class OwnSensor(mjsense.Sensor):
 
     def initialize(self, sim: mjsense.Simulation) -> None:
         on_warp: Any = sim
-        self.original.initialize(sim.model, getattr(on_warp, "warp_model", sim.model), Data(sim), getattr(on_warp, "device", "cpu"))
+        self.original.initialize(
+            sim.model, getattr(on_warp, "warp_model", sim.model), Data(sim), getattr(on_warp, "device", "cpu")
+        )
 
     def compute(self, sim: mjsense.Simulation) -> Any:
         self.original._invalid = False
@@ -176,7 +178,7 @@ class OwnSensor(mjsense.Sensor):
     def reset(self, world_ids: Any = None) -> None:
         self.original.reset(world_ids if world_ids is None or not HAS_TORCH else tensor(np.array(world_ids)))
 
-    def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
+    def debug_vis(self, visualizer: mjsense.sensors.DebugShapes) -> None:
         self.original.debug_vis(visualizer)
 
     def _mjs_updates(self) -> bool:

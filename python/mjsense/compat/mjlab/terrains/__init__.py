@@ -25,7 +25,9 @@ class SubTerrainCfg:
     flat_patch_sampling: dict[str, Any] | None = None
 
     def native(self) -> configs.SubTerrainCfg:
-        raise NotImplementedError(f"{type(self).__name__} has no counterpart here: see mjsense.SubTerrainCfg for the kinds of tiles")
+        raise NotImplementedError(
+            f"{type(self).__name__} has no counterpart here: see mjsense.SubTerrainCfg for the kinds of tiles"
+        )
 
 
 @dataclass(kw_only=True)
@@ -52,8 +54,13 @@ class BoxPyramidStairsTerrainCfg(SubTerrainCfg):
         inverted = isinstance(self, BoxInvertedPyramidStairsTerrainCfg)
         low, high = (max(height, 1e-3) for height in self.step_height_range)  # steps of TerrainCfg need a positive height
         return configs.SubTerrainCfg(
-            kind="stairs", proportion=self.proportion, inverted=inverted, platform_width=self.platform_width,
-            step_height=(low, high), step_width=self.step_width)  # fmt: skip
+            kind="stairs",
+            proportion=self.proportion,
+            inverted=inverted,
+            platform_width=self.platform_width,
+            step_height=(low, high),
+            step_width=self.step_width,
+        )
 
 
 @dataclass(kw_only=True)
@@ -75,7 +82,12 @@ class HfPyramidSlopedTerrainCfg(SubTerrainCfg):
 
     def native(self) -> configs.SubTerrainCfg:
         return configs.SubTerrainCfg(
-            kind="slope", proportion=self.proportion, inverted=self.inverted, platform_width=self.platform_width, slope=self.slope_range)
+            kind="slope",
+            proportion=self.proportion,
+            inverted=self.inverted,
+            platform_width=self.platform_width,
+            slope=self.slope_range,
+        )
 
 
 @dataclass(kw_only=True)
@@ -94,8 +106,11 @@ class HfRandomUniformTerrainCfg(SubTerrainCfg):
     def native(self) -> configs.SubTerrainCfg:
         half = (self.noise_range[1] - self.noise_range[0]) / 2
         return configs.SubTerrainCfg(
-            kind="rough", proportion=self.proportion, amplitude=(0.0 if self.scale_with_difficulty else half, half),
-            spacing=self.downsampled_scale or self.horizontal_scale)  # fmt: skip
+            kind="rough",
+            proportion=self.proportion,
+            amplitude=(0.0 if self.scale_with_difficulty else half, half),
+            spacing=self.downsampled_scale or self.horizontal_scale,
+        )
 
 
 @dataclass(kw_only=True)
@@ -110,7 +125,9 @@ class HfWaveTerrainCfg(SubTerrainCfg):
     border_width: float = 0.0
 
     def native(self) -> configs.SubTerrainCfg:
-        return configs.SubTerrainCfg(kind="waves", proportion=self.proportion, amplitude=self.amplitude_range, waves=self.num_waves)
+        return configs.SubTerrainCfg(
+            kind="waves", proportion=self.proportion, amplitude=self.amplitude_range, waves=self.num_waves
+        )
 
 
 @dataclass(kw_only=True)
@@ -158,18 +175,35 @@ class TerrainEntityCfg(EntityCfg):
             return configs.TerrainCfg(daylight=daylight)
         tiles = self.terrain_generator
         if self.terrain_type != "generator" or tiles is None:
-            raise ValueError(f"TerrainEntityCfg: terrain_type is {self.terrain_type!r}: 'plane', or 'generator' with a terrain_generator")
+            raise ValueError(
+                f"TerrainEntityCfg: terrain_type is {self.terrain_type!r}: 'plane', or 'generator' with a terrain_generator"
+            )
         kinds = {name: sub.native() for name, sub in tiles.sub_terrains.items()}
         if tiles.curriculum:  # a column for each
             kinds = {name: configs.replace(kind, proportion=1.0) for name, kind in kinds.items()}
         top = self.max_init_terrain_level
         return configs.TerrainCfg(
-            terrain_type="generator", sub_terrains=kinds, levels=tiles.num_rows, types=0 if tiles.curriculum else tiles.num_cols,
-            tile_size=tiles.size, difficulty=tiles.difficulty_range, border=tiles.border_width, seed=tiles.seed or 0,
-            max_init_level=-1 if top is None else min(top, tiles.num_rows - 1), daylight=daylight)  # fmt: skip
+            terrain_type="generator",
+            sub_terrains=kinds,
+            levels=tiles.num_rows,
+            types=0 if tiles.curriculum else tiles.num_cols,
+            tile_size=tiles.size,
+            difficulty=tiles.difficulty_range,
+            border=tiles.border_width,
+            seed=tiles.seed or 0,
+            max_init_level=-1 if top is None else min(top, tiles.num_rows - 1),
+            daylight=daylight,
+        )
 
 
 __all__ = [
-    "BoxFlatTerrainCfg", "BoxInvertedPyramidStairsTerrainCfg", "BoxPyramidStairsTerrainCfg", "HfPyramidSlopedTerrainCfg",
-    "HfRandomUniformTerrainCfg", "HfWaveTerrainCfg", "SubTerrainCfg", "TerrainEntityCfg", "TerrainGeneratorCfg",
-]  # fmt: skip
+    "BoxFlatTerrainCfg",
+    "BoxInvertedPyramidStairsTerrainCfg",
+    "BoxPyramidStairsTerrainCfg",
+    "HfPyramidSlopedTerrainCfg",
+    "HfRandomUniformTerrainCfg",
+    "HfWaveTerrainCfg",
+    "SubTerrainCfg",
+    "TerrainEntityCfg",
+    "TerrainGeneratorCfg",
+]

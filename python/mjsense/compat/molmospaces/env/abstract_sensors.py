@@ -22,7 +22,9 @@ class CoreSensor(Sensor):
         super().__init__(uuid, gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64))
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
-        raise RuntimeError(f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()")
+        raise RuntimeError(
+            f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()"
+        )
 
 
 class SensorSuite(suite.SensorSuite):

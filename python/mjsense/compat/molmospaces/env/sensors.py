@@ -145,9 +145,19 @@ def get_core_sensors(exp_config: Any) -> list[Any]:
         sensors += [CameraParameterSensor(camera.name), CameraSensor(camera.name)]
         if camera.record_depth:
             sensors.append(DepthSensor(camera.name))
-    others = (RobotJointPositionSensor, RobotJointVelocitySensor, RobotBasePoseSensor, EnvStateSensor, TaskInfoSensor, LastActionSensor,
-              LastCommandedJointPosSensor, LastCommandedRelativeJointPosSensor, LastCommandedEETwistSensor, LastCommandedEEPoseSensor,
-              ObjectImagePointsSensor)  # fmt: skip
+    others = (
+        RobotJointPositionSensor,
+        RobotJointVelocitySensor,
+        RobotBasePoseSensor,
+        EnvStateSensor,
+        TaskInfoSensor,
+        LastActionSensor,
+        LastCommandedJointPosSensor,
+        LastCommandedRelativeJointPosSensor,
+        LastCommandedEETwistSensor,
+        LastCommandedEEPoseSensor,
+        ObjectImagePointsSensor,
+    )
     return [*sensors, *(sensor() for sensor in others)]
 
 
@@ -290,9 +300,29 @@ class GraspPoseSensor(Sensor):
         return np.asarray(pose_of_matrix(task._registered_policy.target_poses["grasp"]), np.float32)
 
 
-__all__ = ["CameraParameterSensor", "CameraSensor", "DepthSensor", "DoorStateSensor", "EnvStateSensor", "GraspPoseSensor",
-           "GraspStateSensor", "LastActionSensor", "LastCommandedEEPoseSensor", "LastCommandedEETwistSensor",
-           "LastCommandedJointPosSensor", "LastCommandedRelativeJointPosSensor", "ObjectImagePointsSensor", "ObjectPoseSensor",
-           "ObjectStartPoseSensor", "PickupObjGoalPoseSensor", "PolicyNumRetriesSensor", "PolicyPhaseSensor",
-           "RobotBasePoseSensor", "RobotJointPositionSensor", "RobotJointVelocitySensor", "TCPPoseSensor", "TaskInfoSensor",
-           "get_core_sensors"]  # fmt: skip
+__all__ = [
+    "CameraParameterSensor",
+    "CameraSensor",
+    "DepthSensor",
+    "DoorStateSensor",
+    "EnvStateSensor",
+    "GraspPoseSensor",
+    "GraspStateSensor",
+    "LastActionSensor",
+    "LastCommandedEEPoseSensor",
+    "LastCommandedEETwistSensor",
+    "LastCommandedJointPosSensor",
+    "LastCommandedRelativeJointPosSensor",
+    "ObjectImagePointsSensor",
+    "ObjectPoseSensor",
+    "ObjectStartPoseSensor",
+    "PickupObjGoalPoseSensor",
+    "PolicyNumRetriesSensor",
+    "PolicyPhaseSensor",
+    "RobotBasePoseSensor",
+    "RobotJointPositionSensor",
+    "RobotJointVelocitySensor",
+    "TCPPoseSensor",
+    "TaskInfoSensor",
+    "get_core_sensors",
+]

@@ -50,7 +50,7 @@ class BaseMujocoTask:
         self._options = options
         self._registered: Any = None
         self._sensor_suite: SensorSuite | None = None
-        self._worlds: mjsense.TaskVectorEnv | None = None
+        self._worlds: mjsense.tasks.TaskVectorEnv | None = None
 
     def _create_sensor_suite_from_config(self, config: Any) -> SensorSuite:
         """The suite: usually ``get_core_sensors(config)`` and the task's own sensors."""
@@ -71,7 +71,7 @@ class BaseMujocoTask:
     # ------------------------------------------------------------------------------------------------- on its own
 
     @property
-    def worlds(self) -> mjsense.TaskVectorEnv:
+    def worlds(self) -> mjsense.tasks.TaskVectorEnv:
         """The environment that runs the task."""
         if self._worlds is None:
             self._worlds = mjsense.make_vec(self, autoreset_mode="disabled", **self._options)  # type: ignore[arg-type]

@@ -21,13 +21,13 @@ namespace mjsense::tasks::policies {
 class MotionQuality {
  public:
   // Measured at the joints of all arms.
-  double speed = 0;           // rad/s, maximum
-  double acceleration = 0;    // rad/s^2, maximum between two control steps
-  double accelerated_at = 0;  // s
-  double depth = 0;           // m, maximum penetration of a contact of the robot with the scene
-  std::string deepest;        // the bodies of that contact, and its time
-  int self_collisions = 0;    // number of control steps with a self-collision of the robot
-  std::string met;            // the last self-collision
+  double speed = 0;         // rad/s, maximum
+  double acceleration = 0;  // rad/s^2, maximum between two control steps
+  std::string accelerated;  // the joint of that acceleration, and its time
+  double depth = 0;         // m, maximum penetration of a contact of the robot with the scene
+  std::string deepest;      // the bodies of that contact, and its time
+  int self_collisions = 0;  // number of control steps with a self-collision of the robot
+  std::string met;          // the last self-collision
   // Maxima of commands: joints of arms (rad/s, rad/s^2); a mobile or floating base (m/s, m/s^2,
   // rad/s, rad/s^2).
   struct Greatest {
@@ -73,7 +73,8 @@ class MotionQuality {
       const double a = std::abs(v - last_[i]) / (time - last_time_);
       if (a <= acceleration) continue;
       acceleration = a;
-      accelerated_at = time;
+      accelerated = scene::name_of(m, mjOBJ_JOINT, m->dof_jntid[dofs_[i]]) + " at " +
+                    std::to_string(time) + " s in phase " + std::to_string(phase);
     }
     last_.resize(dofs_.size());
     for (std::size_t i = 0; i < dofs_.size(); ++i) last_[i] = world.data->qvel[dofs_[i]];
