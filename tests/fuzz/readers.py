@@ -310,13 +310,13 @@ def _page() -> Any:
     import viser
 
     class Slider(viser.GuiSliderHandle):
-        min, max, step, value, disabled = 0.0, 1.0, 0.1, 0.5, False
+        min, max, step, value, disabled = 0.0, 1.0, 0.1, 0.5, False  # pyright: ignore[reportAssignmentType]
 
         def __init__(self) -> None:
             pass
 
     class Box(viser.GuiCheckboxHandle):
-        value, disabled = False, False
+        value, disabled = False, False  # pyright: ignore[reportAssignmentType]
 
         def __init__(self) -> None:
             pass

@@ -33,7 +33,7 @@ def test_example(name, tmp_path):
 
 @pytest.mark.skipif(not (BUILD / "CMakeCache.txt").exists(), reason="not imported from a build folder")
 def test_cpp_projects(tmp_path):
-    """The installed program runs. examples/cpp find the installed libraries and are built: one takes a picture, one records episodes."""
+    """examples/cpp find the installed libraries and are built: one takes a picture, one records episodes."""
 
     def run(*command):
         env = {k: v for k, v in os.environ.items() if k != "LD_LIBRARY_PATH"}
@@ -44,7 +44,6 @@ def test_cpp_projects(tmp_path):
     run("cmake", "--install", BUILD, "--prefix", "installed")
     headers = {str(h.relative_to(tmp_path / "installed/include")) for h in (tmp_path / "installed/include").rglob("*.h")}
     assert headers == set(PUBLIC)
-    run("installed/bin/mjsense", "sensors", EXAMPLES.parent / "models/robots/quadruped.xml")
     for name in ("sees", "records"):
         run("cmake", "-S", EXAMPLES / "cpp" / name, "-B", name, "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}")
         run("cmake", "--build", name)

@@ -161,7 +161,7 @@ def test_program(pick, door):
     assert done.returncode == 0 and "2 of 2 episodes (40 steps) replay equal bit for bit" in done.stdout, done.stdout
     assert "actions/joint_pos_rel: the action that the policy chose" in done.stdout
     wrong = run(pick, "--from", "state")
-    assert wrong.returncode == 2 and "invalid choice: 'state'" in wrong.stderr and wrong.stderr.count("\n") == 1
+    assert wrong.returncode == 2 and "--from is 'state': must be one of actions, states; did you mean 'states'?" in wrong.stderr and wrong.stderr.count("\n") == 1
 
 
 def test_without_data_for_replay(tmp_path):

@@ -122,13 +122,13 @@ def test_sensors_of_an_object():
         mjs.make_vec("pick", 3)
 
 
-def test_program_rejects_python_sensors(robot, tmp_path):
+def test_program_names_a_class_that_is_not_found(robot, tmp_path):
     file = robot(PYTHON)
     done = subprocess.run(
         [sys.executable, "-m", "mjsense", "record", "pick", "--robot", str(file), "--cameras", "none", "--out", str(tmp_path / "out")],
         capture_output=True, text=True)  # fmt: skip
     assert done.returncode != 0
-    assert "sensor 'grip' is the Python class 'lab_sensors:Grip', which this program cannot run: call mjsense.record()" in done.stderr
+    assert "robot.toml: sensor 'grip': class 'lab_sensors:Grip' is not found: No module named 'lab_sensors'" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -58,13 +58,20 @@ class ProgressLine:
     def _write(self, text: str, last: bool) -> None:
         if self._overwrite:
             if sys.stderr.isatty():  # a longer line would wrap, and "\r" would not return to its beginning
-                columns = os.get_terminal_size(sys.stderr.fileno()).columns  # 0: unknown
-                text = text[: columns - 1 if columns > 1 else 79]
+                text = text[: _columns() - 1]
             sys.stderr.write("\r" + text.ljust(len(self._shown)) + ("\n" if last else ""))
         elif text != self._shown:
             sys.stderr.write(text + "\n")
         sys.stderr.flush()
         self._shown = text
+
+
+def _columns() -> int:
+    """Width of the terminal, 80 if it is unknown."""
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns or 80
+    except OSError:  # a replacement of sys.stderr has no file descriptor
+        return 80
 
 
 def line_of(progress: Any) -> ProgressLine | None:

@@ -23,6 +23,7 @@ from mjsense.dataset.video_decoder import Packets, have_av
 
 _REFUSALS = (ValueError, LookupError, OSError, RuntimeError, ImportError)
 _CACHE_BYTES = 1 << 26
+_OPTIONAL = ("replay/model/", "replay/held", "replay/changed")  # only in episodes that need them
 _NAME_BYTES = 100  # of the name of a video, padded with 0
 
 
@@ -99,7 +100,7 @@ def _check_streams(episode: Episode) -> None:
             raise ValueError(
                 f"{place} is {now.dtype} {list(now.shape)}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}"
             )
-        if stream.name not in streams and "streams" in episode._recording.provenance:
+        if stream.name not in streams and not place.startswith(_OPTIONAL) and "streams" in episode._recording.provenance:
             raise ValueError(f"has no '{place}', which another episode of the recording has")
 
 
