@@ -6,6 +6,7 @@ Members of a private base class in the same module are shown as those of the cla
 import ast
 import copy
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +35,8 @@ class Docstrings(griffe.Extension):
         obj.docstring.value = re.sub(r"::$", ":", text, flags=re.MULTILINE)
 
     def on_package(self, *, pkg: griffe.Module, loader: Any, **kwargs: Any) -> None:
-        for module in pkg.modules.values():
-            for cls in module.classes.values() if not module.is_alias else ():
+        for module in modules(pkg):
+            for cls in module.classes.values():
                 if cls.is_alias:
                     continue
                 for base in [base for base in cls.mro() if base.parent is module and base.name[0] == "_"]:
@@ -49,6 +50,14 @@ class Docstrings(griffe.Extension):
                         cls.del_member(name)
                     own = griffe.Parameter("self", kind=griffe.ParameterKind.positional_or_keyword)
                     cls.set_member("__init__", griffe.Function("__init__", parameters=griffe.Parameters(own, *parameters)))
+
+
+def modules(package: griffe.Module) -> Iterator[griffe.Module]:
+    """The modules of a package and of the packages in it."""
+    for module in package.modules.values():
+        if not module.is_alias:
+            yield module
+            yield from modules(module)
 
 
 def reference(name: str, obj: griffe.Object) -> str:
