@@ -419,3 +419,20 @@ def test_streams_that_the_description_lists(root):
             del file[f"traj_0/{place}"]
         assert any(place.split("/")[0] in error and "was recorded" in error for error in errors_of(copy)), (place, errors_of(copy))
         shutil.rmtree(copy)
+
+
+def test_a_rendering_names_a_scene_with_numbers_that_json_lacks(root, tmp_path):
+    with changed(file_of(root)) as file:
+        scene = bytes(file["traj_0/obs_scene"][()]).decode().rstrip("\0")
+        del file["traj_0/obs_scene"]
+        file["traj_0"].create_dataset("obs_scene", data=list(('{"text": NaN, ' + scene[1:]).encode()), dtype="u1")
+    with pytest.raises(ValueError, match=r"\.h5 traj_0/obs_scene is not JSON text: it has the word NaN$"):
+        mjs.render(root, tmp_path / "rendered", cameras=["wrist_camera"])
+
+
+def test_a_description_leaves_room_for_that_of_a_rendering(root):
+    deep = "x"
+    for _ in range(62):
+        deep = [deep]
+    describe(root, lambda about: about.update(unknown=deep))
+    assert any("nested deeper than 60 levels" in error for error in errors_of(root))

@@ -35,6 +35,15 @@ def parse_object(text: str | bytes, what: str, max_bytes: int) -> dict[str, Any]
     return value
 
 
+def require_standard(text: str, what: str) -> None:
+    """Raises ValueError for NaN and Infinity, which Python's reader accepts and which the JSON of a recording cannot have."""
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"{what} is not JSON text: it has the word {word}")
+
+    json.loads(text, parse_constant=refuse)
+
+
 def kind_of(value: Any) -> str:
     """JSON's word for the type of a value."""
     kinds = {
