@@ -36,7 +36,8 @@ nb::object PythonHost::simulation(const std::shared_ptr<sim::Simulation>& sim) {
 std::vector<std::shared_ptr<Sensor>> PythonHost::members(
     nb::handle sensors, const std::shared_ptr<sim::Simulation>& sim) {
   nb::object shown = simulation(sim);
-  nb::object prepared = nb::module_::import_("mjsense.tasks.members").attr("prepare")(shown, sensors);
+  nb::object prepared =
+      nb::module_::import_("mjsense.tasks.members").attr("prepare")(shown, sensors);
   std::vector<std::shared_ptr<Sensor>> made;
   for (nb::handle object : prepared) {
     if (nb::isinstance<SensorHandle>(object)) {
