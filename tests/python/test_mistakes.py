@@ -250,7 +250,7 @@ CASES = {
     "option of gymnasium": (lambda u: gymnasium.make("mjsense/Pick-v0", camras=[]), ["make_vec()", "'camras'", "did you mean 'cameras'"]),
     # making recordings
     "no folder": (lambda u: mjs.record("pick"), ["record()", "missing", "'out'"]),
-    "format": (lambda u: mjs.record("pick", out=u.tmp / "q", format="lerobt"), ["record()", "format is 'lerobt'", "did you mean 'lerobot'?"]),
+    "format": (lambda u: mjs.record("pick", out=u.tmp / "q", format="lerobt"), ["unknown export format 'lerobt'", "did you mean 'lerobot'"]),
     "no episodes": (lambda u: mjs.record("pick", out=u.tmp / "q", episodes=0), ["episodes is 0", "at least 1"]),
     "no worlds": (lambda u: mjs.record("pick", out=u.tmp / "q", worlds=0), ["worlds is 0", "at least 1"]),
     "columns of a policy": (
@@ -273,13 +273,13 @@ CASES = {
     "stream of a window": (lambda u: mjs.Dataset(u.data.root, delta_timestamps={"rewrds": [0]}), ["'rewrds'", "did you mean 'rewards'?"]),
     "text for streams": (lambda u: mjs.Dataset(u.data.root, streams="rewards"), ["Dataset()", "streams must be a sequence of str", "'rewards'"]),
     "number of an episode": (lambda u: mjs.Dataset(u.data.root, episodes=[7]), ["episodes: 7", "1 episodes"]),
-    "key of a map": (lambda u: mjs.export_lerobot(u.data.root, u.tmp / "e", map={"stat": "obs/agent/qpos"}), ["map", "unknown key 'stat'", "state, action"]),
+    "key of a map": (lambda u: mjs.exporting.export_lerobot(u.data.root, u.tmp / "e", map={"stat": "obs/agent/qpos"}), ["map", "unknown key 'stat'", "state, action"]),
     "stream of a map": (
-        lambda u: mjs.export_lerobot(u.data.root, u.tmp / "e", map={"state": "obs/agent/qps", "action": "obs/agent/qpos"}),
+        lambda u: mjs.exporting.export_lerobot(u.data.root, u.tmp / "e", map={"state": "obs/agent/qps", "action": "obs/agent/qpos"}),
         ["Feature 'state'", "'obs/agent/qps'", "did you mean 'obs/agent/qpos'"],
     ),
-    "no output": (lambda u: mjs.export_lerobot(u.data.root), ["export_lerobot()", "missing", "'out'"]),
-    "source of an export": (lambda u: mjs.export_lerobot(u.tmp / "nothing", u.tmp / "e"), ["nothing", "no such file or directory"]),
+    "no output": (lambda u: mjs.exporting.export_lerobot(u.data.root), ["export_lerobot()", "missing", "'out'"]),
+    "source of an export": (lambda u: mjs.exporting.export_lerobot(u.tmp / "nothing", u.tmp / "e"), ["nothing", "no such file or directory"]),
     "source of a replay": (lambda u: mjs.check_replay(u.tmp / "nothing"), ["nothing", "no such file or directory"]),
     "source of a rendering": (lambda u: mjs.render(u.tmp / "nothing", out=u.tmp / "e"), ["nothing", "no such file or directory"]),
     "camera of a rendering": (lambda u: mjs.render(u.data.root, out=u.tmp / "e", cameras=["tpo"]), ["no camera named 'tpo'"]),

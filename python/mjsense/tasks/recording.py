@@ -68,7 +68,7 @@ def record(
     molmospaces_depth: bool = False,
     # end of options
     sensors: Iterable[Any] = (),
-    format: Literal["mjsense", "lerobot"] = "mjsense",
+    format: str = "mjsense",
     map: Any = None,
     trim_idle: bool | None = None,
     keep_recording: bool = False,
@@ -147,7 +147,7 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        format: ``lerobot``: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        format: ``lerobot``, or another of :data:`mjsense.exporting.FORMATS` that is written while recording: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
         map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
         trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
         keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
