@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import sys
 from collections.abc import Collection, Sequence
@@ -12,6 +11,7 @@ from typing import Any, NoReturn
 
 from mjsense.commands.fields import Field, find, read_size, suggestion
 from mjsense.commands.table import FIELDS, NAMES
+from mjsense.core.progress_line import terminal_width
 
 _NAME_COLUMN = 28  # where descriptions begin
 _MAX_WIDTH = 100  # longer lines are hard to read
@@ -21,19 +21,9 @@ _MAX_STEPS = 1_000_000_000
 _LISTED = ("robot", "policy")  # in the help
 
 
-def terminal_width(descriptor: int) -> int:
-    """Number of columns of a terminal, otherwise that of ``COLUMNS`` or 80."""
-    try:
-        columns = os.get_terminal_size(descriptor).columns
-    except OSError:
-        columns = 0
-    given = os.environ.get("COLUMNS", "")
-    return columns if columns > 1 else int(given) if given.isdecimal() and int(given) > 1 else 80
-
-
 def text_width() -> int:
     """Number of columns of help texts and lists."""
-    return min(max(terminal_width(1), 40), _MAX_WIDTH)
+    return min(max(terminal_width(sys.stdout), 40), _MAX_WIDTH)
 
 
 def wrapped(text: str, width: int) -> list[str]:

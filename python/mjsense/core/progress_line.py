@@ -8,7 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, TypeVar
+from typing import Any, TextIO, TypeVar
 
 T = TypeVar("T")
 _PERIOD = 0.1  # s between two updates of a line that is overwritten
@@ -58,7 +58,7 @@ class ProgressLine:
     def _write(self, text: str, last: bool) -> None:
         if self._overwrite:
             if sys.stderr.isatty():  # a longer line would wrap, and "\r" would not return to its beginning
-                text = text[: _columns() - 1]
+                text = text[: terminal_width(sys.stderr) - 1]
             sys.stderr.write("\r" + text.ljust(len(self._shown)) + ("\n" if last else ""))
         elif text != self._shown:
             sys.stderr.write(text + "\n")
@@ -66,12 +66,14 @@ class ProgressLine:
         self._shown = text
 
 
-def _columns() -> int:
-    """Width of the terminal, 80 if it is unknown."""
+def terminal_width(stream: TextIO) -> int:
+    """Number of columns of the terminal that shows a stream, otherwise that of ``COLUMNS`` or 80."""
     try:
-        return os.get_terminal_size(sys.stderr.fileno()).columns or 80
-    except OSError:  # a replacement of sys.stderr has no file descriptor
-        return 80
+        columns = os.get_terminal_size(stream.fileno()).columns
+    except OSError:  # no terminal, or a stream without a file descriptor
+        columns = 0
+    given = os.environ.get("COLUMNS", "")
+    return columns if columns > 1 else int(given) if given.isdecimal() and int(given) > 1 else 80
 
 
 def line_of(progress: Any) -> ProgressLine | None:
