@@ -83,22 +83,9 @@ def export_lerobot(
     exact_rate: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Writes a recording as a LeRobot v3.0 data set. See docs/export.md.
+    """Writes a recording as a LeRobot v3.0 data set.
 
-    Args:
-        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder of the data set, which must not exist.
-        map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
-            places an object. Videos of episodes with such steps are encoded again.
-        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
-            such a data set. By default the rate is rounded if that changes it by at most 5 %.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
     """
     options = {"trim_idle": trim_idle, "exact_rate": exact_rate}
     return export(root, out, format="lerobot", map=map, episodes=episodes, success=success, progress=progress, **options)
@@ -116,22 +103,9 @@ def export_lerobot21(
     exact_rate: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``. See docs/export.md.
+    """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``.
 
-    Args:
-        root: Output directory of a recording, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder of the data set, which must not exist.
-        map: Features and cameras: a :class:`mjsense.exporting.Mapping`, a TOML file, or a dict of the same form.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
-            places an object. Videos of episodes with such steps are encoded again.
-        exact_rate: Keep a rate that is not a whole number, such as 500/33. LeRobot's own tools cannot delete, split or append episodes of
-            such a data set. By default the rate is rounded if that changes it by at most 5 %.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
     """
     options = {"trim_idle": trim_idle, "exact_rate": exact_rate}
     return export(root, out, format="lerobot21", map=map, episodes=episodes, success=success, progress=progress, **options)
@@ -151,18 +125,7 @@ def export_robomimic(
     """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
     data for replay. Images are decoded, because robomimic reads arrays.
 
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: File to write. It must not exist.
-        map: Which streams become which observations and actions: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
     """
     options = {"trim_idle": trim_idle}
     return export(root, out, format="robomimic", map=map, episodes=episodes, success=success, progress=progress, **options)
@@ -179,20 +142,10 @@ def export_rlds(
     trim_idle: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG.
+    """Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG. The name of ``out`` is
+    that of the data set: small letters, digits and ``_``.
 
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist. Its name is that of the data set: small letters, digits and ``_``.
-        map: Which streams become which features: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
     """
     return export(root, out, format="rlds", map=map, episodes=episodes, success=success, trim_idle=trim_idle, progress=progress)
 
@@ -211,18 +164,7 @@ def export_zarr(
     """Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion
     Policy's ``ReplayBuffer`` reads them. Images are decoded.
 
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which arrays: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`). By default only in episodes whose task
-            places an object.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
     """
     return export(root, out, format="zarr", map=map, episodes=episodes, success=success, trim_idle=trim_idle, progress=progress)
 
@@ -240,16 +182,7 @@ def export_rerun(
     """Writes a recording as a folder of ``.rrd`` files, one for each episode, which ``rerun OUT/*.rrd`` shows: the videos as they are,
     depth images, features as curves, and, if the recording has data for replay, the geoms of the scene.
 
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which curves: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
     """
     return export(root, out, format="rerun", map=map, episodes=episodes, success=success, progress=progress)
 
@@ -268,17 +201,7 @@ def export_mcap(
     """Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
     calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages.
 
-    Args:
-        root: Recording: its folder, one of its ``house_N`` folders, or one HDF5 file.
-        out: Folder to write. It must not exist.
-        map: Which streams become which topics: a TOML file, a dict of the same form, or a Mapping.
-        episodes: Positions of episodes in the recording; by default all.
-        success: Only successful (True) or only failed (False) episodes.
-        encode_again: Encode videos again that have B-frames, which ``foxglove.CompressedVideo`` does not allow; other videos are copied.
-        progress: Called with the number of written episodes and of all episodes.
-
-    Returns:
-        ``out``.
+    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
 
     Raises:
         ValueError: A video has B-frames, and ``encode_again`` is False.
