@@ -25,9 +25,8 @@ RESULTS = ROOT / ".cache" / "bench" / "results"  # results of the last runs, whi
 if not (RELEASE / "python").exists():
     sys.exit(f"{RELEASE} is missing: ./dev bench builds it")
 sys.path.insert(0, str(RELEASE / "python"))  # so that a later `import mjsense` finds the measured build
-os.environ["PYTHONPATH"] = os.pathsep.join(
-    [str(RELEASE / "python"), *filter(None, [os.environ.get("PYTHONPATH")])]
-)  # in other processes too
+# In other processes too.
+os.environ["PYTHONPATH"] = os.pathsep.join([str(RELEASE / "python"), *filter(None, [os.environ.get("PYTHONPATH")])])
 MJSENSE = [sys.executable, "-m", "mjsense"]
 """The program."""
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
+# Not benchmarks.
 SHARED = {
     "run",
     "harness",
@@ -17,7 +18,7 @@ SHARED = {
     "pictures",
     "page",
     "figures",
-}  # not benchmarks
+}
 
 ASKED_FOR = {"builds"}  # run only if named: needs a second build
 

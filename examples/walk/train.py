@@ -89,9 +89,8 @@ def with_sb3(task, env):
     from mjsense.tasks.rl.sb3 import SB3VecEnv
 
     worlds = VecNormalize(SB3VecEnv(env, action_mean=task.stand, action_scale=SCALE), norm_reward=False)
-    worlds.action_space = type(worlds.action_space)(
-        -10, 10, worlds.action_space.shape, np.float32
-    )  # servos have limits of their own
+    # Servos have limits of their own.
+    worlds.action_space = type(worlds.action_space)(-10, 10, worlds.action_space.shape, np.float32)
     steps = 24 * env.num_envs
     trainer = PPO(
         "MlpPolicy",

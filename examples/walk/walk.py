@@ -88,11 +88,12 @@ class Walk(mjs.Task):
         world.qpos[3:7] = np.cos(turn / 2), 0, 0, np.sin(turn / 2)
         world.qpos[7:] += rng.uniform(-0.05, 0.05, 12)
         world.ctrl[:] = self.stand
+        # Forwards, left, turn: m/s, rad/s.
         self.command[world.id] = (
             rng.uniform(0.3, 0.8),
             rng.uniform(-0.2, 0.2),
             rng.uniform(-0.5, 0.5),
-        )  # forwards, left, turn: m/s, rad/s
+        )
 
     def begin(self, ids):
         self.before[ids] = self.stand

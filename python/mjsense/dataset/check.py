@@ -109,9 +109,8 @@ def _check_videos(episode: Episode) -> None:
         info = episode._video(name)
         episode.image_histogram(name)
         if have_av():
-            packets = Packets(
-                info.path, info.fps, info.frames, (info.width, info.height), ""
-            )  # the program compares the checksum
+            # The program compares the checksum.
+            packets = Packets(info.path, info.fps, info.frames, (info.width, info.height), "")
             exact = packets.exact or info.path.suffix == ".mkv" or episode._recording.fps is None
             if not exact or sorted(packets.frames) != list(range(info.frames)):
                 raise ValueError(f"{info.path.name}: its times are not those of {info.frames} frames at {info.fps} per second")

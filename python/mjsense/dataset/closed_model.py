@@ -146,9 +146,8 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
                 continue
             file = element.attrib[key]
             if "name" not in element.attrib and key == "file" and element.tag != "skin":
-                element.set(
-                    "name", posixpath.splitext(posixpath.basename(file.replace("\\", "/")))[0]
-                )  # the name that it has without one
+                # The name that it has without one.
+                element.set("name", posixpath.splitext(posixpath.basename(file.replace("\\", "/")))[0])
             folder = folders[FILE_TAGS[element.tag]] or folders["assetdir"]
             element.set(key, find(element, key, posixpath.basename(file) if strip else file, folder))
 

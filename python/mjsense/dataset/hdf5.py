@@ -386,9 +386,8 @@ class Rows:
         if stored > limits.ROW_BYTES + (limits.ROW_BYTES >> 4):
             raise ValueError(f"has a packed chunk of {stored} bytes, more than {limits.ROW_BYTES}")
         without, data = dataset.read_direct_chunk(at)
-        data = data[
-            :stored
-        ]  # without filters, h5py gives as many bytes as a whole chunk has, and does not fill those that are not stored
+        # Without filters, h5py gives as many bytes as a whole chunk has, and does not fill those that are not stored.
+        data = data[:stored]
         for i in reversed(range(len(self._filters))):
             if without >> i & 1:
                 continue

@@ -163,9 +163,8 @@ class _Sizes:
             if element.tag not in ("texture", "hfield"):
                 continue
             files = [self._members[element.attrib[key]] for key in element.attrib if key.startswith("file")]
-            channels = (
-                self._value(element, "nchannel", 3) if element.tag == "texture" else 4
-            )  # a number of a height field has 4 bytes
+            # A number of a height field has 4 bytes.
+            channels = self._value(element, "nchannel", 3) if element.tag == "texture" else 4
             for content in files:
                 width, height = image_size(content)
                 total += max(width * height * channels, len(content))

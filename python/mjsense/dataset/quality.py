@@ -54,9 +54,8 @@ def kept_rows(episode: EpisodeRows) -> list[int]:
     """Rows of the observations that :meth:`Episode.trimmed` leaves."""
     actors = [name for name in episode.streams if name.startswith("env_states/actors/")]
     joints = [name for name in episode.streams if name.startswith("obs/agent/qpos/")]
-    poses = [
-        np.nan_to_num(episode[name].reshape(episode.length, -1)[:, :7].astype(float)) for name in actors
-    ]  # NaN: the object is absent
+    # NaN: the object is absent.
+    poses = [np.nan_to_num(episode[name].reshape(episode.length, -1)[:, :7].astype(float)) for name in actors]
     slow = _SLOW / float(episode.fps)
     still = idle_steps(episode)
     for pose in poses:

@@ -239,9 +239,8 @@ def _carried_streams(episode: Episode, replaced: list[str]) -> list[str]:
     listed = [*_texts(stated.get("streams")), *(_texts(rendered.get("carried")) if isinstance(rendered, dict) else ())]
 
     def is_replaced(entry: str) -> bool:
-        name = (
-            entry[: entry.rfind("(")].rpartition(" ")[0].replace("sensor_param_", "obs/sensor_param/", 1)
-        )  # of "qpos uint8(2000,)"
+        # The name in "qpos uint8(2000,)".
+        name = entry[: entry.rfind("(")].rpartition(" ")[0].replace("sensor_param_", "obs/sensor_param/", 1)
         places = [name] if name.startswith("obs/") else [f"obs/extra/{name}", f"obs/sensor_data/{name.replace('/', '_')}"]
         return any(place == prefix or place.startswith(f"{prefix}/") for place in places for prefix in replaced)
 

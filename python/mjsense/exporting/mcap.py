@@ -139,11 +139,12 @@ def _encoded(video: Video) -> Iterator[bytes]:
     encoder: Any = av.CodecContext.create("libx264", "w")
     encoder.width, encoder.height, encoder.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
     encoder.framerate = video.fps
+    # Zerolatency: no B-frames, one packet for each frame.
     encoder.options = {
         "preset": "veryfast",
         "tune": "zerolatency",
         "crf": str(CRF),
-    }  # zerolatency: no B-frames, one packet for each frame
+    }
     for t in range(len(video)):
         yield b"".join(bytes(packet) for packet in encoder.encode(padded(video[t])))
 

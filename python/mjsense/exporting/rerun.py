@@ -138,10 +138,11 @@ def _blueprint(source: Source, episode: Episode) -> Any:
         eye = None
     cameras = [rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name) for name in source.cameras]
     curves = [rrb.TimeSeriesView(origin=f"features/{name}", name=name) for name in source.features]
+    # Depth images would cover the scene with points.
     shown = [
         "$origin/**",
         *(f"- $origin/cameras/{name}/depth" for name in source.cameras),
-    ]  # depth images would cover the scene with points
+    ]
     scene = rrb.Spatial3DView(origin="world", name="scene", contents=shown, eye_controls=eye)
     left = rrb.Vertical(scene, rrb.TextDocumentView(origin="task", name="task"), row_shares=[9, 1])
     right = rrb.Vertical(*cameras, rrb.Tabs(*curves)) if cameras else rrb.Tabs(*curves)
@@ -220,9 +221,8 @@ def _drawn(rr: Any, shape: Shape) -> Any:
     """Rerun's shape."""
     x, _, z = shape.size
     if shape.triangles is not None:
-        corners = (
-            shape.triangles.reshape(-1, 3) @ shape.rotation.T + shape.position
-        )  # each triangle has its own, so that edges are sharp
+        # Each triangle has its own, so that edges are sharp.
+        corners = shape.triangles.reshape(-1, 3) @ shape.rotation.T + shape.position
         normals = np.repeat(np.cross(corners[1::3] - corners[::3], corners[2::3] - corners[::3]), 3, 0)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return rr.Mesh3D(vertex_positions=corners, vertex_normals=normals, albedo_factor=shape.rgba)

@@ -17,6 +17,7 @@ from mjsense.warp.sensor import REGISTRY, Stage, WarpSensor, Worlds, unsupported
 from mjsense.warp.stepper import Stepper
 from mjsense.warp.user import UserSensor
 
+# Each registers its sensors.
 __all__ = [
     "SceneSensors",
     "builtin",
@@ -27,7 +28,7 @@ __all__ = [
     "lidar",
     "rays",
     "terrain_height",
-]  # each registers its sensors
+]
 
 
 class SceneSensors:

@@ -8,8 +8,8 @@
 
 namespace mjsense::replay {
 
-// A stream that the description lists, as recorded or as carried over by a rendering, and the paths in a trajectory where it may be: a camera's
-// image is a video, or an array.
+// A stream that the description lists, as recorded or as carried over by a rendering, and the paths
+// in a trajectory where it may be: a camera's image is a video, or an array.
 struct ListedStream {
   std::string name;
   std::vector<std::string> places;
