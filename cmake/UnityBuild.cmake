@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # mjsense_unity(TARGET SOURCE...): compiles up to eight files of a room together, because most files spend more time on the headers
-# that they include than on their own lines: without ccache, both libraries take 305 instead of 585 CPU seconds (preset dev). Files with compile options of their own (cmake/Isa.cmake)
-# are compiled alone. A file's own missing includes are found by ./dev clang, which compiles each file alone.
+# that they include than on their own lines: without ccache, both libraries take 305 instead of 585 CPU seconds (preset dev). Files
+# with compile options of their own (cmake/Isa.cmake) are compiled alone. Missing includes of a file are found by ./dev check, in which
+# clang examines each file alone.
 function(mjsense_unity target)
   set(sources ${ARGN})
   list(SORT sources)
