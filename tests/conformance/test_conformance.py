@@ -12,7 +12,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-import run
+import run_cases
 
 
 def cases(name):
@@ -42,9 +42,9 @@ def check(found, expected):
 def test_case(case):
     if "expect_error" in case:
         with pytest.raises((ValueError, KeyError, RuntimeError, TypeError)):
-            run.run_case(case)
+            run_cases.run_case(case)
         return
-    result = run.run_case(case)
+    result = run_cases.run_case(case)
     for label, fields in case["expect"].items():
         for field, expected in fields.items():
             check(result[label].get(field), expected)
@@ -60,7 +60,7 @@ OTHERWISE = {
 def test_divergence_follows_mujoco(case):
     if case["id"] in OTHERWISE:
         pytest.skip(OTHERWISE[case["id"]])
-    result = run.run_case(case)
+    result = run_cases.run_case(case)
     for key, value in case["mujoco4"].items():
         if key in ("error", "msg"):  # mjsense does not reject unnamed XML sensors but gives them a name
             assert result["n"]["value"] == ["r/sensor_0"]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs each fuzz target of build/fuzz, and each Python reader of readers.py, for a number of seconds: ./dev fuzz [SECONDS] [NAME ...]
+"""Runs each fuzz target of build/fuzz, and each Python reader of untrusted_readers.py, for a number of seconds: ./dev fuzz [SECONDS] [NAME ...]
 
 This script creates the seeds of the C++ targets. Inputs that reach new code are stored in build/fuzz/corpus/NAME for the next run. Inputs that cause
 a failure are written to build/fuzz/found/: add a test with such an input next to the code, then fix the code. Inputs of the Python readers
@@ -86,7 +86,7 @@ def words(name: str) -> list[str]:
 
 
 def run_python(name: str, seconds: int) -> bool:
-    done = subprocess.run([sys.executable, ROOT / "tests/fuzz/readers.py", name, str(seconds)], env={"PYTHONPATH": str(ROOT / "build/dev/python"), **os.environ})
+    done = subprocess.run([sys.executable, ROOT / "tests/fuzz/untrusted_readers.py", name, str(seconds)], env={"PYTHONPATH": str(ROOT / "build/dev/python"), **os.environ})
     return done.returncode == 0
 
 
@@ -114,7 +114,7 @@ def run(name: str, seconds: int) -> bool:
 
 def main(arguments: list[str]) -> int:
     seconds = int(arguments.pop(0)) if arguments and arguments[0].isdigit() else SECONDS
-    names = [*SEEDS, *(PYTHON + name for name in re.findall(r"^def read_(\w+)", (ROOT / "tests/fuzz/readers.py").read_text(), re.MULTILINE))]
+    names = [*SEEDS, *(PYTHON + name for name in re.findall(r"^def read_(\w+)", (ROOT / "tests/fuzz/untrusted_readers.py").read_text(), re.MULTILINE))]
     unknown = sorted(set(arguments) - set(names))
     if unknown:
         print(f"no target named {', '.join(unknown)}; there are {', '.join(names)}", file=sys.stderr)

@@ -9,7 +9,7 @@ import pytest
 for module in ("hypothesis", "av", "pyarrow", "viser"):
     pytest.importorskip(module)
 sys.path.insert(0, str(Path(__file__).parent))
-import readers
+import untrusted_readers as readers
 
 
 @pytest.mark.parametrize("name", readers.READERS)

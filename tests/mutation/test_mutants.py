@@ -5,7 +5,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
-# Under a name of its own: tests/conformance has a run.py too.
+# Under a name of its own: other folders of tests have a run.py too.
 spec = importlib.util.spec_from_file_location("mutation_run", Path(__file__).parent / "run.py")
 mutation = sys.modules["mutation_run"] = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(mutation)

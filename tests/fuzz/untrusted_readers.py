@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The readers of untrusted files in Python, and inputs for them: valid ones of which some places are changed, and any bytes.
 
-A reader returns a value, or raises an error of one line. ``python tests/fuzz/readers.py NAME SECONDS`` runs one of them with new inputs
+A reader returns a value, or raises an error of one line. ``python tests/fuzz/untrusted_readers.py NAME SECONDS`` runs one of them with new inputs
 until the time has passed; test_readers.py runs all of them with a few inputs that are always the same.
 """
 
