@@ -2,14 +2,17 @@
 #include "python/bindings/foreign_arrays.h"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "mjsense/rays/foreign_rays.h"
 #include "mjsense/worlds/foreign_arrays.h"
 #include "python/bindings/mujoco_callbacks.h"
 #include "python/bindings/process_guard.h"
@@ -46,10 +49,30 @@ class PyForeignArrays {
     });
   }
 
+  // Addresses of the arrays of ForeignRaysQuery.
+  void cast(int count, const std::array<std::uintptr_t, 6>& arrays, std::uint32_t groups,
+            nb::bytes hidden) {
+    rays::ForeignRaysQuery query;
+    query.count = count;
+    query.origins = reinterpret_cast<const float*>(arrays[0]);
+    query.directions = reinterpret_cast<const float*>(arrays[1]);
+    query.exclude = reinterpret_cast<const int*>(arrays[2]);
+    query.distances = reinterpret_cast<float*>(arrays[3]);
+    query.geoms = reinterpret_cast<int*>(arrays[4]);
+    query.normals = reinterpret_cast<float*>(arrays[5]);
+    query.groups = groups;
+    query.hidden = {static_cast<const std::uint8_t*>(hidden.data()), hidden.size()};
+    work([&](worlds::ForeignArrays& own) {
+      if (!rays_) rays_ = make_shared_guarded<rays::ForeignRays>(own.worlds());
+      rays_->cast(own.worlds(), query);
+    });
+  }
+
  private:
   const ProcessGuard process_;
   std::mutex mutex_;
   std::shared_ptr<worlds::ForeignArrays> arrays_;
+  std::shared_ptr<rays::ForeignRays> rays_;
 };
 
 }  // namespace
@@ -78,6 +101,10 @@ void bind_foreign_arrays(nb::module_& m) {
           nb::arg("call"), nb::arg("mask") = 0,
           "Calls mj_step (0), mj_forward (1), mj_step1 (2), mj_step2 (3), or mj_resetData (4) for "
           "the worlds of the mask: the address of B bools, or 0 for all.")
+      .def("cast", &PyForeignArrays::cast, nb::arg("count"), nb::arg("arrays"), nb::arg("groups"),
+           nb::arg("hidden"),
+           "Casts rays into the worlds. arrays: addresses of origins, directions, excluded bodies, "
+           "distances, geoms and normals. hidden: a byte for each geom.")
       .def(
           "set_option",
           [](PyForeignArrays& self, const std::string& name, const std::vector<double>& values) {

@@ -6,9 +6,9 @@
     data = mujoco_warp.put_data(mj_model, mj_data, nworld=1024)
     mujoco_warp.step(model, data)
 
-``step``, ``forward``, ``step1``, ``step2`` and ``reset_data`` then compute all worlds with MuJoCo, on all cores, if the arrays are on Warp's CPU
-device, and write the results into the arrays of the data. On CUDA devices, and for models with callbacks, they are mujoco_warp's own. All
-other functions are mujoco_warp's own everywhere.
+``step``, ``forward``, ``step1``, ``step2``, ``reset_data`` and ``rays`` then compute all worlds with MuJoCo and mjsense, on all cores, if the
+arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models with callbacks, they are
+mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import contextlib
 import dataclasses
 import functools
 import importlib.metadata
+import inspect
+import operator
 import sys
 import weakref
 from typing import TYPE_CHECKING, Any
@@ -41,14 +43,26 @@ FIRST, LAST = (3, 11), (4, 0)
 
 _CALLS = {"step": 0, "forward": 1, "step1": 2, "step2": 3}
 _RESET = 4
-_OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "put_model")}
+_OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "ray", "rays", "refit_bvh", "put_model")}
 """mujoco_warp's own functions."""
 
 _OTHER = ("qLD", "qLDiagInv", "qLU")
 """Fields that have the names of fields of MuJoCo, but another content."""
 
-_FIXED_OPTIONS = ("integrator", "cone", "solver", "iterations", "ls_iterations", "ccd_iterations", "sdf_initpoints", "sdf_iterations")
+_FIXED_OPTIONS = (
+    "integrator",
+    "cone",
+    "solver",
+    "iterations",
+    "ls_iterations",
+    "ccd_iterations",
+    "sdf_initpoints",
+    "sdf_iterations",
+)
 """Options that are Python numbers in mujoco_warp, and equal in MuJoCo."""
+
+_GEOMETRY = ("mesh_", "hfield_", "oct_", "tex_", "flex")
+"""Beginnings of the names of the model's arrays that are large, and must not be changed."""
 
 _models: dict[int, Any] = {}
 """By the id of a ``mujoco_warp.Model``: a copy of the ``mujoco.MjModel`` that it was made of."""
@@ -132,12 +146,20 @@ class Worlds:
         """Fields of the data that show the worlds."""
         self.left: list[str] = []
         """Fields of the data that stay as they are."""
+        self._num_worlds = data.nworld
+        self._fixed = np.array(source.body_weldid)[source.geom_bodyid] == 0
         self._options = self._options_of(model)
         self._link()
 
     @staticmethod
     def _check_sizes(source: Any, data: Any) -> None:
-        for name, size in (("qpos", source.nq), ("qvel", source.nv), ("ctrl", source.nu), ("xpos", source.nbody), ("geom_xpos", source.ngeom)):
+        for name, size in (
+            ("qpos", source.nq),
+            ("qvel", source.nv),
+            ("ctrl", source.nu),
+            ("xpos", source.nbody),
+            ("geom_xpos", source.ngeom),
+        ):
             found = getattr(data, name).shape
             if found[:2] != (data.nworld, size):
                 raise ValueError(
@@ -148,8 +170,7 @@ class Worlds:
         """Tells the worlds where the arrays are."""
         data: Any = self._data()
         self._arrays.clear()
-        self._held: list[tuple[dict[str, Any], str, Any]] = []
-        self._others: list[tuple[str, np.ndarray, np.ndarray]] = []
+        self._others: list[tuple[str, np.ndarray, bytes]] = []
         self.shown, self.left = [], []
         parts = [("", "data", data), ("contact.", "contact", data.contact), ("efc.", "data", data.efc)]
         for prefix, kind, part in parts:
@@ -164,16 +185,21 @@ class Worlds:
         for prefix, part in (("", self.model), ("opt.", self.model.opt)):
             hints = {field.name: field.type for field in dataclasses.fields(part)}
             for name in _array_fields(part):
+                if name.startswith(_GEOMETRY):
+                    continue
                 array = getattr(part, name)
                 by_world = getattr(hints[name], "shape", ("",))[:1] == ("*",)
                 rows = array.shape[0] if by_world else 1
                 if not self._add("model", part, name, prefix + name, rows, False) and by_world and array.size:
                     values = array.numpy()
-                    self._others.append((prefix + name, values, values.copy()))
+                    self._others.append((prefix + name, values, values.tobytes()))
+        # The attributes as they are now. They keep the arrays.
+        self._parts = [
+            (vars(part), (*vars(part).values(),)) for part in (data, data.contact, data.efc, self.model, self.model.opt)
+        ]
 
     def _add(self, kind: str, part: Any, name: str, field: str, rows: int, state: bool) -> bool:
         array = getattr(part, name)
-        self._held.append((vars(part), name, array))
         if not array.device.is_cpu:
             raise ValueError(f"{name} is on the device {array.device}, and other arrays of the data are on the CPU")
         if not array.size:
@@ -187,20 +213,51 @@ class Worlds:
 
     def run(self, call: int, mask: int = 0) -> None:
         """Calls MuJoCo's function for all worlds. `mask`: address of an array of bools; of a reset."""
-        if any(attributes.get(name) is not array for attributes, name, array in self._held):
-            self._link()
-        if (options := self._options_of(self.model)) != self._options:
-            self._set_options(options)
-        for name, now, before in self._others:
-            if not np.array_equal(now, before, equal_nan=True):
-                self._changed(name, now, before)
+        for attributes, values in self._parts:
+            if len(attributes) != len(values) or not all(map(operator.is_, attributes.values(), values)):
+                self._set_options()
+                self._link()
+                break
+        for index, (name, now, before) in enumerate(self._others):
+            if now.tobytes() != before:
+                self._changed(name, now)
+                self._others[index] = (name, now, now.tobytes())
         self._arrays.run(call, mask)
+
+    def cast(self, query: dict[str, Any]) -> None:
+        """Casts the rays of a call of ``mujoco_warp.rays``."""
+        count = query["pnt"].shape[1]
+        kinds = {
+            "pnt": wp.vec3,
+            "vec": wp.vec3,
+            "bodyexclude": wp.int32,
+            "dist": wp.float32,
+            "geomid": wp.int32,
+            "normal": wp.vec3,
+        }
+        for name, kind in kinds.items():
+            array, shape = query[name], (count,) if name == "bodyexclude" else (self._num_worlds, count)
+            if array.dtype is not kind or array.shape != shape or not array.is_contiguous:
+                raise ValueError(
+                    f"rays(): {name} must be a contiguous array {shape} of {kind.__name__}, not {array.shape} of {array.dtype.__name__}"
+                )
+        hidden = np.zeros(self.model.ngeom, np.uint8)
+        if query["rc"] is not None:
+            hidden[:] = 1
+            hidden[query["rc"].enabled_geom_ids.numpy()] = 0
+        if not query["flg_static"]:
+            hidden[self._fixed] = 1
+        wanted = [*query["geomgroup"]]
+        groups = sum((group != 0) << bit for bit, group in enumerate(wanted))
+        if count:
+            self._arrays.cast(count, [query[name].ptr for name in kinds], groups, hidden.tobytes())
 
     @staticmethod
     def _options_of(model: Any) -> dict[str, int]:
         return {name: int(getattr(model.opt, name)) for name in (*_FIXED_OPTIONS, "disableflags", "enableflags")}
 
-    def _set_options(self, options: dict[str, int]) -> None:
+    def _set_options(self) -> None:
+        options = self._options_of(self.model)
         for name, value in options.items():
             if value != self._options[name]:
                 if name in self._flags:  # bits have other meanings in other series
@@ -208,11 +265,10 @@ class Worlds:
                 self._arrays.set_option(f"opt.{name}", [value])
         self._options = options
 
-    def _changed(self, name: str, now: np.ndarray, before: np.ndarray) -> None:
+    def _changed(self, name: str, now: np.ndarray) -> None:
         if name != "opt.impratio_invsqrt":
             raise ValueError(f"{name} of the model was changed, which must be the same as when the model was made")
         self._arrays.set_option("opt.impratio", (now.astype(float) ** -2).tolist())
-        before[...] = now
 
 
 def _array_fields(part: Any) -> list[str]:
@@ -241,8 +297,42 @@ def _reset_data(m: Any, d: Any, reset: Any = None) -> None:
     if not _on_cpu(m, d):
         return _OWN["reset_data"](m, d, reset)
     if reset is not None and (reset.dtype is not wp.bool or reset.shape != (d.nworld,) or not reset.is_contiguous):
-        raise ValueError(f"reset_data(): reset must be a contiguous array of {d.nworld} bools, not {reset.dtype.__name__} {reset.shape}")
+        raise ValueError(
+            f"reset_data(): reset must be a contiguous array of {d.nworld} bools, not {reset.dtype.__name__} {reset.shape}"
+        )
     worlds_of(m, d).run(_RESET, 0 if reset is None else reset.ptr)
+
+
+_rays_arguments = inspect.signature(_OWN["rays"])
+
+
+@functools.wraps(_OWN["rays"])
+def _rays(*args: Any, **kwargs: Any) -> None:
+    query = _rays_arguments.bind(*args, **kwargs)
+    query.apply_defaults()
+    model, data = query.arguments["m"], query.arguments["d"]
+    worlds = _worlds.get(id(data))
+    if worlds is not None and worlds.model is model and _on_cpu(model, data):
+        worlds.cast(query.arguments)
+    else:
+        if query.arguments["rc"] is not None:
+            _OWN["refit_bvh"](model, data, query.arguments["rc"])
+        _OWN["rays"](*args, **kwargs)
+
+
+@functools.wraps(_OWN["ray"])
+def _ray(*args: Any, **kwargs: Any) -> Any:
+    call = inspect.signature(_OWN["ray"]).bind(*args, **kwargs).arguments
+    if call.get("rc") is not None:
+        _OWN["refit_bvh"](call["m"], call["d"], call["rc"])
+    return _OWN["ray"](*args, **kwargs)
+
+
+@functools.wraps(_OWN["refit_bvh"])
+def _refit_bvh(m: Any, d: Any, rc: Any) -> None:
+    worlds = _worlds.get(id(d))
+    if rc.nrender or m.nflex or worlds is None or worlds.model is not m or not _on_cpu(m, d):
+        _OWN["refit_bvh"](m, d, rc)
 
 
 @functools.wraps(_OWN["put_model"])
@@ -254,4 +344,11 @@ def _put_model(mjm: Any, *args: Any, **kwargs: Any) -> Any:
     return model
 
 
-_NEW = {**{name: _call(name) for name in _CALLS}, "reset_data": _reset_data, "put_model": _put_model}
+_NEW = {
+    **{name: _call(name) for name in _CALLS},
+    "reset_data": _reset_data,
+    "ray": _ray,
+    "rays": _rays,
+    "refit_bvh": _refit_bvh,
+    "put_model": _put_model,
+}

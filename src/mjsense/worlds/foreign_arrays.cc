@@ -14,6 +14,7 @@
 #include "mjsense/core/model_indices.h"
 #include "mjsense/scene/mujoco_log.h"
 #include "mjsense/worlds/ordered_apply.h"
+#include "mjsense/worlds/step_stages.h"
 
 namespace mjsense::worlds {
 namespace {
@@ -58,7 +59,8 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
 #define X(T, name) FIELD(T, efc_##name, 1, true, d->efc_##name)
   X(int, type)
   X(int, id)
-  X(int, state) X(mjtNum, pos) X(mjtNum, margin) X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref)
+  X(int, state)
+  X(mjtNum, pos) X(mjtNum, margin) X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref)
       X(mjtNum, frictionloss) X(mjtNum, force)
 #undef X
 #undef FIELD
@@ -145,6 +147,7 @@ void take_elements(const void* now, const void* seen, DType theirs, void* to, DT
   take_changed<std::uint8_t, std::uint8_t>(now, seen, to, n);
 }
 
+constexpr std::string_view kControls[] = {"ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart"};
 // Fields that a reset shows, beside the state.
 constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy",
                                        "ne",   "nf",      "nl",         "nefc"};
@@ -183,12 +186,14 @@ ForeignArrays::ForeignArrays(const mjModel* model, int num_worlds, int threads)
     : worlds_(model, num_worlds, threads),
       num_contacts_(num_worlds),
       num_constraints_(num_worlds),
-      first_contact_(num_worlds) {
+      first_contact_(num_worlds),
+      current_(num_worlds) {
   set_option("opt.disableflags", {static_cast<double>(model->opt.disableflags)});
 }
 
 void ForeignArrays::set_option(const std::string& name, const std::vector<double>& values) {
   int size = 0, element = 0;
+  current_.assign(worlds_.size(), 0);
   void* rows = mjb_expand(worlds_.batch(), name.c_str(), &size, &element);
   if (!rows || size != 1 || values.empty())
     throw ValueError(fmt::format("MuJoCo has no option {} with one number", name));
@@ -231,6 +236,7 @@ bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool
                      found->constraints,
                      input,
                      input || std::ranges::count(kReset, field) > 0,
+                     std::ranges::count(kControls, field) > 0,
                      found->pointer,
                      rows.data,
                      static_cast<std::size_t>(rows.strides[0]),
@@ -300,14 +306,18 @@ bool ForeignArrays::add_contacts(std::string_view field, const ArrayView& rows) 
   return add(kind, 0, DType::kInt32, kind == kAddresses ? 0 : 1);
 }
 
-void ForeignArrays::take(mjData* d, int w) {
+// Returns whether anything was written on which positions and velocities depend.
+bool ForeignArrays::take(mjData* d, int w) {
+  bool moved = false;
   for (const Field& f : fields_) {
     if (!f.input) continue;
     const std::size_t bytes = f.count * dtype_size(f.dtype);
     const std::byte *now = f.rows + w * f.row_bytes, *seen = f.seen.data() + w * bytes;
-    if (std::memcmp(now, seen, bytes) != 0)
-      take_elements(now, seen, f.dtype, const_cast<void*>(f.pointer(d)), f.type, f.count);
+    if (std::memcmp(now, seen, bytes) == 0) continue;
+    take_elements(now, seen, f.dtype, const_cast<void*>(f.pointer(d)), f.type, f.count);
+    if (!f.control) moved = true;
   }
+  return moved;
 }
 
 void ForeignArrays::show(const mjData* d, int w) {
@@ -356,10 +366,15 @@ void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument
   ordered_after(argument);
   auto& self = *static_cast<ForeignArrays*>(argument);
   scene::drop_warnings(true);
-  self.take(d, w);
+  const bool current = !self.take(d, w) && self.current_[w];
+  self.current_[w] = 0;  // also if a MuJoCo error jumps out of this function
   switch (self.call_) {
     case RawCall::kStep:
-      mj_step(m, d);
+      if (current && can_split_step(m)) {
+        step_from(mjSTAGE_VEL, m, d, true);
+      } else {
+        mj_step(m, d);
+      }
       break;
     case RawCall::kForward:
       mj_forward(m, d);
@@ -374,6 +389,7 @@ void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument
       if (!self.mask_ || self.mask_[w]) mj_resetData(m, d);
       break;
   }
+  self.current_[w] = self.call_ == RawCall::kForward || self.call_ == RawCall::kStep1;
   self.show(d, w);
   scene::drop_warnings(false);
   orders_before(argument);
@@ -407,6 +423,7 @@ void ForeignArrays::take_model() {
     }
   }
   if (!any) return;
+  current_.assign(num_worlds, 0);
   std::vector<int> ids;
   for (int w = 0; w < num_worlds; ++w) {
     if (changed[w]) check_element_indices(worlds_.model_of(w));

@@ -10,6 +10,7 @@
 #include <mujoco/mujoco.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,6 +60,7 @@ class ForeignArrays {
     int count;          // elements of a row
     bool constraints;   // there are nefc elements
     bool input, reset;  // written by the program; shown by a reset
+    bool control;       // positions and velocities do not depend on it
     const void* (*pointer)(const mjData*);
     std::byte* rows;
     std::size_t row_bytes;        // distance of two rows
@@ -83,7 +85,7 @@ class ForeignArrays {
   };
 
   static void run_world(const mjModel* m, mjData* d, int w, void* argument);
-  void take(mjData* d, int w);
+  bool take(mjData* d, int w);
   void show(const mjData* d, int w);
   void show_contacts(const mjModel* m, const mjData* d, int w) const;
   void take_model();
@@ -98,6 +100,8 @@ class ForeignArrays {
   int max_contacts_ = -1, max_constraints_ = -1;  // rows of the arrays; -1: there are no arrays
   // By world; contacts begin at first_contact_.
   std::vector<int> num_contacts_, num_constraints_, first_contact_;
+  // By world: positions and velocities are those of the state, so that a step need not compute them.
+  std::vector<std::uint8_t> current_;
   RawCall call_ = RawCall::kStep;
   const bool* mask_ = nullptr;
 };
