@@ -35,6 +35,8 @@ class Program:
             setattr(self, name, array)
             assert self.add("data", name, array, name in STATE)
         self.efc_force = np.zeros((WORLDS, constraints), np.float32)
+        self.efc_id = np.zeros((WORLDS, constraints), np.int32)
+        assert self.add("data", "efc_id", self.efc_id)
         self.nefc = np.zeros((WORLDS, 1), np.int32)
         assert self.add("data", "efc_force", self.efc_force)
         assert self.add("data", "nefc", self.nefc)
@@ -150,6 +152,7 @@ def test_contacts_are_in_the_order_of_the_worlds():
         np.testing.assert_array_equal(found["friction"], contact.friction.astype(np.float32))
         rows = [contact.efc_address + k for k in range(4)] if contact.efc_address >= 0 else []
         assert found["efc_address"].tolist() == rows + [-1] * (10 - len(rows))
+        assert (program.efc_id[world, rows] == row).all()
     numbers = program.contact["geomcollisionid"][: len(contacts), 0]
     for world in range(WORLDS):
         own = numbers[program.contact["worldid"][: len(contacts), 0] == world]

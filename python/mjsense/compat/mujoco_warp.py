@@ -93,14 +93,19 @@ def use(threads: int = 0) -> None:
     _replace({_OWN[name]: new for name, new in _NEW.items()})
 
 
+def stop() -> None:
+    """From now on, all functions are mujoco_warp's own again."""
+    _replace({new: _OWN[name] for name, new in _NEW.items()})
+
+
 @contextlib.contextmanager
 def used(threads: int = 0) -> Iterator[None]:
-    """``use()`` for a ``with`` block."""
+    """``use()`` for a ``with`` block, and ``stop()`` at its end."""
     use(threads)
     try:
         yield
     finally:
-        _replace({new: _OWN[name] for name, new in _NEW.items()})
+        stop()
 
 
 def _replace(functions: dict[Any, Any]) -> None:

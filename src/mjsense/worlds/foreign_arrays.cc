@@ -60,8 +60,9 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
   X(int, type)
   X(int, id)
   X(int, state)
-  X(mjtNum, pos) X(mjtNum, margin) X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref)
-      X(mjtNum, frictionloss) X(mjtNum, force)
+  X(mjtNum, pos)
+  X(mjtNum, margin) X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref) X(mjtNum, frictionloss)
+      X(mjtNum, force)
 #undef X
 #undef FIELD
           return std::nullopt;
@@ -237,6 +238,7 @@ bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool
                      input,
                      input || std::ranges::count(kReset, field) > 0,
                      std::ranges::count(kControls, field) > 0,
+                     field == "efc_id",
                      found->pointer,
                      rows.data,
                      static_cast<std::size_t>(rows.strides[0]),
@@ -334,6 +336,13 @@ void ForeignArrays::show(const mjData* d, int w) {
 }
 
 void ForeignArrays::show_contacts(const mjModel* m, const mjData* d, int w) const {
+  for (const Field& f : fields_) {
+    if (!f.contact_ids) continue;
+    auto* ids = reinterpret_cast<int*>(f.rows + w * f.row_bytes);
+    for (int i = 0; i < std::min(f.count, d->nefc); ++i) {
+      if (d->efc_type[i] >= mjCNSTR_CONTACT_FRICTIONLESS) ids[i] += first_contact_[w];
+    }
+  }
   const int room = std::clamp(max_contacts_ - first_contact_[w], 0, d->ncon);
   for (const ContactField& f : contact_fields_) {
     if (f.made == kCount) continue;

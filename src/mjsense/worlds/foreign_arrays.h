@@ -35,7 +35,8 @@ class ForeignArrays {
   void set_option(const std::string& name, const std::vector<double>& values);
 
   // `rows` [B, n] shows this field of mjData; `input`: the program may also write it. Of the fields
-  // efc_... a world fills as many elements as it has constraints. Returns false if MuJoCo has no such
+  // efc_... a world fills as many elements as it has constraints, and efc_id has the row of a contact
+  // among those of all worlds. Returns false if MuJoCo has no such
   // field, or one of another size or type.
   bool add_data(std::string_view field, const ArrayView& rows, bool input);
   // `rows` [1 or B, n] has the values of this field of the model, or option (opt.gravity), for all
@@ -61,6 +62,7 @@ class ForeignArrays {
     bool constraints;   // there are nefc elements
     bool input, reset;  // written by the program; shown by a reset
     bool control;       // positions and velocities do not depend on it
+    bool contact_ids;   // of contacts among those of all worlds
     const void* (*pointer)(const mjData*);
     std::byte* rows;
     std::size_t row_bytes;        // distance of two rows
