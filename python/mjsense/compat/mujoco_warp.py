@@ -46,7 +46,7 @@ _RESET = 4
 _OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "ray", "rays", "refit_bvh", "put_model")}
 """mujoco_warp's own functions."""
 
-_OTHER = ("qLD", "qLDiagInv", "qLU")
+_OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
 """Fields that have the names of fields of MuJoCo, but another content."""
 
 _FIXED_OPTIONS = (

@@ -61,11 +61,11 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
   X(int, id)
   X(int, state)
   X(mjtNum, pos)
-  X(mjtNum, margin) X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref) X(mjtNum, frictionloss)
-      X(mjtNum, force)
+  X(mjtNum, margin)
+  X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref) X(mjtNum, frictionloss) X(mjtNum, force)
 #undef X
 #undef FIELD
-          return std::nullopt;
+      return std::nullopt;
 }
 
 struct ModelFieldType {
@@ -166,6 +166,7 @@ constexpr ContactPlace kContactPlaces[] = {
     PLACE(frame, kFloat32, 9),       PLACE(includemargin, kFloat32, 1),
     PLACE(friction, kFloat32, 5),    PLACE(solref, kFloat32, mjNREF),
     PLACE(solimp, kFloat32, mjNIMP), PLACE(solreffriction, kFloat32, mjNREF),
+    PLACE(adhesion, kFloat32, 1),    PLACE(surfacevel, kFloat32, 3),
     PLACE(dim, kInt32, 1),           PLACE(geom, kInt32, 2),
     PLACE(flex, kInt32, 2),          PLACE(elem, kInt32, 2),
     PLACE(vert, kInt32, 2)};
