@@ -149,7 +149,7 @@ void take_elements(const void* now, const void* seen, DType theirs, void* to, DT
 }
 
 constexpr std::string_view kControls[] = {"ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart"};
-// Fields that a reset shows, beside the state.
+// Fields that a reset shows in addition to the state.
 constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy",
                                        "ne",   "nf",      "nl",         "nefc"};
 

@@ -113,7 +113,7 @@ with compat.used():
     assert left == {*worlds.left}, sorted(left ^ {*worlds.left})
 assert mjw.step is before[0]
 
-# Both take the same rays and go on; then forward(), a reset, and a model that was randomised.
+# Both cast the same rays and step; then forward(), a reset, and a model that was randomised.
 rng = np.random.default_rng(1)
 origins = wp.array(rng.uniform(-1, 1, (WORLDS, 50, 3)) + (0, 0, 2), dtype=wp.vec3)
 directions = wp.array(rng.normal(0, 1, (WORLDS, 50, 3)) - (0, 0, 2), dtype=wp.vec3)
@@ -166,7 +166,7 @@ assert not ours[1].overflow.numpy().any()
 # Errors.
 few = start(nconmax=1)
 few[1].qpos.numpy()[:, 2] = 0.09
-raises(ValueError, r"worlds have \d+ contacts, and the data has room for 8: make it with nconmax=\d+", lambda: mjw.step(*few))
+raises(ValueError, r"worlds have \d+ contacts, and the data has room for 8: make it with nconmax=\d+", lambda few=few: mjw.step(*few))
 small = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>")
 raises(ValueError, "this Data belongs to another model: its qpos has the shape", lambda: mjw.step(mjw.put_model(small), ours[1]))
 raises(ValueError, r"call use\(\) before mujoco_warp.put_model", lambda: mjw.step(own[0], own[1]))
