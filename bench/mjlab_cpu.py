@@ -3,7 +3,8 @@
 
     build/mjlab/bin/python bench/mjlab_cpu.py [TASK ...] [--envs 64 1024] [--steps 20] [--threads 1]
 
-One process has both environments, which take the same random actions in turns. CPU time is that of all threads. Physics: step, forward,
+One process has both environments. After `--warm` steps with mjsense's physics, which bring both into the same states, each takes the same
+random actions. CPU time is that of all threads. Physics: step, forward,
 reset and set_const; sensing: rays and cameras; the rest: managers, contact sensors, rewards, observations. The environment build/mjlab is
 that of tests/python/test_adapters.py; PYTHONPATH names the folder of the build, build/release/python.
 """
@@ -57,6 +58,7 @@ def main() -> None:
     parser.add_argument("tasks", nargs="*", default=TASKS)
     parser.add_argument("--envs", nargs="*", type=int, default=[64, 1024])
     parser.add_argument("--steps", type=int, default=20, help="steps with mjsense; a tenth of it with mjlab's own kernels")
+    parser.add_argument("--warm", type=int, default=25)
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
 
@@ -77,17 +79,17 @@ def main() -> None:
     )
     for task in options.tasks:
         for envs in options.envs:
-            theirs = Environment(task, envs)
             with mujoco_warp.used(options.threads):
-                ours = Environment(task, envs)
-            actions = torch.randn(2 + options.steps, envs, theirs.env.action_manager.total_action_dim) * 0.3
+                theirs, ours = Environment(task, envs), Environment(task, envs)
+                actions = torch.randn(options.warm + options.steps, envs, ours.env.action_manager.total_action_dim) * 0.3
+                for action in actions[: options.warm]:
+                    theirs.step(action)
+                    ours.step(action)
             rates = []
             for one, steps in ((theirs, max(1, options.steps // 10)), (ours, options.steps)):
-                # The functions are bound in modules, so that used() serves one environment at a time.
+                one.spent = dict.fromkeys(one.spent, 0.0)
                 with mujoco_warp.used(options.threads) if one is ours else torch.no_grad():
-                    one.step(actions[0])
-                    one.spent = dict.fromkeys(one.spent, 0.0)
-                    for action in actions[1 : 1 + steps]:
+                    for action in actions[options.warm :][:steps]:
                         one.step(action)
                 rates.append(envs * steps / one.spent["all"])
             shares = [ours.spent[part] / ours.spent["all"] for part in PARTS]

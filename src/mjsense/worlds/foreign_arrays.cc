@@ -9,6 +9,7 @@
 #include <initializer_list>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_indices.h"
@@ -62,7 +63,8 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
   X(int, state)
   X(mjtNum, pos)
   X(mjtNum, margin)
-  X(mjtNum, D) X(mjtNum, vel) X(mjtNum, aref) X(mjtNum, frictionloss) X(mjtNum, force)
+  X(mjtNum, D)
+  X(mjtNum, vel) X(mjtNum, aref) X(mjtNum, frictionloss) X(mjtNum, force)
 #undef X
 #undef FIELD
       return std::nullopt;
@@ -186,10 +188,14 @@ int constraint_rows(const mjModel* m, const mjContact& contact) {
 
 ForeignArrays::ForeignArrays(const mjModel* model, int num_worlds, int threads)
     : worlds_(model, num_worlds, threads),
-      num_contacts_(num_worlds),
+      contacts_(num_worlds),
       num_constraints_(num_worlds),
+      first_contact_row_(num_worlds),
       first_contact_(num_worlds),
+      scratch_(worlds_.model()),
+      borrowed_(num_worlds),
       current_(num_worlds) {
+  fill_scratch();
   set_option("opt.disableflags", {static_cast<double>(model->opt.disableflags)});
 }
 
@@ -216,10 +222,21 @@ void ForeignArrays::clear() {
   max_contacts_ = max_constraints_ = -1;
 }
 
+// Makes an mjData for each thread, so that none is made while the worlds run.
+void ForeignArrays::fill_scratch() {
+  std::vector<ScratchData::Loan> all(worlds_.threads());
+  for (ScratchData::Loan& one : all) one = scratch_.borrow();
+}
+
 // Calls function(m, d, world, this) for all worlds.
 void ForeignArrays::apply(mjfBatchFunc function) {
   apply_ordered(worlds_.batch(), nullptr, 0, function, this, 1);
   scene::drop_warnings(false);  // an error leaves the flag set
+  for (mjData*& data : borrowed_) {
+    if (!data) continue;
+    mj_deleteData(std::exchange(data, nullptr));
+    fill_scratch();
+  }
   for (int w = 0; w < worlds_.size(); ++w) {
     if (mjb_status(worlds_.batch())[w])
       throw RuntimeError(fmt::format("world {}: MuJoCo: {}", w, mjb_error(worlds_.batch(), w)));
@@ -332,25 +349,27 @@ void ForeignArrays::show(const mjData* d, int w) {
     if (f.input)
       std::memcpy(f.seen.data() + w * n * dtype_size(f.dtype), row, n * dtype_size(f.dtype));
   }
-  num_contacts_[w] = d->ncon;
+  if (max_contacts_ >= 0) contacts_[w].assign(d->contact, d->contact + d->ncon);
   num_constraints_[w] = d->nefc;
+  first_contact_row_[w] = d->ne + d->nf + d->nl;
 }
 
-void ForeignArrays::show_contacts(const mjModel* m, const mjData* d, int w) const {
+void ForeignArrays::show_contacts(const mjModel* m, int w) const {
   for (const Field& f : fields_) {
     if (!f.contact_ids) continue;
     auto* ids = reinterpret_cast<int*>(f.rows + w * f.row_bytes);
-    for (int i = 0; i < std::min(f.count, d->nefc); ++i) {
-      if (d->efc_type[i] >= mjCNSTR_CONTACT_FRICTIONLESS) ids[i] += first_contact_[w];
-    }
+    for (int i = first_contact_row_[w]; i < std::min(f.count, num_constraints_[w]); ++i)
+      ids[i] += first_contact_[w];
   }
-  const int room = std::clamp(max_contacts_ - first_contact_[w], 0, d->ncon);
+  const std::vector<mjContact>& contacts = contacts_[w];
+  const int room =
+      std::clamp(max_contacts_ - first_contact_[w], 0, static_cast<int>(contacts.size()));
   for (const ContactField& f : contact_fields_) {
     if (f.made == kCount) continue;
     std::byte* row = f.rows + first_contact_[w] * f.row_bytes;
     int number = 0;
     for (int i = 0; i < room; ++i, row += f.row_bytes) {
-      const mjContact& contact = d->contact[i];
+      const mjContact& contact = contacts[i];
       auto* ids = reinterpret_cast<int*>(row);
       if (f.made == kNotMade) {
         const void* from = reinterpret_cast<const std::byte*>(&contact) + f.offset;
@@ -372,6 +391,22 @@ void ForeignArrays::show_contacts(const mjModel* m, const mjData* d, int w) cons
   }
 }
 
+// Uses an mjData that is shared by the thread's worlds and stays in its cache, as
+// Worlds::step_in_scratch(). Poses that rays read are carried over, too.
+void ForeignArrays::step_in_scratch(const mjModel* m, mjData* d, int w) {
+  mjData* s = borrowed_[w] = scratch_.borrow().release();
+  mj_copyState(m, d, s, mjSTATE_INTEGRATION);
+  mj_step(m, s);
+  mj_copyState(m, s, d, mjSTATE_INTEGRATION);
+  mju_copy(d->geom_xpos, s->geom_xpos, 3 * static_cast<int>(m->ngeom));
+  mju_copy(d->geom_xmat, s->geom_xmat, 9 * static_cast<int>(m->ngeom));
+  show(s, w);
+  borrowed_[w] = nullptr;
+  const ScratchData::Loan returned(s, ScratchData::Release{&scratch_});
+  scene::drop_warnings(false);
+  orders_before(this);
+}
+
 void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument) {
   ordered_after(argument);
   auto& self = *static_cast<ForeignArrays*>(argument);
@@ -380,10 +415,12 @@ void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument
   self.current_[w] = 0;  // also if a MuJoCo error jumps out of this function
   switch (self.call_) {
     case RawCall::kStep:
-      if (current && can_split_step(m)) {
+      if (!can_split_step(m)) {
+        mj_step(m, d);
+      } else if (current) {
         step_from(mjSTAGE_VEL, m, d, true);
       } else {
-        mj_step(m, d);
+        return self.step_in_scratch(m, d, w);
       }
       break;
     case RawCall::kForward:
@@ -482,7 +519,7 @@ void ForeignArrays::set_constants(const std::vector<int>& ids) {
 }
 
 void ForeignArrays::check_capacity() const {
-  const int contacts = first_contact_.back() + num_contacts_.back();
+  const int contacts = first_contact_.back() + static_cast<int>(contacts_.back().size());
   if (max_contacts_ >= 0 && contacts > max_contacts_)
     throw ValueError(
         fmt::format("the {} worlds have {} contacts, and the data has room for {}: make it with "
@@ -506,14 +543,14 @@ void ForeignArrays::run(RawCall call, const bool* mask) {
   int contacts = 0;
   for (int w = 0; w < worlds_.size(); ++w) {
     first_contact_[w] = contacts;
-    contacts += num_contacts_[w];
+    contacts += static_cast<int>(contacts_[w].size());
   }
   for (const ContactField& f : contact_fields_) {
     if (f.made == kCount) *reinterpret_cast<int*>(f.rows) = std::min(contacts, max_contacts_);
   }
   if (contacts > 0 && !contact_fields_.empty()) {
-    apply([](const mjModel* m, mjData* d, int w, void* argument) {
-      static_cast<const ForeignArrays*>(argument)->show_contacts(m, d, w);
+    apply([](const mjModel* m, mjData*, int w, void* argument) {
+      static_cast<const ForeignArrays*>(argument)->show_contacts(m, w);
     });
   }
   check_capacity();

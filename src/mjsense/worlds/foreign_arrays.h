@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
+#include "mjsense/worlds/scratch_data.h"
 #include "mjsense/worlds/worlds.h"
 
 namespace mjsense::worlds {
@@ -88,8 +89,10 @@ class ForeignArrays {
 
   static void run_world(const mjModel* m, mjData* d, int w, void* argument);
   bool take(mjData* d, int w);
+  void step_in_scratch(const mjModel* m, mjData* d, int w);
   void show(const mjData* d, int w);
-  void show_contacts(const mjModel* m, const mjData* d, int w) const;
+  void show_contacts(const mjModel* m, int w) const;
+  void fill_scratch();
   void take_model();
   void set_constants(const std::vector<int>& ids);
   void apply(mjfBatchFunc function);
@@ -100,8 +103,12 @@ class ForeignArrays {
   std::vector<ModelField> model_fields_;
   std::vector<ContactField> contact_fields_;
   int max_contacts_ = -1, max_constraints_ = -1;  // rows of the arrays; -1: there are no arrays
-  // By world; contacts begin at first_contact_.
-  std::vector<int> num_contacts_, num_constraints_, first_contact_;
+  // By world: its contacts, the number of its constraints, the first of them of a contact, and the row
+  // of its first contact in the arrays.
+  std::vector<std::vector<mjContact>> contacts_;
+  std::vector<int> num_constraints_, first_contact_row_, first_contact_;
+  ScratchData scratch_;
+  std::vector<mjData*> borrowed_;  // by world; not null after a MuJoCo error
   // By world: positions and velocities are those of the state, so that a step need not compute them.
   std::vector<std::uint8_t> current_;
   RawCall call_ = RawCall::kStep;
