@@ -176,6 +176,7 @@ def test_models_differ_between_worlds_from_the_next_step_on():
     program.throw()
     datas, models = program.plain(), [mujoco.MjModel.from_xml_string(XML) for _ in range(WORLDS)]
     for step in range(60):
+        program.worlds.run(FORWARD)  # whose positions and velocities a step may not use after a change
         if step == 10:
             mass[3, 1] = models[3].body_mass[1] = 2.5
         if step == 20:  # MuJoCo computes poses of bodies anew only because body_sameframe follows
@@ -223,7 +224,11 @@ def test_diverged_worlds_show_what_diverged_and_the_others_go_on():
     for _ in range(5):
         program.worlds.run(STEP)
         other.worlds.run(STEP)
-    assert np.isnan(program.qpos[2]).any()
+    assert np.isnan(program.qvel[2, 3])
+    assert np.isnan(program.xpos[2]).all()
+    assert not np.isnan(program.ctrl[2]).any()
+    assert 2 not in program.contact["worldid"][: program.count[0, 0]]
+    np.testing.assert_array_equal(program.time, other.time)
     rest = [0, 1, 3, 4]
     np.testing.assert_array_equal(program.qpos[rest], other.qpos[rest])
     program.worlds.run(RESET, np.array([False, False, True, False, False]).ctypes.data)
@@ -258,10 +263,13 @@ def test_other_fields_sizes_and_types_are_refused():
         program.worlds.run(STEP)
 
 
-def test_rays_hit_what_plain_mujoco_hits():
+@pytest.mark.parametrize("call", [FORWARD, STEP])
+def test_rays_hit_what_plain_mujoco_hits(call):
+    """After a step, poses are those before it."""
     program = Program()
     program.throw()
-    program.worlds.run(FORWARD)
+    datas = program.plain()
+    program.worlds.run(call)
     rng, count = np.random.default_rng(1), 37
     origins = rng.uniform(-0.2, 0.2, (WORLDS, count, 3)).astype(np.float32) + np.float32((0, 0, 1.2))
     directions = rng.normal(0, 1, (WORLDS, count, 3)).astype(np.float32)
@@ -275,8 +283,8 @@ def test_rays_hit_what_plain_mujoco_hits():
     arrays = [array.ctypes.data for array in (origins, directions, exclude, distances, geoms, normals)]
     program.worlds.cast(count, arrays, 0x3F, bytes(program.model.ngeom))
     found = np.zeros(1, np.int32)
-    for world, data in enumerate(program.plain()):
-        mujoco.mj_forward(program.model, data)
+    for world, data in enumerate(datas):
+        (mujoco.mj_forward if call == FORWARD else mujoco.mj_step)(program.model, data)
         for ray in range(count):
             if not directions[world, ray].any():
                 assert geoms[world, ray] == -1

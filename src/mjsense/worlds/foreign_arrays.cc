@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstring>
 #include <initializer_list>
+#include <limits>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -64,7 +65,8 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
   X(mjtNum, pos)
   X(mjtNum, margin)
   X(mjtNum, D)
-  X(mjtNum, vel) X(mjtNum, aref) X(mjtNum, frictionloss) X(mjtNum, force)
+  X(mjtNum, vel)
+  X(mjtNum, aref) X(mjtNum, frictionloss) X(mjtNum, force)
 #undef X
 #undef FIELD
       return std::nullopt;
@@ -407,12 +409,32 @@ void ForeignArrays::step_in_scratch(const mjModel* m, mjData* d, int w) {
   orders_before(this);
 }
 
+// A world whose state is not finite: MuJoCo would find contacts between all its geoms. Its state stays,
+// and its results are NaN.
+void ForeignArrays::show_diverged(const mjModel* m, mjData* d, int w) {
+  d->ncon = d->ne = d->nf = d->nl = d->nefc = 0;
+  if (call_ == RawCall::kStep || call_ == RawCall::kStep2) d->time += m->opt.timestep;
+  show(d, w);
+  for (const Field& f : fields_) {
+    auto* row = reinterpret_cast<float*>(f.rows + w * f.row_bytes);
+    if (f.dtype == DType::kFloat32 && !f.input)
+      std::fill_n(row, f.count, std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
 void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument) {
   ordered_after(argument);
   auto& self = *static_cast<ForeignArrays*>(argument);
   scene::drop_warnings(true);
   const bool current = !self.take(d, w) && self.current_[w];
   self.current_[w] = 0;  // also if a MuJoCo error jumps out of this function
+  const auto is_bad = [](mjtNum x) { return mju_isBad(x) != 0; };
+  if (self.call_ != RawCall::kReset && (std::any_of(d->qpos, d->qpos + m->nq, is_bad) ||
+                                        std::any_of(d->qvel, d->qvel + m->nv, is_bad))) {
+    self.show_diverged(m, d, w);
+    scene::drop_warnings(false);
+    return orders_before(argument);
+  }
   switch (self.call_) {
     case RawCall::kStep:
       if (!can_split_step(m)) {

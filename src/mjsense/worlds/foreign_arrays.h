@@ -91,6 +91,7 @@ class ForeignArrays {
   bool take(mjData* d, int w);
   void step_in_scratch(const mjModel* m, mjData* d, int w);
   void show(const mjData* d, int w);
+  void show_diverged(const mjModel* m, mjData* d, int w);
   void show_contacts(const mjModel* m, int w) const;
   void fill_scratch();
   void take_model();
