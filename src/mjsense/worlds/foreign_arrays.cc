@@ -5,6 +5,7 @@
 #include <mujoco/mjxmacro.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <initializer_list>
 #include <limits>
@@ -66,7 +67,8 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
   X(mjtNum, margin)
   X(mjtNum, D)
   X(mjtNum, vel)
-  X(mjtNum, aref) X(mjtNum, frictionloss) X(mjtNum, force)
+  X(mjtNum, aref)
+  X(mjtNum, frictionloss) X(mjtNum, force)
 #undef X
 #undef FIELD
       return std::nullopt;
@@ -132,13 +134,22 @@ void show_elements(const void* from, DType type, void* to, DType theirs, std::in
   std::memcpy(to, from, n * dtype_size(theirs));
 }
 
+template <class T>
+bool same_bits(T a, T b) {
+  if constexpr (std::is_same_v<T, float>) {
+    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
+  } else {
+    return a == b;
+  }
+}
+
 template <class To, class From>
 void take_changed(const void* now, const void* seen, void* to, std::int64_t n) {
   const auto* source = static_cast<const From*>(now);
   const auto* old = static_cast<const From*>(seen);
   auto* target = static_cast<To*>(to);
   for (std::int64_t i = 0; i < n; ++i) {
-    if (std::memcmp(source + i, old + i, sizeof(From)) != 0) target[i] = static_cast<To>(source[i]);
+    if (!same_bits(source[i], old[i])) target[i] = static_cast<To>(source[i]);
   }
 }
 
