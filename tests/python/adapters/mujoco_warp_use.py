@@ -9,6 +9,7 @@ PAGE is docs/mujoco_warp.md, whose example runs, and whose list of fields that s
 import copy
 import re
 import sys
+import threading
 from pathlib import Path
 
 import mujoco
@@ -182,12 +183,24 @@ mjw.step(*called)
 assert (called[1].ctrl.numpy() == 0.5).all()
 assert id(called[1]) not in compat._worlds
 
+# Two simulations in two threads.
+pairs, alone = [start(), start()], start()
+runs = [threading.Thread(target=lambda pair=pair: [mjw.step(*pair) for _ in range(50)]) for pair in pairs]
+for run in runs:
+    run.start()
+for run in runs:
+    run.join()
+for _ in range(50):
+    mjw.step(*alone)
+for _, data in pairs:
+    np.testing.assert_array_equal(data.qpos.numpy(), alone[1].qpos.numpy())
+
 (code,) = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)[:1]
 program = {}
 exec(code, program)
 assert np.isfinite(program["data"].qpos.numpy()).all()
 kept = len(compat._worlds), len(compat._models)
-program = few = called = None
+program = few = called = pairs = alone = None
 import gc
 
 gc.collect()
