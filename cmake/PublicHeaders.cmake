@@ -58,6 +58,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scene/terrain.h
   mjsense/sensors/builtin/builtin_sensor.h
   mjsense/sensors/camera/camera_sensor_cfg.h
+  mjsense/sensors/camera/image_cfg.h
   mjsense/sensors/contact/contact_match.h
   mjsense/sensors/contact/contact_memory.h
   mjsense/sensors/contact/contact_reading.h

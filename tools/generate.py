@@ -18,7 +18,7 @@ import runpy
 import sys
 import textwrap
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python" / "mjsense"
@@ -96,14 +96,30 @@ from mjsense.core.field_docs import show_field_docs
 from mjsense.core.sensor_data import SensorData, make_data
 '''
 
-# Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).
+
+class Signature(NamedTuple):
+    """The part of a function's signature and docstring that lists options."""
+
+    struct: str
+    skipped: tuple[str, ...] = ()  # options that are other parameters, or are not offered
+    renamed: dict[str, str] = {}
+    defaults: dict[str, str] = {}
+    more: dict[str, str] = {}  # additions to the texts
+
+
 SIGNATURES = {
-    "tasks/recording.py": ("RecordJobCfg", {}, {}, ("task", "robot", "policy", "scene", "out"), {}),
-    "tasks/vector.py": (
-        "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False", "seed": "None"}, ("task", "robot", "policy", "scene"),
+    "tasks/recording.py": Signature("RecordJobCfg", ("task", "robot", "policy", "scene", "out")),
+    "tasks/vector.py": Signature(
+        "RolloutCfg",
+        ("task", "robot", "policy", "scene"),
+        {"num_worlds": "num_envs"},
+        {"num_worlds": "1", "action_noise": "False", "seed": "None"},
         {"seed": " None: a random seed, so that every environment has other episodes."},
     ),
-}  # fmt: skip
+}
+
+# Options of functions and commands, which have no dataclass.
+OPTION_STRUCTS = {"RecordJobCfg", "RolloutCfg", "ImageCfg", "RgbCfg"}
 
 # Options of the program: its structs, with the parameters that have another name in Python. Names that options accept are listed too.
 OPTIONS = {
@@ -328,7 +344,7 @@ class Generator:
     def python(self, module: str) -> str:
         # EffectSensorCfg too is derived from SensorCfg, in configs, which imports effects.
         own = {n: "configs" if s.get("bases") else s["module"] or "configs" for n, s in self.structs.items()}
-        wanted = [n for n in own if own[n] == module and "." not in n and n not in ("RecordJobCfg", "RolloutCfg", "VideoCfg")]
+        wanted = [n for n in own if own[n] == module and "." not in n and n not in OPTION_STRUCTS]
         done: set[str] = set()
         parts: list[str] = []
 
@@ -372,19 +388,20 @@ class Generator:
     # --------------------------------------------------------------------------------------------------- signatures
 
     def signature(self, text: str, name: str) -> str:
-        struct, renamed, defaults, skipped, more = SIGNATURES[name]
+        struct, skipped, renamed, defaults, more = SIGNATURES[name]
         fields = [f for f in self.structs[struct]["fields"] if not f["hidden"] and f["name"] not in skipped]
+        inside, about = (re.search(rf"^( +){mark}$", text, re.MULTILINE)[1] for mark in ("# options of a recording", "Options:"))
         lines, args = [], []
         for f in fields:
             parameter = renamed.get(f["name"], f["name"])
             default = defaults.get(f["name"], self.default(f["type"], f["default"], f))
             annotation = "Seed" if f["type"]["kind"] == "unsigned" else self.annotation(f["type"], f)
             annotation += " | None" if default == "None" and "None" not in annotation else ""
-            lines.append(f"    {parameter}: {annotation} = {default},\n")
-            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}{more.get(f['name'], '')}", WIDTH, initial_indent=" " * 8,
-                                                subsequent_indent=" " * 12)) + "\n")  # fmt: skip
-        text = between(text, "    # options of a recording", "    # end of options", "".join(lines))
-        return between(text, "        Options:", "        Others:", "".join(args))
+            lines.append(f"{inside}{parameter}: {annotation} = {default},\n")
+            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}{more.get(f['name'], '')}", WIDTH, initial_indent=about,
+                                                subsequent_indent=about + " " * 4)) + "\n")  # fmt: skip
+        text = between(text, f"{inside}# options of a recording", f"{inside}# end of options", "".join(lines))
+        return between(text, f"{about}Options:", f"{about}Others:", "".join(args))
 
     # --------------------------------------------------------------------------------------------------------- docs
 

@@ -186,6 +186,8 @@ const Schema& schema() {
     schema.add(struct_of<tasks::scenes::SceneFileCfg>());
     schema.add(struct_of<tasks::rollout::RecordJobCfg>());
     schema.add(struct_of<tasks::rollout::RolloutCfg>());
+    schema.add(struct_of<sensors::ImageCfg>());
+    schema.add(struct_of<sensors::RgbCfg>());
     return schema;
   }();
   return kSchema;

@@ -57,6 +57,7 @@
 #include "mjsense/scene/terrain.h"
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
+#include "mjsense/sensors/camera/image_cfg.h"
 #include "mjsense/sensors/contact/contact_match.h"
 #include "mjsense/sensors/contact/contact_memory.h"
 #include "mjsense/sensors/contact/contact_reading.h"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense.core.declared_fields import declared_fields
 from mjsense.core.installed_files import use_installed_meshes
 from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
@@ -64,7 +65,7 @@ class _Rebuilt:
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
         settings = episode._recording.settings
         cameras = settings["cameras"]
-        options = {key: settings[key] for key in _core.rollout_options() if key in settings}
+        options = {key: settings[key] for key in declared_fields("RolloutCfg") if key in settings}
         options |= {
             "policy": "",
             "replay_sensor": True,
