@@ -100,6 +100,15 @@ def test_every_image_option_is_kept(option, tmp_path):
     assert videos(tmp_path / "back") == made["usual"]
 
 
+def test_options_of_files_are_as_recorded_unless_they_are_given(recorded, tmp_path):
+    before = mjs.Dataset(recorded).episodes[0]._recording
+    mjs.render(recorded, tmp_path / "videos", keyint=3)
+    mjs.render(recorded, tmp_path / "arrays", gzip=1)
+    encoded, copied = (mjs.Dataset(tmp_path / name).episodes[0]._recording for name in ("videos", "arrays"))
+    assert (encoded.video, encoded.gzip, copied.gzip) == (before.video | {"keyint": 3}, before.gzip, 1)
+    assert videos(tmp_path / "arrays") == videos(recorded) != videos(tmp_path / "videos")
+
+
 @pytest.mark.parametrize(
     "task, robot", (("open", "i2rt_yam"), ("nav_to_obj", "rby1"), ("packing", "franka"), ("pick", "floating_rum"))
 )
@@ -359,7 +368,7 @@ def test_errors(recorded, tmp_path):
         (dict(add_cameras={"top": {**TOP, "body": "hand"}}), "hand"),
         (dict(add_cameras={"wrist_camera": TOP}), "two cameras are named 'wrist_camera'"),
         (dict(camera_system="droit"), "droid"),
-        (dict(brightness=0.0), "brightness is 0.0: must be positive"),
+        (dict(brightness=0.0), "brightness is 0: must be above 0"),
         (dict(num_worlds=0), "worlds is 0: must be at least 1"),
         (dict(sensors=[mjs.ContactSensorCfg(name="c", primary=mjs.ContactMatch("body", "robot_0/base"), track_air_time=True)]),
          "sensor 'c' depends on the physics steps between observations"),

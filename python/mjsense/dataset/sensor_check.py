@@ -27,7 +27,7 @@ from mjsense.dataset.model_fields import ReplayInputs
 from mjsense.dataset.places import open_plain
 from mjsense.dataset.playback import fields_of, inputs_of
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
-from mjsense.recording.recorder import FILE_OPTIONS, recorded_sensors
+from mjsense.recording.recorder import recorded_sensors
 from mjsense.scene.physics_options import PREFIX
 from mjsense.scene.randomizable import field_of
 from mjsense.sim.simulation import Simulation
@@ -184,7 +184,7 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     first = episodes[0]
     rate = Fraction(first.fps)
     video = first._recording.video or {}
-    options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
+    options = {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
     recorder = _core.Recorder(
         worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options
     )

@@ -48,15 +48,9 @@ def record(
     terminate_upon_success: bool = False,
     max_penetration: float | None = None,
     episodes: int = 1,
-    max_attempts: int = 0,
-    num_attempts: int = 0,
-    first_attempt: int = 0,
-    shard: str = "",
-    keep_failures: bool = False,
     resume: bool = False,
     append: bool = False,
     overwrite: bool = False,
-    replay: bool = True,
     house: int = 0,
     batches: int = 0,
     gzip: int = 4,
@@ -66,6 +60,12 @@ def record(
     tune: str = "fastdecode",
     keyint: int = 20,
     molmospaces_depth: bool = False,
+    max_attempts: int = 0,
+    num_attempts: int = 0,
+    first_attempt: int = 0,
+    shard: str = "",
+    keep_failures: bool = False,
+    replay: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     format: str = "mjsense",
@@ -122,17 +122,11 @@ def record(
             any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
             deeper at the start do not count. [m]
         episodes: Number of episodes to keep.
-        max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
-        num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
-        first_attempt: Number of the first attempt.
-        shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
-            directory; requires ``num_attempts``, the number of attempts of all shards.
-        keep_failures: Keep failed episodes too.
         resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
         append: Add new episodes to a completed recording; all settings that affect the data must be unchanged.
         overwrite: Replace an existing recording of this house.
-        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
-        house: Number of the ``house_N`` folder in the output directory. Each house has its own random numbers.
+        house: Number of the ``house_N`` folder in the output directory. Each house of a task has its own random
+            numbers.
         batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
         gzip: Compression level of arrays, 0 to 9.
         ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
@@ -143,6 +137,13 @@ def record(
         keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+        max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
+        num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
+        first_attempt: Number of the first attempt.
+        shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
+            directory; requires ``num_attempts``, the number of attempts of all shards.
+        keep_failures: Keep failed episodes too.
+        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
         Others:
         sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
