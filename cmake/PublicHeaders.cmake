@@ -47,8 +47,10 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/rays/ray_geom.h
   mjsense/rays/ray_scene.h
   mjsense/rays/ray_world.h
+  mjsense/record/files_cfg.h
   mjsense/record/recorder.h
   mjsense/record/recording.h
+  mjsense/record/video_cfg.h
   mjsense/replay/recording_tools.h
   mjsense/scene/default_lighting.h
   mjsense/scene/entity.h
@@ -58,6 +60,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scene/terrain.h
   mjsense/sensors/builtin/builtin_sensor.h
   mjsense/sensors/camera/camera_sensor_cfg.h
+  mjsense/sensors/camera/image_cfg.h
   mjsense/sensors/contact/contact_match.h
   mjsense/sensors/contact/contact_memory.h
   mjsense/sensors/contact/contact_reading.h

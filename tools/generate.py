@@ -18,7 +18,7 @@ import runpy
 import sys
 import textwrap
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python" / "mjsense"
@@ -96,23 +96,54 @@ from mjsense.core.field_docs import show_field_docs
 from mjsense.core.sensor_data import SensorData, make_data
 '''
 
-# Signatures with the options of a recording: file -> (struct, renamed parameters, different defaults, positional parameters, additions to texts).
+
+class Signature(NamedTuple):
+    """The part of a function's signature and docstring that lists options."""
+
+    structs: tuple[str, ...]
+    skipped: tuple[str, ...] = ()  # options that are other parameters, or are not offered
+    renamed: dict[str, str] = {}
+    defaults: dict[str, str] = {}
+    more: dict[str, str] = {}  # additions to the texts
+
+
+# Options that follow from what is rendered or imported.
+OF_RECORDING = ("episodes", "append", "overwrite", "house")
+OF_IMPORT = (*OF_RECORDING, "resume", "molmospaces_depth")
+
 SIGNATURES = {
-    "tasks/recording.py": ("RecordJobCfg", {}, {}, ("task", "robot", "policy", "scene", "out"), {}),
-    "tasks/vector.py": (
-        "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False", "seed": "None"}, ("task", "robot", "policy", "scene"),
+    "tasks/recording.py": Signature(("RecordJobCfg",), ("task", "robot", "policy", "scene", "out")),
+    "tasks/vector.py": Signature(
+        ("RolloutCfg",),
+        ("task", "robot", "policy", "scene"),
+        {"num_worlds": "num_envs"},
+        {"num_worlds": "1", "action_noise": "False", "seed": "None"},
         {"seed": " None: a random seed, so that every environment has other episodes."},
     ),
-}  # fmt: skip
+    "tasks/teleoperation/teleoperation.py": Signature(("FilesCfg", "ImageCfg")),
+    "recording/recorder.py": Signature(("FilesCfg",)),
+    "recording/record_episodes.py": Signature(("FilesCfg",), ("episodes", "append", "overwrite")),
+    "dataset/rendering.py": Signature(("RenderCfg",), OF_RECORDING),
+    "dataset/import_lerobot.py": Signature(("FilesCfg",), OF_IMPORT, defaults={"crf": "18"}),
+    "dataset/import_robomimic.py": Signature(("FilesCfg",), OF_IMPORT),
+}
+
+# Options of functions and commands, which have no dataclass.
+OPTION_STRUCTS = {"RecordJobCfg", "RolloutCfg", "RenderCfg", "ImageCfg", "RgbCfg", "FilesCfg", "VideoCfg"}
 
 # Options of the program: its structs, with the parameters that have another name in Python. Names that options accept are listed too.
 OPTIONS = {
     "RecordJobCfg": {"num_worlds": "worlds"},
     "RolloutCfg": {"num_worlds": "worlds"},
+    "RenderCfg": {},
+    "FilesCfg": {},
+    "ImageCfg": {},
     "LidarSensorCfg": {},
     "SpinningScanCfg": {},
     "TableScanCfg": {},
 }
+# Options that commands without --set do not offer; nor do they offer hidden ones.
+NOT_OFFERED = {"RenderCfg": OF_RECORDING, "FilesCfg": (), "ImageCfg": ()}
 TABLE = '''# SPDX-License-Identifier: Apache-2.0
 """Options of the program that are fields of configurations, and the names that they accept. The program shows its help and checks its
 arguments before it loads the library.
@@ -223,6 +254,11 @@ class Generator:
         self.data_of_kind: dict[str, str] = schema["data_of_kind"]
         self.names: dict[str, list[str]] = schema["names"]
         self.methods = methods()
+        images = {f["name"] for part in ("ImageCfg", "VideoCfg") for f in self.structs[part]["fields"]} - {"ffmpeg"}
+        for f in self.structs["RenderCfg"]["fields"]:
+            if f["name"] in {*images, "brightness", "gzip"} and f["type"]["kind"] != "optional":
+                f["type"] = {"kind": "optional", "element": f["type"]}
+                f |= {"default": None, "doc": f["doc"] + " By default as recorded."}
         # Bases that the schema does not list as structs, such as SensorCfg.
         for struct in list(self.structs.values()):
             for i, base in enumerate(struct.get("bases", [])):
@@ -328,7 +364,7 @@ class Generator:
     def python(self, module: str) -> str:
         # EffectSensorCfg too is derived from SensorCfg, in configs, which imports effects.
         own = {n: "configs" if s.get("bases") else s["module"] or "configs" for n, s in self.structs.items()}
-        wanted = [n for n in own if own[n] == module and "." not in n and n not in ("RecordJobCfg", "RolloutCfg", "VideoCfg")]
+        wanted = [n for n in own if own[n] == module and "." not in n and n not in OPTION_STRUCTS]
         done: set[str] = set()
         parts: list[str] = []
 
@@ -372,19 +408,20 @@ class Generator:
     # --------------------------------------------------------------------------------------------------- signatures
 
     def signature(self, text: str, name: str) -> str:
-        struct, renamed, defaults, skipped, more = SIGNATURES[name]
-        fields = [f for f in self.structs[struct]["fields"] if not f["hidden"] and f["name"] not in skipped]
+        structs, skipped, renamed, defaults, more = SIGNATURES[name]
+        fields = [f for one in structs for f in self.structs[one]["fields"] if not f["hidden"] and f["name"] not in skipped]
+        inside, about = (re.findall(rf"^( +){mark}$", text, re.MULTILINE)[0] for mark in ("# options of a recording", "Options:"))
         lines, args = [], []
         for f in fields:
             parameter = renamed.get(f["name"], f["name"])
             default = defaults.get(f["name"], self.default(f["type"], f["default"], f))
             annotation = "Seed" if f["type"]["kind"] == "unsigned" else self.annotation(f["type"], f)
             annotation += " | None" if default == "None" and "None" not in annotation else ""
-            lines.append(f"    {parameter}: {annotation} = {default},\n")
-            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}{more.get(f['name'], '')}", WIDTH, initial_indent=" " * 8,
-                                                subsequent_indent=" " * 12)) + "\n")  # fmt: skip
-        text = between(text, "    # options of a recording", "    # end of options", "".join(lines))
-        return between(text, "        Options:", "        Others:", "".join(args))
+            lines.append(f"{inside}{parameter}: {annotation} = {default},\n")
+            args.append("\n".join(textwrap.wrap(f"{parameter}: {field_text(f)}{more.get(f['name'], '')}", WIDTH, initial_indent=about,
+                                                subsequent_indent=about + " " * 4)) + "\n")  # fmt: skip
+        text = between(text, f"{inside}# options of a recording", f"{inside}# end of options", "".join(lines))
+        return between(text, f"{about}Options:", f"{about}Others:", "".join(args))
 
     # --------------------------------------------------------------------------------------------------------- docs
 
@@ -431,11 +468,16 @@ class Generator:
         ]
         return "| field | rows | unit | |\n| --- | --- | --- | --- |\n" + "".join(rows)
 
+    def offered(self, struct: str) -> list[dict[str, Any]]:
+        """The fields that are options of a command."""
+        fields, left_out = self.structs[struct]["fields"], NOT_OFFERED.get(struct)
+        return fields if left_out is None else [f for f in fields if not f["hidden"] and f["name"] not in left_out]
+
     def option_table(self, name: str) -> str:
         rows = []
-        for f in self.structs[name]["fields"]:
+        for f in self.offered(name):
             option, default, text = f["option"].replace("_", "-"), f["default"], markdown(field_text(f))
-            if f["type"]["kind"] == "bool":
+            if "bool" in (f["type"]["kind"], f["type"].get("element", {}).get("kind")):
                 shown = f"--no-{option}" if default else f"--{option}"
                 text = f"Do not {text[0].lower()}{text[1:]}" if default and not f["hidden"] else text
                 default = ""
@@ -454,9 +496,7 @@ class Generator:
     def program_table(self) -> str:
         structs = ""
         for struct, renamed in OPTIONS.items():
-            rows = [
-                self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.structs[struct]["fields"] if "type" in f
-            ]
+            rows = [self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.offered(struct) if "type" in f]
             structs += f"    {quoted(struct)}: [\n" + "".join(row for row in rows if row) + "    ],\n"
         names = self.names
         return TABLE % (NOTE, structs, "".join(f"    {quoted(kind)}: {json.dumps(known)},\n" for kind, known in names.items()))
@@ -477,7 +517,8 @@ class Generator:
         shown = (
             "" if default is None or kind == "bool" else ",".join(map(short, default)) or "none" if is_list else short(default)
         )
-        more = {"words": f["words"] or t.get("words") or [], "default": shown, "is_list": is_list, "is_on": default is True, "hidden": f["hidden"],
+        more = {"words": f["words"] or t.get("words") or [], "default": shown, "is_list": is_list, "is_on": default is True,
+                "is_either": kind == "bool" and default is None, "hidden": f["hidden"],
                 "low": f.get("low"), "high": f.get("high"), "above_low": f["above_low"]}  # fmt: skip
         given = "".join(
             f", {name}={value!r}" for name, value in more.items() if not (value is None or value is False or value in ("", []))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from mjsense.core.declared_fields import declared_fields
 from mjsense.dataset import bounded_json
 from mjsense.dataset.limits import DESCRIPTION_BYTES, IMAGE_PIXELS, IMAGE_SIDE, PERIOD_MS, RATE_DIGITS, RATES, TEXT_BYTES
 from mjsense.dataset.places import is_plain_name, printable
@@ -68,6 +69,17 @@ def _is_finite(v: Any) -> bool:
     return isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) < 1e300
 
 
+def _declared(option: dict[str, Any]) -> tuple[Check, str]:
+    """The rule of an option that is a number, from its declaration."""
+    kind, low, high = option["type"]["kind"], option.get("low", -1e300), option.get("high", 1e300)
+
+    def check(v: Any) -> bool:
+        is_of_kind = isinstance(v, int) or kind != "int"
+        return _is_finite(v) and is_of_kind and low <= v <= high and not (option["above_low"] and v == low)
+
+    return check, f"a{' whole' if kind == 'int' else ''} number from {low:g} to {high:g}"
+
+
 _BOOL: tuple[Check, str] = (lambda v: isinstance(v, bool), "true or false")
 _TEXT: tuple[Check, str] = (lambda v: isinstance(v, str) and len(v) <= TEXT_BYTES, f"a text of at most {TEXT_BYTES} characters")
 _NAME: tuple[Check, str] = (lambda v: isinstance(v, str) and is_plain_name(v), "a plain name, without a folder")
@@ -91,8 +103,6 @@ _VIDEO: dict[str, tuple[Check, str]] = {
 _SETTINGS: dict[str, tuple[Check, str]] = {
     "policy_dt_ms": _between(0, PERIOD_MS),
     "shadows": _BOOL,
-    "samples": _whole(1, 4096),
-    "shadow_samples": _whole(1, 4096),
     "meshes": _word(("shapes", "real", "auto")),
     "robot": _TEXT,
     "task": _TEXT,
@@ -210,7 +220,8 @@ def _checked_settings(what: str, settings: dict[str, Any]) -> dict[str, Any]:
                 _check(what, name or key, value, rule)
             known.pop(key, None)
 
-    for key, rule in _SETTINGS.items():
+    colours = {name: _declared(field) for name, field in declared_fields("RgbCfg").items()}
+    for key, rule in (_SETTINGS | colours).items():
         if key in known:
             check(key, known[key], rule)
     if "brightness" in known.get("render", {}):
