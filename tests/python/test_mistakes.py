@@ -162,6 +162,14 @@ CASES = {
         lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef("body", "ball"), pattern="grid"),
         ["RayCastSensorCfg 'r'", "pattern", "GridPatternCfg", "'grid'"],
     ),
+    "a class for a pattern": (
+        lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef("body", "ball"), pattern=mjs.GridPatternCfg),
+        ["RayCastSensorCfg 'r'", "pattern", "the class GridPatternCfg", "write GridPatternCfg(...)"],
+    ),
+    "a class for a reference": (
+        lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef),
+        ["RayCastSensorCfg 'r'", "frame must be", "the class ObjRef", "write ObjRef(...)"],
+    ),
     "text for a reference": (lambda u: mjs.RayCastSensorCfg(name="r", frame="ball"), ["RayCastSensorCfg 'r'", "frame", "ObjRef", "'ball'"]),
     "distance of rays": (
         lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef("body", "ball"), max_distance=-1),

@@ -146,6 +146,7 @@ class Description:
         """
         what = f"{where}: the attribute 'recording'"
         table = bounded_json.parse_object(text, what, DESCRIPTION_BYTES)
+        _check_finite(what, table)
         archive, settings, video = table.get("model_archive", ""), table.get("settings", {}), table.get("video")
         if archive != "":
             _check(what, "model_archive", archive, _NAME)
@@ -156,7 +157,6 @@ class Description:
             _check(what, "video", video, _TABLE)
             chosen = {"tune": "", **_chosen(what, "video", video, _VIDEO)}  # recordings of older versions have no tuning
             chosen = {"encoder_threads" if key == "threads" else key: value for key, value in chosen.items()}
-        _check_finite(f"{what}: settings", settings)
         known = _checked_settings(f"{what}: settings", settings)
         provenance = {key: table[key] for key in _PROVENANCE if key in table}
         if video is not None:
@@ -239,7 +239,7 @@ def _check_finite(what: str, value: Any) -> None:
         for inner in value:
             _check_finite(what, inner)
     elif isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{what} contain the number {value}; all numbers must be finite")
+        raise ValueError(f"{what} contains the number {value}; all numbers must be finite")
 
 
 def _chosen(what: str, place: str, table: dict[str, Any], rules: dict[str, tuple[Check, str]]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from mjsense.core.progress_line import line_of
 from mjsense.dataset import bounded_json, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.hdf5 import open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
@@ -219,7 +219,7 @@ class _House:
 
     def _finish(self, world: int, episode: Episode) -> None:
         with open_h5(episode.path) as file:
-            scene = text_of(file[episode.trajectory]["obs_scene"].read())
+            scene = file[episode.trajectory]["obs_scene"].text()
             bounded_json.require_standard(scene, f"{episode.path} {episode.trajectory}/obs_scene")
         self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
         self._recorder.finish_episode(world, scene, episode.outcome)
