@@ -22,11 +22,11 @@ struct TileBox {
 // arrays list the pixels of packet 0 first; members are as in Hits of the kernels.
 struct alignas(64) FixedTile {
   static constexpr int kPixels = kTileSize * kTileSize;
-  float t[kPixels];              // planar depth, m
+  float t[kPixels];              // planar depth, m; infinity: no hit
   float u[kPixels], v[kPixels];  // barycentric coordinates in triangles
-  float n[3][kPixels];           // normal of the triangle
+  float n[3][kPixels];           // normal of the triangle, geom frame, any length
   int id[kPixels];               // ViewGeom::id, or -1
-  int prim[kPixels];             // triangle
+  int prim[kPixels];             // triangle of a mesh; -1 for the walls of a height field
   float rgb[3][kPixels];         // colour where no other geom casts a shadow, 0..1
   // By light and packet: a bit for each pixel that the light does not reach, because a fixed geom
   // shadows it or it faces away.
