@@ -235,7 +235,8 @@ def test_vector_environments(tmp_path, kind, mode):
     env = kind([lambda n=n: Counter(n) for n in lengths], autoreset_mode=mode)
     cameras = {} if mode == AutoresetMode.SAME_STEP else {"view": "render"}
     env = mjs.RecordEpisodes(env, tmp_path, 6, cameras=cameras)
-    assert isinstance(env, mjs.recording.RecordVectorEpisodes)
+    assert isinstance(env, mjs.recording.RecordVectorEpisodes) and isinstance(env, mjs.RecordEpisodes)
+    assert not isinstance(env.env, mjs.RecordEpisodes)
     env.reset(seed=5)
     for step in range(100):
         if env.recording.complete:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABCMeta
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import partial
@@ -106,12 +107,13 @@ class _Recorded:
 
 
 @checked
-class RecordEpisodes(_Recorded, gymnasium.Wrapper):
+class RecordEpisodes(_Recorded, gymnasium.Wrapper, metaclass=ABCMeta):  # RecordVectorEpisodes is registered as a virtual subclass
     """Records the episodes of a Gymnasium environment, MuJoCo or not, to the files of :func:`mjsense.record`::
 
         env = mjs.RecordEpisodes(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"), "data", episodes=10, cameras={"view": "render"})
 
-    Given a ``gymnasium.vector.VectorEnv``, it returns a :class:`RecordVectorEpisodes`, which does the same for all its environments.
+    Given a ``gymnasium.vector.VectorEnv``, it returns a :class:`RecordVectorEpisodes`, which does the same for all its environments,
+    and which ``isinstance`` regards as a ``RecordEpisodes``.
 
     Recorded are the observation, as ``observation`` or one stream for each entry of a dict or tuple, the action that led to it, the reward,
     ``terminated``, ``truncated``, all infos that JSON can express, the cameras and the sensors. A finished episode is safe on disk. When
@@ -200,3 +202,6 @@ class RecordVectorEpisodes(_Recorded, VectorWrapper):
         """Publishes the recording and closes the environments."""
         self.recording.close()
         self.env.close(**kwargs)
+
+
+RecordEpisodes.register(RecordVectorEpisodes)

@@ -14,6 +14,7 @@ from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds
 from mjsense.core.declared_fields import given_options
+from mjsense.core.old_names import old_order
 from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.sensor import Sensor
 from mjsense.sensors.suite import SensorSuite, add_missing
@@ -35,11 +36,17 @@ class WarpSimulation(Protocol):
     def _host_rows(self, sensors: Sequence[Any]) -> Any: ...
 
 
+@old_order(
+    "Recorder(out, simulation, ...)",
+    "Recorder(simulation, out, ...)",
+    ("out", "simulation", "sensors"),
+    lambda given: isinstance(given[0], (str, Path)),
+)
 @checked
 class Recorder(KnownAttributes):
     """Records sensors row by row to the same files as :func:`mjsense.record`::
 
-        with mjs.Recorder("data", sim, sensors, episodes=2) as recorder:
+        with mjs.Recorder(sim, "data", sensors, episodes=2) as recorder:
             recorder.begin_episode(world=0, episode=0)
             recorder.append([0])                     # the observation after the reset
             for _ in range(100):
@@ -54,8 +61,8 @@ class Recorder(KnownAttributes):
 
     def __init__(
         self,
-        out: str | Path,
         simulation: Simulation | WarpSimulation,
+        out: str | Path,
         sensors: Iterable[Any] | None = None,
         *,
         # options of a recording
@@ -78,9 +85,9 @@ class Recorder(KnownAttributes):
     ) -> None:
         """
         Args:
-            out: Output directory; the files are in ``out/house_<house>/``.
             simulation: The simulation to record. With ``backend="warp"`` the rows come to the host in one transfer for each
                 ``append()``, and the recording cannot be replayed.
+            out: Output directory; the files are in ``out/house_<house>/``.
             sensors: A :class:`SensorSuite` or sensors, in the order of the files; by default all of the scene. A camera becomes
                 videos of its ``rgb`` and ``depth`` and arrays ``<camera>_<field>`` of its other fields. User-defined sensors need
                 an ``observation_space`` or ``is_dict``.
@@ -110,7 +117,8 @@ class Recorder(KnownAttributes):
         options = given_options("FilesCfg", locals())
         chosen, handles = recorded_sensors(simulation, sensors)
         self._simulation = simulation
-        self._rows = None if isinstance(simulation, Simulation) else simulation._host_rows(chosen)
+        host_rows = getattr(simulation, "_host_rows", None)  # only WarpSimulation has it
+        self._rows = host_rows(chosen) if host_rows else None
         rate = _rate(fps, simulation)
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
         self._core = _core.Recorder(

@@ -274,6 +274,7 @@ class Rollout {
   void refuse_deep_contacts(std::span<const int> worlds);
   void finish_rows();
   bool guard_rows(const std::function<void()>& body);
+  void repeat_until_complete(const std::function<void()>& body);
   void sense();
   void take_failures();
   void check_speeds(std::span<const int> worlds);
