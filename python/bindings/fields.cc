@@ -25,7 +25,7 @@ std::string context_of(nb::handle config) {
   return context;
 }
 
-// Empty for a class: its attributes are the defaults of its fields, which nobody has asked for.
+// Empty for a class: its attributes are the defaults of its fields, not values that were given.
 std::string kind_of(nb::handle config) {
   if (nb::isinstance<nb::type_object>(config)) return "";
   nb::object kind = nb::getattr(config, "kind", nb::none());

@@ -438,7 +438,7 @@ def test_a_text_of_numbers_is_named(root, tmp_path):
         del file["traj_0/obs_scene"]
         file["traj_0"].create_dataset("obs_scene", data=np.array(-1))
     with pytest.raises(ValueError, match=r"\.h5 traj_0/obs_scene is of the type int64; it must be a text$"):
-        mjs.Dataset(root).episodes[0].obs_scene  # noqa: B018
+        mjs.Dataset(root).episodes[0].obs_scene
 
 
 def test_a_description_leaves_room_for_that_of_a_rendering(root):

@@ -76,7 +76,7 @@ def test_warp_is_imported_only_if_asked_for():
 def test_it_is_a_simulation():
     sim = simulation()
     assert isinstance(sim, mjs.Simulation)
-    with pytest.raises(NotImplementedError, match="Simulation.draw is not available with backend='warp'"):
+    with pytest.raises(NotImplementedError, match=r"Simulation\.draw is not available with backend='warp'"):
         sim.draw
 
 
