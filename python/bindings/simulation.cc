@@ -23,6 +23,7 @@
 #include "python/bindings/bindings.h"
 #include "python/bindings/data_copies.h"
 #include "python/bindings/derived_field.h"
+#include "python/bindings/foreign_arrays.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/py_simulation.h"
 #include "python/bindings/sensor_handle.h"
@@ -184,6 +185,7 @@ nb::tuple draw(PySimulation& self, int world, nb::list handles) {
 }  // namespace
 
 void bind_simulation(nb::module_& m) {
+  bind_foreign_arrays(m);
   nb::class_<PySimulation>(m, "Simulation", "The C++ simulation.")
       .def(nb::init<std::shared_ptr<scene::Scene>, int, int, int, std::uint64_t>(),
            nb::arg("scene"), nb::arg("num_worlds"), nb::arg("decimation"), nb::arg("threads"),

@@ -142,6 +142,25 @@ def test_code_of_the_page_on_mjlab_gives_the_same_with_mjlab_itself(environment)
     run(environment("mjlab"), Path(__file__).parent / "adapters/mjlab_page.py", ROOT / "docs/mjlab.md")
 
 
+@pytest.mark.parametrize("name", ["mjlab", "warp"])
+def test_mujoco_warp_is_stepped_by_mujoco(environment, name):
+    run(environment(name), Path(__file__).parent / "adapters/mujoco_warp_use.py", ROOT / "docs/mujoco_warp.md")
+
+
+def test_environments_of_mjlab(environment):
+    run(environment("mjlab"), Path(__file__).parent / "adapters/mjlab_use.py")
+
+
+def test_scripts_of_mjlab(environment, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("WANDB_MODE", "disabled")
+    python, program = environment("mjlab"), ("-m", "mjsense.compat.mjlab")
+    run(python, *program, "list_envs")
+    options = ("--env.scene.num-envs", "4", "--agent.max-iterations", "2", "--agent.logger", "tensorboard")
+    run(python, *program, "train", "Mjlab-Cartpole-Balance", *options)
+    assert [*tmp_path.glob("logs/rsl_rl/*/*/model_*.pt")]
+
+
 def test_gym_hil(environment):
     run(environment("programs"), Path(__file__).parent / "adapters/gym_hil_images.py")
 

@@ -85,7 +85,7 @@ def test_python(page, tmp_path, monkeypatch):
         if re.search(rf"^\s*(import|from) {name}\b", page.read_text(), re.MULTILINE):
             for module in (name, *OTHERS[name]):
                 monkeypatch.setitem(sys.modules, module, MagicMock())
-    if page.stem == "warp":
+    if page.stem in ("warp", "mujoco_warp"):
         pytest.importorskip("mujoco_warp")
     for name, format in FORMATS.items():
         if f"export_{name}(" in page.read_text() or f'format="{name}"' in page.read_text():

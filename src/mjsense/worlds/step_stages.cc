@@ -24,9 +24,9 @@ void position_and_velocity(const mjModel* m, mjData* d, bool sensors) {
   if (sensors) mj_sensorVel(m, d);
 }
 
-void step_from(mjtStage stage, const mjModel* m, mjData* d) {
-  if (stage < mjSTAGE_VEL) position_and_velocity(m, d, false);
-  if (stage < mjSTAGE_ACC) mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
+void step_from(mjtStage stage, const mjModel* m, mjData* d, bool sensors) {
+  if (stage < mjSTAGE_VEL) position_and_velocity(m, d, sensors);
+  if (stage < mjSTAGE_ACC) mj_forwardSkip(m, d, mjSTAGE_VEL, !sensors);
   mj_checkAcc(m, d);
   switch (m->opt.integrator) {
     case mjINT_EULER:

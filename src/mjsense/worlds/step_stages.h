@@ -17,9 +17,10 @@ bool can_split_step(const mjModel* m);
 // <flag energy="enable"/>, MuJoCo's e_kinetic reports the energy of the previous forward.
 void position_and_velocity(const mjModel* m, mjData* d, bool sensors);
 
-// mj_step from the stage that is already computed. MuJoCo's sensors are skipped, because they
-// cannot be read between the stages before the integration and those after it.
-void step_from(mjtStage stage, const mjModel* m, mjData* d);
+// mj_step from the stage that is already computed. Without `sensors`, MuJoCo's own are skipped: they
+// cannot be read between the stages before the integration and those after it. With them, those of the
+// stage that is already computed must be, too.
+void step_from(mjtStage stage, const mjModel* m, mjData* d, bool sensors = false);
 
 // mj_step as a whole. In the histories of MuJoCo's sensors, e_kinetic is the energy of the state at
 // which it was measured, as in position_and_velocity().

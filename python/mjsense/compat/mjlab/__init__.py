@@ -12,4 +12,30 @@ Sensors return torch tensors that share the sensors' memory, or NumPy arrays if 
 
 Not supported: managers, rewards and other parts of training, actuators that mjlab computes in Python, and sub-terrains not in its
 ``ROUGH_TERRAINS_CFG``. A configuration that names one of these raises an error.
+
+``use()`` is for whole programs of mjlab, which keep their imports.
 """
+
+TESTED = "1.6"
+"""The series of mjlab that ``use()`` is tested with."""
+
+
+def use(threads: int = 0) -> None:
+    """mjlab's environments on the CPU are stepped by mjsense from now on: ``mjsense.compat.mujoco_warp.use()``.
+
+    Call it before an environment is made.
+
+    Raises:
+        ImportError: If mjlab or mujoco_warp is not installed, or is of a version that was not tested.
+    """
+    import importlib.metadata
+
+    try:
+        version = importlib.metadata.version("mjlab")
+    except importlib.metadata.PackageNotFoundError:
+        raise ImportError("mjsense.compat.mjlab.use() needs the package mjlab: pip install mjlab") from None
+    if not version.startswith(f"{TESTED}."):
+        raise ImportError(f"mjsense.compat.mjlab.use() is tested with mjlab {TESTED}, and {version} is installed")
+    from mjsense.compat import mujoco_warp
+
+    mujoco_warp.use(threads)

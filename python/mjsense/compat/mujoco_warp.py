@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs that use mujoco_warp, with the physics of mjsense on the CPU.
+
+    mjsense.compat.mujoco_warp.use()
+    model = mujoco_warp.put_model(mj_model)
+    data = mujoco_warp.put_data(mj_model, mj_data, nworld=1024)
+    mujoco_warp.step(model, data)
+
+``step``, ``forward``, ``step1``, ``step2``, ``reset_data`` and ``rays`` then compute all worlds with MuJoCo and mjsense, on all cores, if the
+arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models with callbacks, they are
+mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import importlib.metadata
+import inspect
+import operator
+import sys
+import weakref
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _core
+from mjsense.sim import foreign_model
+from mjsense.sim.attached import _STATE
+
+try:
+    import mujoco_warp
+    import warp as wp
+except ImportError as error:
+    raise ImportError(f"mjsense.compat.mujoco_warp needs the package mujoco-warp, and {error}: pip install mujoco-warp") from None
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+FIRST, LAST = (3, 11), (4, 0)
+"""The first and last series of mujoco_warp that this is tested with."""
+
+_CALLS = {"step": 0, "forward": 1, "step1": 2, "step2": 3}
+_RESET = 4
+_OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "ray", "rays", "refit_bvh", "put_model")}
+"""mujoco_warp's own functions."""
+
+_OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
+"""Fields that have the names of fields of MuJoCo, but another content."""
+
+_FIXED_OPTIONS = (
+    "integrator",
+    "cone",
+    "solver",
+    "iterations",
+    "ls_iterations",
+    "ccd_iterations",
+    "sdf_initpoints",
+    "sdf_iterations",
+)
+"""Options that are Python numbers in mujoco_warp, and equal in MuJoCo."""
+
+_GEOMETRY = ("mesh_", "hfield_", "oct_", "tex_", "flex")
+"""Beginnings of the names of the model's arrays that are large, and must not be changed."""
+
+_models: dict[int, Any] = {}
+"""By the id of a ``mujoco_warp.Model``: a copy of the ``mujoco.MjModel`` that it was made of."""
+_worlds: dict[int, Worlds] = {}
+"""By the id of a ``mujoco_warp.Data``."""
+_threads = 0
+
+
+def use(threads: int = 0) -> None:
+    """From now on, mujoco_warp steps worlds on the CPU with mjsense. Call it before the model is made (``mujoco_warp.put_model``).
+
+    Modules that have imported the functions themselves use the new ones, too.
+
+    Args:
+        threads: Number of threads; 0: one per CPU that is available to this process.
+
+    Raises:
+        ImportError: If the installed mujoco_warp is of a series that was not tested.
+    """
+    global _threads
+    version = importlib.metadata.version("mujoco-warp")
+    series = tuple(int(part) for part in version.split(".")[:2])
+    if not FIRST <= series <= LAST:
+        raise ImportError(
+            f"mjsense.compat.mujoco_warp is tested with mujoco-warp {FIRST[0]}.{FIRST[1]} to {LAST[0]}.{LAST[1]}, and {version} is installed"
+        )
+    _threads = threads
+    _replace({_OWN[name]: new for name, new in _NEW.items()})
+
+
+def stop() -> None:
+    """From now on, all functions are mujoco_warp's own again."""
+    _replace({new: _OWN[name] for name, new in _NEW.items()})
+
+
+@contextlib.contextmanager
+def used(threads: int = 0) -> Iterator[None]:
+    """``use()`` for a ``with`` block, and ``stop()`` at its end."""
+    use(threads)
+    try:
+        yield
+    finally:
+        stop()
+
+
+def _replace(functions: dict[Any, Any]) -> None:
+    """Replaces functions in all modules, except in mujoco_warp's own files."""
+    by_id = {id(old): new for old, new in functions.items()}
+    for name, module in [*sys.modules.items()]:
+        if name.startswith("mujoco_warp._src") or name == __name__:
+            continue
+        for attribute, value in [*getattr(module, "__dict__", {}).items()]:
+            if id(value) in by_id:
+                setattr(module, attribute, by_id[id(value)])
+
+
+def worlds_of(model: Any, data: Any) -> Worlds:
+    """The worlds of this model and data, which are made at the first step."""
+    worlds = _worlds.get(id(data))
+    if worlds is None or worlds.model is not model:
+        if worlds is None:
+            weakref.finalize(data, _worlds.pop, id(data), None)
+        worlds = _worlds[id(data)] = Worlds(model, data)
+    return worlds
+
+
+class Worlds:
+    """Worlds that are shown in the arrays of a ``mujoco_warp.Data``."""
+
+    def __init__(self, model: Any, data: Any) -> None:
+        if id(model) not in _models:
+            raise ValueError(
+                "mjsense.compat.mujoco_warp does not know what this Model was made of: call use() before mujoco_warp.put_model()"
+            )
+        self.model = model
+        self._data = weakref.ref(data)
+        source = _models[id(model)]
+        self._check_sizes(source, data)
+        try:
+            ours = source if foreign_model.is_our_series(foreign_model.package_of(source)) else foreign_model.copy_of(source)
+        except ValueError as error:
+            raise ValueError(str(error).replace("attach()", "mujoco_warp on the CPU").replace("attached", "simulated")) from None
+        self._arrays = _core.ForeignArrays(ours._address, data.nworld, _threads)
+        self._flags = {name: int(getattr(ours.opt, name)) for name in ("disableflags", "enableflags")}
+        self.shown: list[str] = []
+        """Fields of the data that show the worlds."""
+        self.left: list[str] = []
+        """Fields of the data that stay as they are."""
+        self._num_worlds = data.nworld
+        self._fixed = np.array(source.body_weldid)[source.geom_bodyid] == 0
+        self._options = self._options_of(model)
+        self._link()
+
+    @staticmethod
+    def _check_sizes(source: Any, data: Any) -> None:
+        for name, size in (
+            ("qpos", source.nq),
+            ("qvel", source.nv),
+            ("ctrl", source.nu),
+            ("xpos", source.nbody),
+            ("geom_xpos", source.ngeom),
+        ):
+            found = getattr(data, name).shape
+            if found[:2] != (data.nworld, size):
+                raise ValueError(
+                    f"this Data belongs to another model: its {name} has the shape {found[:2]}, and the model needs {(data.nworld, size)}"
+                )
+
+    def _link(self) -> None:
+        """Tells the worlds where the arrays are."""
+        data: Any = self._data()
+        self._arrays.clear()
+        self._others: list[tuple[str, np.ndarray, bytes]] = []
+        self.shown, self.left = [], []
+        parts = [("", "data", data), ("contact.", "contact", data.contact), ("efc.", "data", data.efc)]
+        for prefix, kind, part in parts:
+            for name in _array_fields(part):
+                rows = part.worldid.shape[0] if kind == "contact" else data.nworld
+                field = f"efc_{name}" if prefix == "efc." else name
+                done = name not in _OTHER and self._add(kind, part, name, field, rows, not prefix and name in _STATE)
+                (self.shown if done else self.left).append(prefix + name)
+        if self._add("contact", data, "nacon", "count", 1, False):
+            self.left.remove("nacon")
+            self.shown.append("nacon")
+        for prefix, part in (("", self.model), ("opt.", self.model.opt)):
+            hints = {field.name: field.type for field in dataclasses.fields(part)}
+            for name in _array_fields(part):
+                if name.startswith(_GEOMETRY):
+                    continue
+                array = getattr(part, name)
+                by_world = getattr(hints[name], "shape", ("",))[:1] == ("*",)
+                rows = array.shape[0] if by_world else 1
+                if not self._add("model", part, name, prefix + name, rows, False) and by_world and array.size:
+                    values = array.numpy()
+                    self._others.append((prefix + name, values, values.tobytes()))
+        # The attributes as they are now. They keep the arrays.
+        self._parts = [
+            (vars(part), (*vars(part).values(),)) for part in (data, data.contact, data.efc, self.model, self.model.opt)
+        ]
+
+    def _add(self, kind: str, part: Any, name: str, field: str, rows: int, state: bool) -> bool:
+        array = getattr(part, name)
+        if not array.device.is_cpu:
+            raise ValueError(f"{name} is on the device {array.device}, and other arrays of the data are on the CPU")
+        if not array.size:
+            return True
+        values = array.numpy()
+        if not values.flags.c_contiguous:
+            raise ValueError(f"{name} is not contiguous in memory: strides {values.strides} of the shape {values.shape}")
+        if values.dtype.name not in ("float32", "int32", "bool") or values.size % rows:
+            return False
+        return self._arrays.add(kind, field, array.ptr, values.dtype.name, rows, values.size // rows, state)
+
+    def run(self, call: int, mask: int = 0) -> None:
+        """Calls MuJoCo's function for all worlds. `mask`: address of an array of bools; of a reset."""
+        for attributes, values in self._parts:
+            if len(attributes) != len(values) or not all(map(operator.is_, attributes.values(), values)):
+                self._set_options()
+                self._link()
+                break
+        for index, (name, now, before) in enumerate(self._others):
+            if now.tobytes() != before:
+                self._changed(name, now)
+                self._others[index] = (name, now, now.tobytes())
+        self._arrays.run(call, mask)
+
+    def cast(self, query: dict[str, Any]) -> None:
+        """Casts the rays of a call of ``mujoco_warp.rays``."""
+        count = query["pnt"].shape[1]
+        kinds = {
+            "pnt": wp.vec3,
+            "vec": wp.vec3,
+            "bodyexclude": wp.int32,
+            "dist": wp.float32,
+            "geomid": wp.int32,
+            "normal": wp.vec3,
+        }
+        for name, kind in kinds.items():
+            array, shape = query[name], (count,) if name == "bodyexclude" else (self._num_worlds, count)
+            if array.dtype is not kind or array.shape != shape or not array.is_contiguous:
+                raise ValueError(
+                    f"rays(): {name} must be a contiguous array {shape} of {kind.__name__}, not {array.shape} of {array.dtype.__name__}"
+                )
+        hidden = np.zeros(self.model.ngeom, np.uint8)
+        if query["rc"] is not None:
+            hidden[:] = 1
+            hidden[query["rc"].enabled_geom_ids.numpy()] = 0
+        if not query["flg_static"]:
+            hidden[self._fixed] = 1
+        wanted = [*query["geomgroup"]]
+        groups = sum((group != 0) << bit for bit, group in enumerate(wanted))
+        if count:
+            self._arrays.cast(count, [query[name].ptr for name in kinds], groups, hidden.tobytes())
+
+    @staticmethod
+    def _options_of(model: Any) -> dict[str, int]:
+        return {name: int(getattr(model.opt, name)) for name in (*_FIXED_OPTIONS, "disableflags", "enableflags")}
+
+    def _set_options(self) -> None:
+        options = self._options_of(self.model)
+        for name, value in options.items():
+            if value != self._options[name]:
+                if name in self._flags:  # bits have other meanings in other series
+                    value = self._flags[name] = self._flags[name] ^ value ^ self._options[name]
+                self._arrays.set_option(f"opt.{name}", [value])
+        self._options = options
+
+    def _changed(self, name: str, now: np.ndarray) -> None:
+        if name != "opt.impratio_invsqrt":
+            raise ValueError(f"{name} of the model was changed, which must be the same as when the model was made")
+        self._arrays.set_option("opt.impratio", (now.astype(float) ** -2).tolist())
+
+
+def _array_fields(part: Any) -> list[str]:
+    return [field.name for field in dataclasses.fields(part) if isinstance(getattr(part, field.name), wp.array)]
+
+
+def _on_cpu(model: Any, data: Any) -> bool:
+    return data.qpos.device.is_cpu and not any(vars(model.callback).values())
+
+
+def _call(name: str) -> Callable[[Any, Any], None]:
+    own, number = _OWN[name], _CALLS[name]
+
+    @functools.wraps(own)
+    def call(m: Any, d: Any) -> None:
+        if _on_cpu(m, d):
+            worlds_of(m, d).run(number)
+        else:
+            own(m, d)
+
+    return call
+
+
+@functools.wraps(_OWN["reset_data"])
+def _reset_data(m: Any, d: Any, reset: Any = None) -> None:
+    if not _on_cpu(m, d):
+        return _OWN["reset_data"](m, d, reset)
+    if reset is not None and (reset.dtype is not wp.bool or reset.shape != (d.nworld,) or not reset.is_contiguous):
+        raise ValueError(
+            f"reset_data(): reset must be a contiguous array of {d.nworld} bools, not {reset.dtype.__name__} {reset.shape}"
+        )
+    worlds_of(m, d).run(_RESET, 0 if reset is None else reset.ptr)
+
+
+_rays_arguments = inspect.signature(_OWN["rays"])
+
+
+@functools.wraps(_OWN["rays"])
+def _rays(*args: Any, **kwargs: Any) -> None:
+    query = _rays_arguments.bind(*args, **kwargs)
+    query.apply_defaults()
+    model, data = query.arguments["m"], query.arguments["d"]
+    worlds = _worlds.get(id(data))
+    if worlds is not None and worlds.model is model and _on_cpu(model, data):
+        worlds.cast(query.arguments)
+    else:
+        if query.arguments["rc"] is not None:
+            _OWN["refit_bvh"](model, data, query.arguments["rc"])
+        _OWN["rays"](*args, **kwargs)
+
+
+@functools.wraps(_OWN["ray"])
+def _ray(*args: Any, **kwargs: Any) -> Any:
+    call = inspect.signature(_OWN["ray"]).bind(*args, **kwargs).arguments
+    if call.get("rc") is not None:
+        _OWN["refit_bvh"](call["m"], call["d"], call["rc"])
+    return _OWN["ray"](*args, **kwargs)
+
+
+@functools.wraps(_OWN["refit_bvh"])
+def _refit_bvh(m: Any, d: Any, rc: Any) -> None:
+    worlds = _worlds.get(id(d))
+    if rc.nrender or m.nflex or worlds is None or worlds.model is not m or not _on_cpu(m, d):
+        _OWN["refit_bvh"](m, d, rc)
+
+
+@functools.wraps(_OWN["put_model"])
+def _put_model(mjm: Any, *args: Any, **kwargs: Any) -> Any:
+    model = _OWN["put_model"](mjm, *args, **kwargs)
+    if model.qpos0.device.is_cpu:
+        weakref.finalize(model, _models.pop, id(model), None)
+        _models[id(model)] = mjm.__copy__()
+    return model
+
+
+_NEW = {
+    **{name: _call(name) for name in _CALLS},
+    "reset_data": _reset_data,
+    "ray": _ray,
+    "rays": _rays,
+    "refit_bvh": _refit_bvh,
+    "put_model": _put_model,
+}

@@ -1,0 +1,592 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/worlds/foreign_arrays.h"
+
+#include <fmt/format.h>
+#include <mujoco/mjxmacro.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/model_indices.h"
+#include "mjsense/scene/mujoco_log.h"
+#include "mjsense/worlds/ordered_apply.h"
+#include "mjsense/worlds/step_stages.h"
+
+namespace mjsense::worlds {
+namespace {
+
+template <class T>
+constexpr DType type_of() {
+  if constexpr (std::is_same_v<T, mjtNum>) return DType::kFloat64;
+  if constexpr (std::is_same_v<T, float>) return DType::kFloat32;
+  if constexpr (std::is_same_v<T, int>) return DType::kInt32;
+  if constexpr (std::is_same_v<T, mjtBool>) return DType::kBool;
+  return DType::kUint8;
+}
+
+// A field of mjData. Of the constraints' fields, `count` is that of one constraint.
+struct DataField {
+  DType type;
+  std::int64_t count;
+  bool constraints;
+  const void* (*pointer)(const mjData*);
+};
+
+std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
+#define FIELD(T, name, n, constraints, expression)                            \
+  if (field == #name)                                                         \
+    return DataField{type_of<T>(), static_cast<std::int64_t>(n), constraints, \
+                     [](const mjData* d) -> const void* { return expression; }};
+#define X(T, name, nr, nc) FIELD(T, name, m->nr*(nc), false, d->name)
+#undef MJ_M
+#define MJ_M(n) m->n
+  MJDATA_POINTERS
+#undef MJ_M
+#define MJ_M(n) n
+#undef X
+  FIELD(mjtNum, time, 1, false, &d->time)
+  FIELD(mjtNum, energy, 2, false, d->energy)
+#define X(name) FIELD(int, name, 1, false, &d->name)
+  X(ne)
+  X(nf)
+  X(nl)
+  X(nefc)
+#undef X
+#define X(T, name) FIELD(T, efc_##name, 1, true, d->efc_##name)
+  X(int, type)
+  X(int, id)
+  X(int, state)
+  X(mjtNum, pos)
+  X(mjtNum, margin)
+  X(mjtNum, D)
+  X(mjtNum, vel)
+  X(mjtNum, aref)
+  X(mjtNum, frictionloss) X(mjtNum, force)
+#undef X
+#undef FIELD
+      return std::nullopt;
+}
+
+struct ModelFieldType {
+  DType type;
+  std::int64_t count;
+};
+std::optional<ModelFieldType> model_field(const mjModel* m, std::string_view field) {
+  MJMODEL_POINTERS_PREAMBLE(m)
+#define X(T, name, nr, nc) \
+  if (field == #name) return ModelFieldType{type_of<T>(), static_cast<std::int64_t>(m->nr) * (nc)};
+  MJMODEL_POINTERS
+#undef X
+#define X(T, name, n) \
+  if (field == "opt." #name) return ModelFieldType{type_of<T>(), n};
+#define XVEC X
+  MJOPTION_FIELDS
+#undef XVEC
+#undef X
+  return std::nullopt;
+}
+
+// How mj_setConst() uses a field of the model.
+struct SetConst {
+  bool in = false, out = false;
+};
+SetConst set_const_use(std::string_view field) {
+#define X(name, fixed, kin0, inert0, spring)                \
+  if (field == #name) {                                     \
+    int first = 0, all = 0;                                 \
+    for (int group : {fixed, kin0, inert0, spring}) {       \
+      if (first == 0) first = group;                        \
+      all |= group;                                         \
+    }                                                       \
+    return {(first & mjSC_IN) != 0, (all & mjSC_OUT) != 0}; \
+  }
+  MJSETCONST_ARRAYS
+#undef X
+  return {};
+}
+
+// Whether a field of MuJoCo can be shown in, and taken from, an array of this type.
+bool converts(DType ours, DType theirs) {
+  if (theirs == DType::kFloat32) return ours == DType::kFloat64 || ours == DType::kFloat32;
+  if (theirs == DType::kBool) return ours == DType::kBool || ours == DType::kUint8;
+  return theirs == DType::kInt32 && ours != DType::kFloat64 && ours != DType::kFloat32;
+}
+
+template <class To, class From>
+void convert(const void* from, void* to, std::int64_t n) {
+  const auto* source = static_cast<const From*>(from);
+  auto* target = static_cast<To*>(to);
+  for (std::int64_t i = 0; i < n; ++i) target[i] = static_cast<To>(source[i]);
+}
+
+// Copies `n` elements of MuJoCo's `type` to the program's.
+void show_elements(const void* from, DType type, void* to, DType theirs, std::int64_t n) {
+  if (type == DType::kFloat64) return convert<float, double>(from, to, n);
+  if (theirs == DType::kInt32 && type != DType::kInt32)
+    return convert<int, std::uint8_t>(from, to, n);
+  std::memcpy(to, from, n * dtype_size(theirs));
+}
+
+template <class T>
+bool same_bits(T a, T b) {
+  if constexpr (std::is_same_v<T, float>) {
+    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
+  } else {
+    return a == b;
+  }
+}
+
+template <class To, class From>
+void take_changed(const void* now, const void* seen, void* to, std::int64_t n) {
+  const auto* source = static_cast<const From*>(now);
+  const auto* old = static_cast<const From*>(seen);
+  auto* target = static_cast<To*>(to);
+  for (std::int64_t i = 0; i < n; ++i) {
+    if (!same_bits(source[i], old[i])) target[i] = static_cast<To>(source[i]);
+  }
+}
+
+// Copies those of the program's elements that differ from `seen`.
+void take_elements(const void* now, const void* seen, DType theirs, void* to, DType type,
+                   std::int64_t n) {
+  if (type == DType::kFloat64) return take_changed<double, float>(now, seen, to, n);
+  if (type == DType::kFloat32) return take_changed<float, float>(now, seen, to, n);
+  if (type == DType::kInt32) return take_changed<int, int>(now, seen, to, n);
+  if (theirs == DType::kInt32) return take_changed<std::uint8_t, int>(now, seen, to, n);
+  take_changed<std::uint8_t, std::uint8_t>(now, seen, to, n);
+}
+
+constexpr std::string_view kControls[] = {"ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart"};
+// Fields that a reset shows in addition to the state.
+constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy",
+                                       "ne",   "nf",      "nl",         "nefc"};
+
+struct ContactPlace {
+  std::string_view name;
+  std::size_t offset;
+  DType dtype;  // of the array
+  int count;
+};
+#define PLACE(name, dtype, count) \
+  { #name, offsetof(mjContact, name), DType::dtype, count }
+constexpr ContactPlace kContactPlaces[] = {
+    PLACE(dist, kFloat32, 1),        PLACE(pos, kFloat32, 3),
+    PLACE(frame, kFloat32, 9),       PLACE(includemargin, kFloat32, 1),
+    PLACE(friction, kFloat32, 5),    PLACE(solref, kFloat32, mjNREF),
+    PLACE(solimp, kFloat32, mjNIMP), PLACE(solreffriction, kFloat32, mjNREF),
+    PLACE(adhesion, kFloat32, 1),    PLACE(surfacevel, kFloat32, 3),
+    PLACE(dim, kInt32, 1),           PLACE(geom, kInt32, 2),
+    PLACE(flex, kInt32, 2),          PLACE(elem, kInt32, 2),
+    PLACE(vert, kInt32, 2)};
+#undef PLACE
+// Fields that mjContact does not have in this form.
+enum Made { kNotMade = -1, kWorld, kType, kNumber, kAddresses, kCount };
+constexpr std::string_view kMade[] = {"worldid", "type", "geomcollisionid", "efc_address", "count"};
+
+// The number of rows that a contact has in the constraints.
+int constraint_rows(const mjModel* m, const mjContact& contact) {
+  if (contact.efc_address < 0) return 0;
+  if (contact.dim == 1 || m->opt.cone == mjCONE_ELLIPTIC) return contact.dim;
+  return 2 * (contact.dim - 1);
+}
+
+}  // namespace
+
+ForeignArrays::ForeignArrays(const mjModel* model, int num_worlds, int threads)
+    : worlds_(model, num_worlds, threads),
+      contacts_(num_worlds),
+      num_constraints_(num_worlds),
+      first_contact_row_(num_worlds),
+      first_contact_(num_worlds),
+      scratch_(worlds_.model()),
+      borrowed_(num_worlds),
+      current_(num_worlds) {
+  fill_scratch();
+  set_option("opt.disableflags", {static_cast<double>(model->opt.disableflags)});
+}
+
+void ForeignArrays::set_option(const std::string& name, const std::vector<double>& values) {
+  int size = 0, element = 0;
+  current_.assign(worlds_.size(), 0);
+  void* rows = mjb_expand(worlds_.batch(), name.c_str(), &size, &element);
+  if (!rows || size != 1 || values.empty())
+    throw ValueError(fmt::format("MuJoCo has no option {} with one number", name));
+  for (int w = 0; w < worlds_.size(); ++w) {
+    const double value = values[w % values.size()];
+    if (element == sizeof(int))
+      static_cast<int*>(rows)[w] =
+          static_cast<int>(value) | (name == "opt.disableflags" ? mjDSBL_AUTORESET : 0);
+    else
+      static_cast<mjtNum*>(rows)[w] = value;
+  }
+}
+
+void ForeignArrays::clear() {
+  fields_.clear();
+  model_fields_.clear();
+  contact_fields_.clear();
+  max_contacts_ = max_constraints_ = -1;
+}
+
+// Makes an mjData for each thread, so that none is made while the worlds run.
+void ForeignArrays::fill_scratch() {
+  std::vector<ScratchData::Loan> all(worlds_.threads());
+  for (ScratchData::Loan& one : all) one = scratch_.borrow();
+}
+
+// Calls function(m, d, world, this) for all worlds.
+void ForeignArrays::apply(mjfBatchFunc function) {
+  apply_ordered(worlds_.batch(), nullptr, 0, function, this, 1);
+  scene::drop_warnings(false);  // an error leaves the flag set
+  for (mjData*& data : borrowed_) {
+    if (!data) continue;
+    mj_deleteData(std::exchange(data, nullptr));
+    fill_scratch();
+  }
+  for (int w = 0; w < worlds_.size(); ++w) {
+    if (mjb_status(worlds_.batch())[w])
+      throw RuntimeError(fmt::format("world {}: MuJoCo: {}", w, mjb_error(worlds_.batch(), w)));
+  }
+}
+
+bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool input) {
+  const std::optional<DataField> found = data_field(worlds_.model(), field);
+  const auto count = static_cast<int>(rows.shape[1]);
+  if (!found || !converts(found->type, rows.dtype) ||
+      (!found->constraints && found->count != count))
+    return false;
+  fields_.push_back({found->type,
+                     rows.dtype,
+                     count,
+                     found->constraints,
+                     input,
+                     input || std::ranges::count(kReset, field) > 0,
+                     std::ranges::count(kControls, field) > 0,
+                     field == "efc_id",
+                     found->pointer,
+                     rows.data,
+                     static_cast<std::size_t>(rows.strides[0]),
+                     {}});
+  if (found->constraints)
+    max_constraints_ = max_constraints_ < 0 ? count : std::min(max_constraints_, count);
+  Field& added = fields_.back();
+  if (!input) return true;
+  // The worlds have their first state, of which the program's differs perhaps.
+  const std::size_t bytes = count * dtype_size(rows.dtype);
+  added.seen.resize(bytes * worlds_.size());
+  apply([](const mjModel*, mjData* d, int w, void* argument) {
+    Field& f = static_cast<ForeignArrays*>(argument)->fields_.back();
+    const std::size_t bytes = f.count * dtype_size(f.dtype);
+    show_elements(f.pointer(d), f.type, f.seen.data() + w * bytes, f.dtype, f.count);
+  });
+  return true;
+}
+
+bool ForeignArrays::add_model(const std::string& field, const ArrayView& rows) {
+  const mjModel* m = worlds_.model();
+  const std::optional<ModelFieldType> found = model_field(m, field);
+  const auto count = static_cast<int>(rows.shape[1]), num_rows = static_cast<int>(rows.shape[0]);
+  if (!found || found->count != count || !converts(found->type, rows.dtype)) return false;
+  ModelField added{field,      found->type,
+                   rows.dtype, count,
+                   num_rows,   set_const_use(field).in,
+                   rows.data,  static_cast<std::size_t>(rows.strides[0]),
+                   {}};
+  const std::size_t bytes = count * dtype_size(rows.dtype);
+  added.seen.resize(bytes * num_rows);
+  for (int row = 0; row < num_rows; ++row) {
+    const mjModel mine = worlds_.model_of(row);
+    const void* values = nullptr;
+#define X(T, name, nr, nc) \
+  if (field == #name) values = mine.name;
+    MJMODEL_POINTERS
+#undef X
+#define X(T, name, n) \
+  if (field == "opt." #name) values = &mine.opt.name;
+#define XVEC X
+    MJOPTION_FIELDS
+#undef XVEC
+#undef X
+    show_elements(values, found->type, added.seen.data() + row * bytes, rows.dtype, count);
+  }
+  model_fields_.push_back(std::move(added));
+  return true;
+}
+
+bool ForeignArrays::add_contacts(std::string_view field, const ArrayView& rows) {
+  const auto count = static_cast<int>(rows.shape[1]), capacity = static_cast<int>(rows.shape[0]);
+  const auto add = [&](int made, std::size_t offset, DType dtype, int expected) {
+    if (rows.dtype != dtype || (expected > 0 && count != expected)) return false;
+    if (made != kCount)
+      max_contacts_ = max_contacts_ < 0 ? capacity : std::min(max_contacts_, capacity);
+    contact_fields_.push_back(
+        {made, offset, dtype, count, rows.data, static_cast<std::size_t>(rows.strides[0])});
+    return true;
+  };
+  for (const ContactPlace& place : kContactPlaces) {
+    if (place.name == field) return add(kNotMade, place.offset, place.dtype, place.count);
+  }
+  const auto* made = std::ranges::find(kMade, field);
+  if (made == std::end(kMade)) return false;
+  const auto kind = static_cast<int>(made - kMade);
+  return add(kind, 0, DType::kInt32, kind == kAddresses ? 0 : 1);
+}
+
+// Returns whether anything was written on which positions and velocities depend.
+bool ForeignArrays::take(mjData* d, int w) {
+  bool moved = false;
+  for (const Field& f : fields_) {
+    if (!f.input) continue;
+    const std::size_t bytes = f.count * dtype_size(f.dtype);
+    const std::byte *now = f.rows + w * f.row_bytes, *seen = f.seen.data() + w * bytes;
+    if (std::memcmp(now, seen, bytes) == 0) continue;
+    take_elements(now, seen, f.dtype, const_cast<void*>(f.pointer(d)), f.type, f.count);
+    if (!f.control) moved = true;
+  }
+  return moved;
+}
+
+void ForeignArrays::show(const mjData* d, int w) {
+  for (Field& f : fields_) {
+    if (call_ == RawCall::kReset && !f.reset) continue;
+    const std::int64_t n = f.constraints ? std::min(f.count, d->nefc) : f.count;
+    std::byte* row = f.rows + w * f.row_bytes;
+    show_elements(f.pointer(d), f.type, row, f.dtype, n);
+    if (f.input)
+      std::memcpy(f.seen.data() + w * n * dtype_size(f.dtype), row, n * dtype_size(f.dtype));
+  }
+  if (max_contacts_ >= 0) contacts_[w].assign(d->contact, d->contact + d->ncon);
+  num_constraints_[w] = d->nefc;
+  first_contact_row_[w] = d->ne + d->nf + d->nl;
+}
+
+void ForeignArrays::show_contacts(const mjModel* m, int w) const {
+  for (const Field& f : fields_) {
+    if (!f.contact_ids) continue;
+    auto* ids = reinterpret_cast<int*>(f.rows + w * f.row_bytes);
+    for (int i = first_contact_row_[w]; i < std::min(f.count, num_constraints_[w]); ++i)
+      ids[i] += first_contact_[w];
+  }
+  const std::vector<mjContact>& contacts = contacts_[w];
+  const int room =
+      std::clamp(max_contacts_ - first_contact_[w], 0, static_cast<int>(contacts.size()));
+  for (const ContactField& f : contact_fields_) {
+    if (f.made == kCount) continue;
+    std::byte* row = f.rows + first_contact_[w] * f.row_bytes;
+    int number = 0;
+    for (int i = 0; i < room; ++i, row += f.row_bytes) {
+      const mjContact& contact = contacts[i];
+      auto* ids = reinterpret_cast<int*>(row);
+      if (f.made == kNotMade) {
+        const void* from = reinterpret_cast<const std::byte*>(&contact) + f.offset;
+        show_elements(from, f.dtype == DType::kFloat32 ? DType::kFloat64 : DType::kInt32, row,
+                      f.dtype, f.count);
+      } else if (f.made == kWorld) {
+        *ids = w;
+      } else if (f.made == kType) {
+        *ids = 1;
+      } else if (f.made == kNumber) {
+        const bool same = i > 0 && std::equal(contact.geom, contact.geom + 2, (&contact)[-1].geom);
+        number = same ? number + 1 : 0;
+        *ids = number;
+      } else {
+        const int rows = constraint_rows(m, contact);
+        for (int k = 0; k < f.count; ++k) ids[k] = k < rows ? contact.efc_address + k : -1;
+      }
+    }
+  }
+}
+
+// Uses an mjData that is shared by the thread's worlds and stays in its cache, as
+// Worlds::step_in_scratch(). Poses that rays read are carried over, too.
+void ForeignArrays::step_in_scratch(const mjModel* m, mjData* d, int w) {
+  mjData* s = borrowed_[w] = scratch_.borrow().release();
+  mj_copyState(m, d, s, mjSTATE_INTEGRATION);
+  mj_step(m, s);
+  mj_copyState(m, s, d, mjSTATE_INTEGRATION);
+  mju_copy(d->geom_xpos, s->geom_xpos, 3 * static_cast<int>(m->ngeom));
+  mju_copy(d->geom_xmat, s->geom_xmat, 9 * static_cast<int>(m->ngeom));
+  show(s, w);
+  borrowed_[w] = nullptr;
+  const ScratchData::Loan returned(s, ScratchData::Release{&scratch_});
+  scene::drop_warnings(false);
+  orders_before(this);
+}
+
+// A world whose state is not finite: MuJoCo would find contacts between all its geoms. Its state stays,
+// and its results are NaN.
+void ForeignArrays::show_diverged(const mjModel* m, mjData* d, int w) {
+  d->ncon = d->ne = d->nf = d->nl = d->nefc = 0;
+  if (call_ == RawCall::kStep || call_ == RawCall::kStep2) d->time += m->opt.timestep;
+  show(d, w);
+  for (const Field& f : fields_) {
+    auto* row = reinterpret_cast<float*>(f.rows + w * f.row_bytes);
+    if (f.dtype == DType::kFloat32 && !f.input)
+      std::fill_n(row, f.count, std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
+void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument) {
+  ordered_after(argument);
+  auto& self = *static_cast<ForeignArrays*>(argument);
+  scene::drop_warnings(true);
+  const bool current = !self.take(d, w) && self.current_[w];
+  self.current_[w] = 0;  // also if a MuJoCo error jumps out of this function
+  const auto is_bad = [](mjtNum x) { return mju_isBad(x) != 0; };
+  if (self.call_ != RawCall::kReset && (std::any_of(d->qpos, d->qpos + m->nq, is_bad) ||
+                                        std::any_of(d->qvel, d->qvel + m->nv, is_bad))) {
+    self.show_diverged(m, d, w);
+    scene::drop_warnings(false);
+    return orders_before(argument);
+  }
+  switch (self.call_) {
+    case RawCall::kStep:
+      if (!can_split_step(m)) {
+        mj_step(m, d);
+      } else if (current) {
+        step_from(mjSTAGE_VEL, m, d, true);
+      } else {
+        return self.step_in_scratch(m, d, w);
+      }
+      break;
+    case RawCall::kForward:
+      mj_forward(m, d);
+      break;
+    case RawCall::kStep1:
+      mj_step1(m, d);
+      break;
+    case RawCall::kStep2:
+      mj_step2(m, d);
+      break;
+    case RawCall::kReset:
+      if (!self.mask_ || self.mask_[w]) mj_resetData(m, d);
+      break;
+  }
+  self.current_[w] = self.call_ == RawCall::kForward || self.call_ == RawCall::kStep1;
+  self.show(d, w);
+  scene::drop_warnings(false);
+  orders_before(argument);
+}
+
+// Writes the values of the model that the program has changed into the worlds' models.
+void ForeignArrays::take_model() {
+  const int num_worlds = worlds_.size();
+  std::vector<bool> changed(num_worlds, false), derive(num_worlds, false);
+  bool any = false;
+  for (const ModelField& f : model_fields_) {
+    const std::size_t bytes = f.count * dtype_size(f.dtype);
+    for (int row = 0; row < f.num_rows; ++row) {
+      const std::byte *now = f.rows + row * f.row_bytes, *seen = f.seen.data() + row * bytes;
+      if (std::memcmp(now, seen, bytes) == 0) continue;
+      int size = 0, element = 0;
+      auto* target =
+          static_cast<std::byte*>(mjb_expand(worlds_.batch(), f.name.c_str(), &size, &element));
+      if (!target)
+        throw ValueError(fmt::format(
+            "{} of the model was changed, which must be the same as when the model was made",
+            f.name));
+      const bool all = f.num_rows == 1;
+      for (int w = all ? 0 : row; w < (all ? num_worlds : row + 1); ++w) {
+        take_elements(now, seen, f.dtype, target + std::size_t{1} * w * size * element, f.type,
+                      f.count);
+        changed[w] = true;
+        if (f.constants) derive[w] = true;
+      }
+      any = true;
+    }
+  }
+  if (!any) return;
+  current_.assign(num_worlds, 0);
+  std::vector<int> ids;
+  for (int w = 0; w < num_worlds; ++w) {
+    if (changed[w]) check_element_indices(worlds_.model_of(w));
+    if (derive[w]) ids.push_back(w);
+  }
+  worlds_.model_changed();
+  if (!ids.empty()) set_constants(ids);
+  for (ModelField& f : model_fields_) {
+    const std::size_t bytes = f.count * dtype_size(f.dtype);
+    for (int row = 0; row < f.num_rows; ++row)
+      std::memcpy(f.seen.data() + row * bytes, f.rows + row * f.row_bytes, bytes);
+  }
+}
+
+// Makes MuJoCo derive the values that the program's model does not have (bounding volumes, which frames
+// are equal). Those that it has are its own, until it computes them itself.
+void ForeignArrays::set_constants(const std::vector<int>& ids) {
+  mjBatch* batch = worlds_.batch();
+  struct Kept {
+    std::byte* rows;
+    std::size_t bytes;
+    std::vector<std::byte> values;
+  };
+  std::vector<Kept> kept;
+  for (const ModelField& f : model_fields_) {
+    if (!set_const_use(f.name).out) continue;
+    int size = 0, element = 0;
+    auto* rows = static_cast<std::byte*>(mjb_expand(batch, f.name.c_str(), &size, &element));
+    if (!rows) continue;
+    const std::size_t bytes = static_cast<std::size_t>(size) * element;
+    Kept& one = kept.emplace_back(Kept{rows, bytes, std::vector<std::byte>(bytes * ids.size())});
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      std::memcpy(one.values.data() + i * bytes, rows + ids[i] * bytes, bytes);
+  }
+  const int failed = mjb_setConst(batch, ids.data(), static_cast<int>(ids.size()));
+  scene::drop_warnings(false);  // an error leaves the flag set
+  for (const Kept& one : kept) {
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      std::memcpy(one.rows + ids[i] * one.bytes, one.values.data() + i * one.bytes, one.bytes);
+  }
+  for (int w : failed ? ids : std::vector<int>{}) {
+    if (*mjb_error(batch, w))
+      throw ValueError(
+          fmt::format("MuJoCo cannot use the model of world {}: {}", w, mjb_error(batch, w)));
+  }
+}
+
+void ForeignArrays::check_capacity() const {
+  const int contacts = first_contact_.back() + static_cast<int>(contacts_.back().size());
+  if (max_contacts_ >= 0 && contacts > max_contacts_)
+    throw ValueError(
+        fmt::format("the {} worlds have {} contacts, and the data has room for {}: make it with "
+                    "nconmax={} or more",
+                    worlds_.size(), contacts, max_contacts_,
+                    (2 * contacts + worlds_.size() - 1) / worlds_.size()));
+  const auto most = std::ranges::max_element(num_constraints_);
+  if (max_constraints_ >= 0 && *most > max_constraints_)
+    throw ValueError(
+        fmt::format("world {} has {} rows of constraints, and the data has room for {}: make it "
+                    "with njmax={} or "
+                    "more",
+                    most - num_constraints_.begin(), *most, max_constraints_, 2 * *most));
+}
+
+void ForeignArrays::run(RawCall call, const bool* mask) {
+  take_model();
+  call_ = call;
+  mask_ = mask;
+  apply(run_world);
+  int contacts = 0;
+  for (int w = 0; w < worlds_.size(); ++w) {
+    first_contact_[w] = contacts;
+    contacts += static_cast<int>(contacts_[w].size());
+  }
+  for (const ContactField& f : contact_fields_) {
+    if (f.made == kCount) *reinterpret_cast<int*>(f.rows) = std::min(contacts, max_contacts_);
+  }
+  if (contacts > 0 && !contact_fields_.empty()) {
+    apply([](const mjModel* m, mjData*, int w, void* argument) {
+      static_cast<const ForeignArrays*>(argument)->show_contacts(m, w);
+    });
+  }
+  check_capacity();
+}
+
+}  // namespace mjsense::worlds

@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Worlds that are stepped from the arrays of another program, as those of mujoco_warp are."""
+
+import os
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjsense import _core
+
+WORLDS = 5
+STEP, FORWARD, STEP1, STEP2, RESET = range(5)
+XML = """
+<mujoco><option timestep=".004" integrator="implicitfast"/><worldbody>
+  <geom name="floor" type="plane" size="0 0 1"/>
+  <body name="box" pos="0 0 .3"><freejoint/><geom name="box" type="box" size=".1 .1 .1"/>
+    <body pos=".1 0 .1"><joint name="hinge" axis="0 1 0" damping=".1"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".03" contype="0" conaffinity="0"/><site name="tip" pos=".3 0 0"/></body></body>
+  </worldbody><actuator><motor joint="hinge"/></actuator><sensor><accelerometer site="tip"/><jointpos joint="hinge"/></sensor></mujoco>"""
+STATE = ("qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "qacc_warmstart", "time")
+DERIVED = ("xpos", "xmat", "sensordata", "qacc", "cvel")
+
+
+class Program:
+    """The arrays of a program."""
+
+    def __init__(self, threads=1, contacts=20 * WORLDS, constraints=100):
+        self.model = mujoco.MjModel.from_xml_string(XML)
+        self.worlds = _core.ForeignArrays(self.model._address, WORLDS, threads)
+        start = mujoco.MjData(self.model)
+        for name in (*STATE, *DERIVED):
+            array = np.tile(np.ravel(getattr(start, name)).astype(np.float32), (WORLDS, 1))
+            setattr(self, name, array)
+            assert self.add("data", name, array, name in STATE)
+        self.efc_force = np.zeros((WORLDS, constraints), np.float32)
+        self.efc_id = np.zeros((WORLDS, constraints), np.int32)
+        assert self.add("data", "efc_id", self.efc_id)
+        self.nefc = np.zeros((WORLDS, 1), np.int32)
+        assert self.add("data", "efc_force", self.efc_force)
+        assert self.add("data", "nefc", self.nefc)
+        floats, ints = {"dist": 1, "pos": 3, "frame": 9, "friction": 5}, {"geom": 2, "dim": 1, "worldid": 1, "geomcollisionid": 1}
+        self.contact = {name: np.zeros((contacts, n), np.float32) for name, n in floats.items()}
+        self.contact |= {name: np.zeros((contacts, n), np.int32) for name, n in {**ints, "efc_address": 10}.items()}
+        self.count = np.zeros((1, 1), np.int32)
+        for name, array in {**self.contact, "count": self.count}.items():
+            assert self.add("contact", name, array)
+
+    def add(self, kind, name, array, state=False):
+        return self.worlds.add(kind, name, array.ctypes.data, array.dtype.name, *array.shape, state)
+
+    def plain(self):
+        """Plain MuJoCo's data in the states of the arrays, by world."""
+        datas = [mujoco.MjData(self.model) for _ in range(WORLDS)]
+        for world, data in enumerate(datas):
+            for name in STATE:
+                value = getattr(self, name)[world]
+                setattr(data, name, value[0] if name == "time" else value.reshape(np.shape(getattr(data, name))))
+        return datas
+
+    def throw(self):
+        """Writes a state for each world."""
+        rng = np.random.default_rng(0)
+        self.qpos[:, 2] += rng.uniform(-0.25, 0.1, WORLDS)
+        self.qvel[:] = rng.normal(0, 0.5, self.qvel.shape)
+        self.ctrl[:] = rng.normal(0, 0.1, self.ctrl.shape)
+
+    def expect(self, datas, message=""):
+        """The arrays are exactly the float32 numbers of these data."""
+        for name in (*STATE, *DERIVED):
+            expected = np.array([np.ravel(getattr(data, name)) for data in datas]).astype(np.float32)
+            np.testing.assert_array_equal(getattr(self, name), expected, err_msg=f"{name} {message}")
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_states_keep_double_precision_and_equal_plain_mujoco(threads):
+    program = Program(threads)
+    program.throw()
+    datas = program.plain()
+    for step in range(200):
+        program.worlds.run(STEP)
+        for data in datas:
+            mujoco.mj_step(program.model, data)
+        program.expect(datas, f"step {step}")
+    assert program.count[0, 0] == sum(data.ncon for data in datas) > WORLDS
+
+
+def test_what_the_program_writes_is_taken_and_nothing_else():
+    program = Program()
+    program.throw()
+    datas = program.plain()
+    for step in range(60):
+        if step % 7 == 3:
+            program.qpos[2, 7] = datas[2].qpos[7] = np.float32(0.1 * step)
+            program.time[1] = 3.0
+            datas[1].time = 3.0
+        for world, data in enumerate(datas):
+            program.ctrl[world, 0] = data.ctrl[0] = np.float32(np.sin(step + world))
+            program.xfrc_applied[world, 8] = data.xfrc_applied[1, 2] = world
+        program.worlds.run(STEP)
+        for data in datas:
+            mujoco.mj_step(program.model, data)
+        program.expect(datas, f"step {step}")
+
+
+def test_steps_after_forward_equal_those_without_and_stages_may_be_divided():
+    """A step after forward() computes positions and velocities no second time, unless something was written."""
+    program, divided = Program(), Program()
+    for one in (program, divided):
+        one.throw()
+    datas = program.plain()
+    for step in range(40):
+        program.worlds.run(FORWARD)
+        divided.worlds.run(STEP1)
+        for data in datas:
+            mujoco.mj_forward(program.model, data)
+        program.expect(datas, f"forward {step}")
+        for world, data in enumerate(datas):
+            program.ctrl[world, 0] = divided.ctrl[world, 0] = data.ctrl[0] = np.float32(0.1 * step)
+        if step % 5 == 4:
+            program.qvel[0, 2] = datas[0].qvel[2] = 1
+            divided.qvel[0, 2] = 1
+            divided.worlds.run(STEP1)
+        program.worlds.run(STEP)
+        divided.worlds.run(STEP2)
+        for data in datas:
+            mujoco.mj_step(program.model, data)
+        program.expect(datas, f"step {step}")
+        divided.expect(datas, f"divided step {step}")
+
+
+def test_contacts_are_in_the_order_of_the_worlds():
+    program = Program()
+    program.throw()
+    datas = program.plain()
+    for _ in range(120):
+        program.worlds.run(STEP)
+        for data in datas:
+            mujoco.mj_step(program.model, data)
+    program.worlds.run(FORWARD)
+    for data in datas:
+        mujoco.mj_forward(program.model, data)
+    contacts = [(world, contact) for world, data in enumerate(datas) for contact in data.contact]
+    assert program.count[0, 0] == len(contacts) > 2 * WORLDS
+    for row, (world, contact) in enumerate(contacts):
+        found = {name: array[row] for name, array in program.contact.items()}
+        assert found["worldid"] == world
+        assert found["geom"].tolist() == contact.geom.tolist()
+        np.testing.assert_array_equal(found["dist"][0], np.float32(contact.dist))
+        np.testing.assert_array_equal(found["frame"], contact.frame.astype(np.float32))
+        np.testing.assert_array_equal(found["friction"], contact.friction.astype(np.float32))
+        rows = [contact.efc_address + k for k in range(4)] if contact.efc_address >= 0 else []
+        assert found["efc_address"].tolist() == rows + [-1] * (10 - len(rows))
+        assert (program.efc_id[world, rows] == row).all()
+    numbers = program.contact["geomcollisionid"][: len(contacts), 0]
+    for world in range(WORLDS):
+        own = numbers[program.contact["worldid"][: len(contacts), 0] == world]
+        assert own.tolist() == list(range(len(own)))
+    for world, data in enumerate(datas):
+        assert program.nefc[world] == data.nefc
+        np.testing.assert_array_equal(program.efc_force[world, : data.nefc], data.efc_force.astype(np.float32))
+
+
+def test_models_differ_between_worlds_from_the_next_step_on():
+    program = Program()
+    mass = np.tile(program.model.body_mass.astype(np.float32), (WORLDS, 1))
+    ipos = np.tile(np.ravel(program.model.body_ipos).astype(np.float32), (WORLDS, 1))
+    friction = np.ravel(program.model.geom_friction)[None].astype(np.float32)
+    gravity = program.model.opt.gravity[None].astype(np.float32)
+    # The program's own, which stay until it computes them itself.
+    derived = [np.ravel(getattr(program.model, name))[None].astype(np.float32) for name in ("body_invweight0", "dof_invweight0")]
+    arrays = {"body_mass": mass, "body_ipos": ipos, "geom_friction": friction, "opt.gravity": gravity}
+    for name, array in {**arrays, "body_invweight0": derived[0], "dof_invweight0": derived[1]}.items():
+        assert program.add("model", name, array)
+    program.throw()
+    datas, models = program.plain(), [mujoco.MjModel.from_xml_string(XML) for _ in range(WORLDS)]
+    for step in range(60):
+        program.worlds.run(FORWARD)  # whose positions and velocities a step may not use after a change
+        if step == 10:
+            mass[3, 1] = models[3].body_mass[1] = 2.5
+        if step == 20:  # MuJoCo computes poses of bodies anew only because body_sameframe follows
+            ipos[1, 3:6] = models[1].body_ipos[1] = np.float32((0.05, 0, 0.02))
+            mujoco.mj_setConst(models[1], mujoco.MjData(models[1]))
+            models[1].body_invweight0[:] = program.model.body_invweight0
+            models[1].dof_invweight0[:] = program.model.dof_invweight0
+        if step == 30:
+            friction[0, 3] = gravity[0, 0] = 0.25
+            for model in models:
+                model.geom_friction[1, 0] = model.opt.gravity[0] = 0.25
+        program.worlds.run(STEP)
+        for model, data in zip(models, datas, strict=True):
+            mujoco.mj_step(model, data)
+        for name in ("qpos", "xpos"):
+            expected = np.array([np.ravel(getattr(data, name)) for data in datas])
+            np.testing.assert_allclose(getattr(program, name), expected, atol=2e-6, err_msg=f"{name} step {step}")
+
+
+def test_reset_is_of_the_worlds_of_the_mask():
+    program = Program()
+    first = program.qpos.copy()
+    program.throw()
+    for _ in range(30):
+        program.worlds.run(STEP)
+    before, poses = program.qpos.copy(), program.xpos.copy()
+    mask = np.array([True, False, False, True, False])
+    program.worlds.run(RESET, mask.ctypes.data)
+    np.testing.assert_array_equal(program.qpos[mask], first[mask])
+    np.testing.assert_array_equal(program.qpos[~mask], before[~mask])
+    np.testing.assert_array_equal(program.xpos, poses)  # until forward()
+    assert (program.time[mask] == 0).all()
+    assert (program.time[~mask] > 0.1).all()
+    assert not program.ctrl[mask].any()
+    assert program.count[0, 0] == (program.contact["worldid"][: program.count[0, 0]] % 3 != 0).sum()
+    program.worlds.run(RESET)
+    np.testing.assert_array_equal(program.qpos, first)
+
+
+def test_diverged_worlds_show_what_diverged_and_the_others_go_on():
+    program, other = Program(), Program()
+    for one in (program, other):
+        one.throw()
+    program.qvel[2, 3] = np.nan
+    for _ in range(5):
+        program.worlds.run(STEP)
+        other.worlds.run(STEP)
+    assert np.isnan(program.qvel[2, 3])
+    assert np.isnan(program.xpos[2]).all()
+    assert not np.isnan(program.ctrl[2]).any()
+    assert 2 not in program.contact["worldid"][: program.count[0, 0]]
+    np.testing.assert_array_equal(program.time, other.time)
+    rest = [0, 1, 3, 4]
+    np.testing.assert_array_equal(program.qpos[rest], other.qpos[rest])
+    program.worlds.run(RESET, np.array([False, False, True, False, False]).ctypes.data)
+    program.worlds.run(STEP)
+    assert np.isfinite(program.qpos).all()
+
+
+def test_too_few_rows_are_an_error_that_says_how_many():
+    program = Program(contacts=3)
+    program.qpos[:, 2] = 0.099
+    with pytest.raises(ValueError, match=r"5 worlds have 20 contacts, and the data has room for 3: make it with nconmax=8 or more"):
+        program.worlds.run(STEP)
+    assert program.count[0, 0] == 3
+    program = Program(constraints=4)
+    program.qpos[:, 2] = 0.099
+    with pytest.raises(ValueError, match=r"world 0 has 16 rows of constraints, and the data has room for 4: make it with njmax=32"):
+        program.worlds.run(STEP)
+
+
+def test_other_fields_sizes_and_types_are_refused():
+    program = Program()
+    assert not program.add("data", "nothing", np.zeros((WORLDS, 3), np.float32))
+    assert not program.add("data", "qpos", np.zeros((WORLDS, 3), np.float32))
+    assert not program.add("data", "qpos", np.zeros((WORLDS, program.model.nq), np.int32))
+    assert not program.add("model", "body_mass", np.zeros((1, 1), np.float32))
+    assert not program.add("contact", "pos", np.zeros((9, 2), np.float32))
+    assert not program.add("contact", "mu", np.zeros((9, 1), np.float32))
+    ids = np.array(program.model.geom_bodyid[None])
+    assert program.add("model", "geom_bodyid", ids)
+    ids[0, 1] = 99
+    with pytest.raises(ValueError, match="geom_bodyid"):
+        program.worlds.run(STEP)
+
+
+@pytest.mark.parametrize("call", [FORWARD, STEP])
+def test_rays_hit_what_plain_mujoco_hits(call):
+    """After a step, poses are those before it."""
+    program = Program()
+    program.throw()
+    datas = program.plain()
+    program.worlds.run(call)
+    rng, count = np.random.default_rng(1), 37
+    origins = rng.uniform(-0.2, 0.2, (WORLDS, count, 3)).astype(np.float32) + np.float32((0, 0, 1.2))
+    directions = rng.normal(0, 1, (WORLDS, count, 3)).astype(np.float32)
+    directions[:, :, 2] -= 2
+    directions[1, 5] = 0
+    exclude = np.full(count, -1, np.int32)
+    exclude[20:] = 1
+    exclude[3] = 2
+    distances, geoms = np.empty((WORLDS, count), np.float32), np.empty((WORLDS, count), np.int32)
+    normals = np.empty((WORLDS, count, 3), np.float32)
+    arrays = [array.ctypes.data for array in (origins, directions, exclude, distances, geoms, normals)]
+    program.worlds.cast(count, arrays, 0x3F, bytes(program.model.ngeom))
+    found = np.zeros(1, np.int32)
+    for world, data in enumerate(datas):
+        (mujoco.mj_forward if call == FORWARD else mujoco.mj_step)(program.model, data)
+        for ray in range(count):
+            if not directions[world, ray].any():
+                assert geoms[world, ray] == -1
+                continue
+            normal = np.zeros(3)
+            expected = mujoco.mj_ray(
+                program.model, data, origins[world, ray], directions[world, ray].astype(float), None, 1, exclude[ray], found, normal
+            )
+            assert geoms[world, ray] == found[0]
+            np.testing.assert_allclose(distances[world, ray], expected, atol=2e-6)
+            np.testing.assert_allclose(normals[world, ray], normal if found[0] >= 0 else 0, atol=1e-5)
+    assert {-1, 0, 1, 2} <= {*geoms.ravel().tolist()}
+    program.worlds.cast(count, arrays, 0x3F, bytes([1, 0, 0]))
+    assert 0 not in geoms
+
+
+def test_threads_take_turns_and_a_forked_process_is_refused():
+    program, alone = Program(2), Program()
+    for one in (program, alone):
+        one.throw()
+    runs = [threading.Thread(target=lambda: [program.worlds.run(STEP) for _ in range(50)]) for _ in range(4)]
+    for run in runs:
+        run.start()
+    for run in runs:
+        run.join()
+    for _ in range(200):
+        alone.worlds.run(STEP)
+    np.testing.assert_array_equal(program.qpos, alone.qpos)
+    child = os.fork()
+    if child == 0:
+        try:
+            program.worlds.run(STEP)
+        except RuntimeError as error:
+            os._exit(0 if "was forked" in str(error) else 2)
+        os._exit(1)
+    assert os.waitpid(child, 0)[1] == 0
