@@ -68,7 +68,8 @@ std::optional<DataField> data_field(const mjModel* m, std::string_view field) {
   X(mjtNum, D)
   X(mjtNum, vel)
   X(mjtNum, aref)
-  X(mjtNum, frictionloss) X(mjtNum, force)
+  X(mjtNum, frictionloss)
+  X(mjtNum, force)
 #undef X
 #undef FIELD
       return std::nullopt;
