@@ -4,22 +4,15 @@
 from __future__ import annotations
 
 import pathlib
-import struct
-import zlib
 
 import numpy as np
 
+from mjsense.core.png import png_of
+
 
 def write_png(path: pathlib.Path, image: np.ndarray) -> None:
-    height, width, _ = image.shape
-    raw = b"".join(b"\0" + row.tobytes() for row in image)
-
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b""))
+    path.write_bytes(png_of(image))
 
 
 def write_sheet(path: pathlib.Path, *images: np.ndarray) -> None:

@@ -20,7 +20,6 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/core/sensor.h
   mjsense/core/sensor_spec.h
   mjsense/core/shared_cache.h
-  mjsense/core/system/cpu.h
   mjsense/core/system/thread_pool.h
   mjsense/core/text/json.h
   mjsense/core/text/sentence.h
@@ -43,12 +42,10 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/observe/pose_sensor.h
   mjsense/observe/shared_field.h
   mjsense/observe/suite.h
-  mjsense/rays/packet.h
-  mjsense/rays/ray_geom.h
-  mjsense/rays/ray_scene.h
-  mjsense/rays/ray_world.h
+  mjsense/record/files_cfg.h
   mjsense/record/recorder.h
   mjsense/record/recording.h
+  mjsense/record/video_cfg.h
   mjsense/replay/recording_tools.h
   mjsense/scene/default_lighting.h
   mjsense/scene/entity.h
@@ -58,19 +55,18 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scene/terrain.h
   mjsense/sensors/builtin/builtin_sensor.h
   mjsense/sensors/camera/camera_sensor_cfg.h
+  mjsense/sensors/camera/image_cfg.h
   mjsense/sensors/contact/contact_match.h
   mjsense/sensors/contact/contact_memory.h
   mjsense/sensors/contact/contact_reading.h
   mjsense/sensors/contact/contact_reducer.h
   mjsense/sensors/contact/contact_sensor.h
   mjsense/sensors/imu/imu_sensor.h
-  mjsense/sensors/lidar/lidar_sensor.h
+  mjsense/sensors/lidar/lidar_sensor_cfg.h
   mjsense/sensors/raycast/pattern.h
-  mjsense/sensors/raycast/pose_history.h
-  mjsense/sensors/raycast/ray_bundle.h
   mjsense/sensors/raycast/ray_frame.h
-  mjsense/sensors/raycast/raycast_sensor.h
-  mjsense/sensors/terrain_height/terrain_height_sensor.h
+  mjsense/sensors/raycast/raycast_sensor_cfg.h
+  mjsense/sensors/terrain_height/terrain_height_sensor_cfg.h
   mjsense/sim/simulation.h
   mjsense/worlds/world_ids.h
   mjsense/worlds/worlds.h

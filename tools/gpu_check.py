@@ -82,7 +82,7 @@ def speed(device: str, worlds: int, count: int = 20) -> list[str]:
         sim.reset(key="init_state")
         sensors = [sensor for sensor in sim.scene.sensors.values() if sensor.cfg is not None]
         with tempfile.TemporaryDirectory() as folder:
-            recorder = mjs.Recorder(folder, sim, sensors) if name.endswith("recorder") else None
+            recorder = mjs.Recorder(sim, folder, sensors) if name.endswith("recorder") else None
             if recorder:
                 recorder.begin_episode(0, 0)
             for step in range(count + 3):

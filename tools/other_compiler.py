@@ -3,7 +3,7 @@
 """Checks C++ files with clang's front end, using the compile commands of a GCC build. Finds errors and warnings that GCC does not
 report.
 
-usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/
+usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/, in the groups of cmake/UnityBuild.cmake if BUILD has them
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def main(arguments: list[str]) -> int:
     entries = [
         entry
         for entry in json.loads(Path(arguments[0], "compile_commands.json").read_text())
-        if Path(entry["file"]).is_relative_to(ROOT / "src") and (not wanted or entry["file"] in wanted)
+        if (entry["file"] in wanted if wanted else Path(entry["file"]).is_relative_to(ROOT / "src") or "/Unity/" in entry["file"])
     ]
 
     def check(entry: dict[str, str]) -> bool:

@@ -6,6 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/files/png.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/sensor_spec.h"
 #include "mjsense/hdf5/lzf.h"
@@ -79,6 +80,17 @@ void bind_core(nb::module_& m) {
       },
       nb::arg("packed"), nb::arg("most"),
       "Unpacks a chunk of HDF5's filter lzf; no bytes if it is damaged or larger than ``most``.");
+
+  m.def(
+      "encode_png",
+      [](nb::bytes pixels, int width, int height, int channels, int bits) {
+        constexpr int kFastest = 1;
+        const auto* data = reinterpret_cast<const std::uint8_t*>(pixels.c_str());
+        const auto png = encode_png({data, pixels.size()}, width, height, channels, kFastest, bits);
+        return nb::bytes(reinterpret_cast<const char*>(png.data()), png.size());
+      },
+      nb::arg("pixels"), nb::arg("width"), nb::arg("height"), nb::arg("channels"), nb::arg("bits"),
+      "A PNG of dense pixels; those of 16 bits have the high byte first.");
 
   nb::class_<SensorSpec>(m, "SensorSpec",
                          "Description of a measurement: name, type, shape, unit, frame and range.")

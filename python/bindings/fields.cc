@@ -25,9 +25,18 @@ std::string context_of(nb::handle config) {
   return context;
 }
 
+// Empty for a class: its attributes are the defaults of its fields, not values that were given.
 std::string kind_of(nb::handle config) {
+  if (nb::isinstance<nb::type_object>(config)) return "";
   nb::object kind = nb::getattr(config, "kind", nb::none());
   return nb::isinstance<nb::str>(kind) ? nb::cast<std::string>(kind) : "";
+}
+
+// As in an error: "'two'", or "the class GridPatternCfg; write GridPatternCfg(...)".
+std::string text_of(nb::handle value) {
+  if (!nb::isinstance<nb::type_object>(value)) return nb::cast<std::string>(nb::repr(value));
+  const auto name = nb::cast<std::string>(value.attr("__name__"));
+  return "the class " + name + "; write " + name + "(...)";
 }
 
 // Converts the value of a configuration's attribute to its declared type.
@@ -37,7 +46,7 @@ struct Reader {
 
   [[noreturn]] void fail(nb::handle value, const FieldType& type) const {
     const std::string text = context_of(config) + ": " + field.name + " must be " + expected(type) +
-                             ", not " + nb::cast<std::string>(nb::repr(value));
+                             ", not " + text_of(value);
     throw nb::type_error(text.c_str());
   }
 
@@ -117,6 +126,7 @@ struct Reader {
   }
 
   void object(nb::handle value, const StructDecl& decl, void* out, const FieldType& type) const {
+    if (nb::isinstance<nb::type_object>(value)) fail(value, type);
     for (const FieldDecl& f : decl.fields) {
       if (f.type && !nb::hasattr(value, f.name)) fail(value, type);
     }
@@ -183,7 +193,7 @@ std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config) {
     read_struct(config, *known.cfg, fields);
     return cfg;
   }
-  const std::string text = "not a sensor configuration: " + nb::cast<std::string>(nb::repr(config));
+  const std::string text = "not a sensor configuration: " + text_of(config);
   throw nb::type_error(text.c_str());
 }
 

@@ -36,7 +36,6 @@ class WrittenRows final : public Sensor {
   void compute(const World& /*world*/) override {}
 };
 
-// `episodes` and so on are fields of RecordJobCfg, of which a recorder uses those about files.
 class PyRecorder {
  public:
   // `simulation` is None if all sensors are rows that Python writes.
@@ -52,27 +51,13 @@ class PyRecorder {
     cfg.fps = {fps_num, fps_den};
     cfg.settings = settings;
     if (sim_) cfg.model = sim_->open().model();
-    for (const char* name : {"house", "episodes", "batches", "gzip"}) {
-      int& value = std::string_view(name) == "house"      ? cfg.house
-                   : std::string_view(name) == "episodes" ? cfg.episodes
-                   : std::string_view(name) == "batches"  ? cfg.batches
-                                                          : cfg.gzip;
-      value = nb::cast<int>(options[name]);
-      options.attr("pop")(name);
-    }
-    for (const auto& [name, value] : {std::pair{"resume", &cfg.resume},
-                                      {"append", &cfg.append},
-                                      {"overwrite", &cfg.overwrite}}) {
-      *value = nb::cast<bool>(options[name]);
-      options.attr("pop")(name);
-    }
     if (options.contains("archive")) {
       const auto archive = nb::cast<nb::tuple>(options.attr("pop")("archive"));
       const auto bytes = nb::cast<nb::bytes>(archive[1]);
       cfg.archive_name = nb::cast<std::string>(archive[0]);
       cfg.archive.assign(bytes.c_str(), bytes.size());
     }
-    read_options(options, struct_of<record::VideoCfg>(), &cfg.video);
+    read_options(options, struct_of<record::FilesCfg>(), static_cast<record::FilesCfg*>(&cfg));
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
     nb::gil_scoped_release unlock;

@@ -410,15 +410,6 @@ void bind_rollout(nb::module_& m) {
       nb::arg("options"),
       "Task, robot and scene of a recording, its number of attempts, and the directory of its "
       "shard.");
-  m.def(
-      "rollout_options",
-      [] {
-        std::vector<std::string> names;
-        for (const FieldDecl& field : struct_of<tasks::rollout::RolloutCfg>().fields)
-          names.emplace_back(field.name);
-        return names;
-      },
-      "Names of the options of a rollout, which are also those of a recording's settings.");
   m.def("task_names", &tasks::rollout::task_names, "Names of the tasks there are.");
   m.def("robot_names", &tasks::robots::robot_names, "Names of the robots there are.");
   m.def("policy_names", &tasks::rollout::policy_names, "Names of the policies there are.");

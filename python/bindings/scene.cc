@@ -165,6 +165,15 @@ void bind_scene(nb::module_& m) {
       nb::arg("type"), "Raises if MuJoCo has no type of elements of this name.");
   m.def("check_cfg", &check_cfg, nb::arg("config"), "Raises if a configuration is wrong.");
   m.def(
+      "check_options",
+      [](const std::string& name, nb::dict options) {
+        const StructDecl& decl = *find_struct(name);
+        const std::shared_ptr<void> object = decl.make();
+        read_options(options, decl, object.get());
+        check_fields(decl, object.get(), "");
+      },
+      nb::arg("struct"), nb::arg("options"), "Raises if a value of a struct's field is wrong.");
+  m.def(
       "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },
       "Key in a scene's registry.");
   m.def("schema", &schema_json, "All configurations and data classes, as JSON.");

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/fields/fields.h"
+#include "mjsense/replay/render_cfg.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/all_sensors.h"
 #include "mjsense_tasks/robots/load_robot.h"
@@ -186,6 +187,11 @@ const Schema& schema() {
     schema.add(struct_of<tasks::scenes::SceneFileCfg>());
     schema.add(struct_of<tasks::rollout::RecordJobCfg>());
     schema.add(struct_of<tasks::rollout::RolloutCfg>());
+    schema.add(struct_of<replay::RenderCfg>());
+    schema.add(struct_of<sensors::ImageCfg>());
+    schema.add(struct_of<sensors::RgbCfg>());
+    schema.add(struct_of<record::FilesCfg>());
+    schema.add(struct_of<record::VideoCfg>());
     return schema;
   }();
   return kSchema;

@@ -11,6 +11,7 @@ import pytest
 from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
+from mjsense.cluster import exporting as cluster_exporting
 from mjsense.core.old_names import MOVED
 
 # Users write the methods of the first three; environments have those of Gymnasium, see below. A viewer is made by a function.
@@ -80,7 +81,7 @@ def live(tmp_path_factory):
     sim = mjs.Simulation(scene, num_worlds=2)
     objects = [scene, sim, *(scene[k] for k in ("touch", "scan", "lidar", "height", "eye", "imu", "ball/acc")), scene["ball"]]
     objects += [mjs.SensorSuite([scene["scan"]]), mjs.sensors.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
-    objects += [mjs.Recorder(tmp_path_factory.mktemp("data"), sim, [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.tasks.WorldState(sim, 0, 0)]
+    objects += [mjs.Recorder(sim, tmp_path_factory.mktemp("data"), [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.tasks.WorldState(sim, 0, 0)]
     objects[-2].reset()
     mjs.record("pick", out=(data := tmp_path_factory.mktemp("pick")), width=32, height=24, horizon=2, keep_failures=True, num_worlds=1)
     dataset = mjs.Dataset(data)
@@ -304,3 +305,15 @@ def test_the_number_of_worlds_has_one_name(tmp_path):
         assert pipeline.num_envs == 2
     with pytest.raises(TypeError, match=r"'worlds'; did you mean 'num_worlds'\?$"):
         mjs.check_replay(data, worlds=2, num_worlds=2)
+
+
+def test_the_source_comes_before_the_output(tmp_path, monkeypatch):
+    sim = mjs.Simulation(ball_scene())
+    with pytest.warns(DeprecationWarning, match=r"^Recorder\(out, simulation, ...\) is now Recorder\(simulation, out, ...\)$") as caught:
+        old = mjs.Recorder(tmp_path / "old", sim, [])
+    assert caught[0].filename == __file__ and old._simulation is sim and (tmp_path / "old").is_dir()
+    with pytest.raises(TypeError, match=r"Recorder\(\): simulation must be a Simulation.*, not 'data'"), pytest.warns(DeprecationWarning):
+        mjs.Recorder("data", "data")
+    monkeypatch.setattr(cluster_exporting, "module_of", lambda format: (_ for _ in ()).throw(ValueError(format)))
+    with pytest.warns(DeprecationWarning, match=r"^export_on_ray\(format, root, out\) is now"), pytest.raises(ValueError, match=r"^mcap$"):
+        cluster_exporting.export_on_ray("mcap", tmp_path, tmp_path / "out")

@@ -349,7 +349,7 @@ def test_suites_and_recorders_take_attached_sensors(tmp_path):
     model, datas = started(2)
     with mjs.attach(model, datas, sensors()) as attached:
         suite = mjs.SensorSuite([attached["touch"], attached["acc"], attached.add(mjs.sensors.PoseSensor("pose", body="box"))])
-        with mjs.Recorder(tmp_path, attached.simulation, suite, episodes=2) as recorder:
+        with mjs.Recorder(attached.simulation, tmp_path, suite, episodes=2) as recorder:
             for world in range(2):
                 recorder.begin_episode(world, world)
             for _ in range(5):

@@ -143,7 +143,7 @@ class TestExport:
         monkeypatch.setattr("mjsense.exporting.rlds._SHARD_BYTES", 50_000)
         shown = []
         (tmp_path / "ray").mkdir()
-        ours = export_on_ray(format, index, tmp_path / "ray/data", progress=lambda *now: shown.append(now))
+        ours = export_on_ray(index, tmp_path / "ray/data", format=format, progress=lambda *now: shown.append(now))
         theirs = mjs.export(index, tmp_path / "data", format=format)
         assert files_of(ours) == files_of(theirs) and shown[-1] == (5, 5)
         assert [path.name for path in (tmp_path / "ray").iterdir()] == ["data"]
@@ -152,7 +152,7 @@ class TestExport:
             compared = subprocess.run([program, "rrd", "compare", "--unordered", file, theirs / file.name], capture_output=True, text=True)
             assert compared.returncode == 0, compared.stderr
         with pytest.raises(FileExistsError, match="exists; name another output"):
-            export_on_ray(format, index, ours)
+            export_on_ray(index, ours, format=format)
 
 
 def test_killed_workers(alone, tmp_path):

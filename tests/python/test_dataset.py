@@ -194,7 +194,7 @@ def test_lossless_depth_is_what_the_sensor_measured(tmp_path):
     camera = mjs.CameraSensorCfg(name="eye", pos=(0, -2, 0.5), quat=(0.7, 0.7, 0, 0), width=16, height=8, data_types=("rgb", "depth"))
     sim = mjs.Simulation(ball_scene(camera), num_worlds=1, decimation=10)
     seen = []
-    with mjs.Recorder(tmp_path, sim, list(sim.scene.sensors.values()), episodes=1) as recorder:
+    with mjs.Recorder(sim, tmp_path, list(sim.scene.sensors.values()), episodes=1) as recorder:
         recorder.begin_episode(0, episode=0)
         for _ in range(4):
             seen.append(sim.scene.camera("eye").data.depth[0].copy())

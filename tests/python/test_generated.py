@@ -10,6 +10,7 @@ import pytest
 
 import mjsense as mjs
 from mjsense import _core
+from mjsense.core.declared_fields import declared_fields
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCHEMA = json.loads(_core.schema())
@@ -44,4 +45,12 @@ def test_options_and_defaults_are_the_same_everywhere():
     assert {"crf", "preset", "ffmpeg", "molmospaces_depth", "num_worlds", "action_noise"} <= set(record)
     for name in set(record) & set(make_vec) - {"policy", "action_noise", "out", "seed"}:
         assert record[name].default == make_vec[name].default, name
+    for function in (mjs.Recorder, mjs.RecordEpisodes.__init__, mjs.play, mjs.import_robomimic, mjs.import_lerobot):
+        parameters = inspect.signature(function).parameters
+        assert {"batches", "gzip", "crf", "preset", "tune", "keyint"} <= parameters.keys(), function
+        for name in parameters.keys() & declared_fields("FilesCfg").keys() - {"episodes"}:
+            finer = name == "crf" and function is mjs.import_lerobot
+            assert parameters[name].default == (18 if finer else record[name].default), (function, name)
+    for name in inspect.signature(mjs.render).parameters.keys() & (declared_fields("ImageCfg") | declared_fields("VideoCfg")).keys() - {"ffmpeg"}:
+        assert inspect.signature(mjs.render).parameters[name].default is None, name
     assert record["seed"].default == 0 and make_vec["seed"].default is None  # a recording is reproducible, an environment draws entropy

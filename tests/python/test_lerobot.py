@@ -94,7 +94,7 @@ def record(tmp_path_factory):
             sim = mjs.Simulation(ball_scene(camera), num_worlds=2, decimation=10)
             made[fps] = tmp_path_factory.mktemp("data")
             rng = np.random.default_rng(0)
-            with mjs.Recorder(made[fps], sim, [*sim.scene.sensors.values(), Height()], episodes=2, fps=fps) as recorder:
+            with mjs.Recorder(sim, made[fps], [*sim.scene.sensors.values(), Height()], episodes=2, fps=fps) as recorder:
                 for world in range(2):
                     recorder.begin_episode(world, episode=world, seed=0)
                 recorder.append()

@@ -63,7 +63,7 @@ CASES = {
     "import": (lambda u: mjs.import_robomimic("x", out="y", fp=3), ["import_robomimic()", "'fp'", "did you mean 'fps'?"]),
     "attach": (lambda u: mjs.attach(1, 2, sensor=()), ["attach()", "'sensor'", "did you mean 'sensors'"]),
     "Simulation": (lambda u: mjs.Simulation(scene_of(), num_world=2), ["Simulation()", "'num_world'", "'num_worlds'"]),
-    "Recorder": (lambda u: mjs.Recorder("x", u.sim, ovewrite=True), ["Recorder()", "'ovewrite'", "did you mean 'overwrite'?"]),
+    "Recorder": (lambda u: mjs.Recorder(u.sim, "x", ovewrite=True), ["Recorder()", "'ovewrite'", "did you mean 'overwrite'?"]),
     "step": (lambda u: u.sim.step(controlsteps=2), ["Simulation.step()", "'controlsteps'", "did you mean 'control_steps'?"]),
     # words
     "image type in capitals": (lambda u: mjs.CameraSensorCfg(name="c", data_types=("RGB",)), ["camera 'c'", "data_types", "'RGB'", "did you mean 'rgb'?"]),
@@ -110,7 +110,7 @@ CASES = {
     "write to sim.model": (lambda u: setattr(u.sim.model.opt, "gravity", [0, 0, -1]), ["read-only", "'opt.gravity'", "sim.options.gravity"]),
     "write to an element": (lambda u: setattr(u.sim.model.body("ball"), "mass", 1), ["read-only", "'body_mass'", "sim.randomize('body_mass', values)"]),
     # order of calls
-    "append without begin_episode": (lambda u: mjs.Recorder(u.tmp / "r", u.sim, []).append(), ["append", "no world records an episode", "begin_episode("]),
+    "append without begin_episode": (lambda u: mjs.Recorder(u.sim, u.tmp / "r", []).append(), ["append", "no world records an episode", "begin_episode("]),
     "task without evaluate": (lambda u: mjs.make_vec(Misspelt()), ["Misspelt", "no method evaluate(sim)", "'evalute'"]),
     "scene used twice": (lambda u: mjs.Simulation(u.sim.scene), ["this scene belongs to a simulation already", "Scene(scene.cfg)"]),
     # recordings
@@ -161,6 +161,14 @@ CASES = {
     "text for a pattern": (
         lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef("body", "ball"), pattern="grid"),
         ["RayCastSensorCfg 'r'", "pattern", "GridPatternCfg", "'grid'"],
+    ),
+    "a class for a pattern": (
+        lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef("body", "ball"), pattern=mjs.GridPatternCfg),
+        ["RayCastSensorCfg 'r'", "pattern", "the class GridPatternCfg", "write GridPatternCfg(...)"],
+    ),
+    "a class for a reference": (
+        lambda u: mjs.RayCastSensorCfg(name="r", frame=mjs.ObjRef),
+        ["RayCastSensorCfg 'r'", "frame must be", "the class ObjRef", "write ObjRef(...)"],
     ),
     "text for a reference": (lambda u: mjs.RayCastSensorCfg(name="r", frame="ball"), ["RayCastSensorCfg 'r'", "frame", "ObjRef", "'ball'"]),
     "distance of rays": (
@@ -259,10 +267,10 @@ CASES = {
     ),
     "camera of a recording": (lambda u: mjs.record("pick", out=u.tmp / "q", cameras=["wrist"]), ["robot 'franka'", "'wrist'", "wrist_camera"]),
     "a folder below a file": (lambda u: mjs.record("pick", out="/dev/null/x", cameras=[]), ["'/dev/null/x/house_0'", "Not a directory"]),
-    "rate": (lambda u: mjs.Recorder(u.tmp / "r", u.sim, [], fps=0), ["Recorder()", "fps is 0", "positive"]),
-    "names for sensors": (lambda u: mjs.Recorder(u.tmp / "r", u.sim, ["feet"]), ["'feet'", "mjsense.Sensor"]),
+    "rate": (lambda u: mjs.Recorder(u.sim, u.tmp / "r", [], fps=0), ["Recorder()", "fps is 0", "positive"]),
+    "names for sensors": (lambda u: mjs.Recorder(u.sim, u.tmp / "r", ["feet"]), ["'feet'", "mjsense.Sensor"]),
     "finish without begin": (
-        lambda u: mjs.Recorder(u.tmp / "r", u.sim, [u.sim.scene["feet"]]).finish_episode(0),
+        lambda u: mjs.Recorder(u.sim, u.tmp / "r", [u.sim.scene["feet"]]).finish_episode(0),
         ["finish", "no episode", "world 0"],
     ),
     # reading and converting recordings

@@ -62,7 +62,7 @@ def test_cluster(data, tmp_path, monkeypatch):
     ray.init("local", num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="ERROR", runtime_env=folder)
     try:
         shown = []
-        ours = export_on_ray("lines", data, tmp_path / "a", progress=lambda *now: shown.append(now))
+        ours = export_on_ray(data, tmp_path / "a", format="lines", progress=lambda *now: shown.append(now))
         assert ours.read_text() == mjs.export(data, tmp_path / "b", format="lines").read_text() and shown == [(2, 5), (4, 5), (5, 5)]
     finally:
         ray.shutdown()

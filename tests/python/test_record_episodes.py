@@ -235,7 +235,8 @@ def test_vector_environments(tmp_path, kind, mode):
     env = kind([lambda n=n: Counter(n) for n in lengths], autoreset_mode=mode)
     cameras = {} if mode == AutoresetMode.SAME_STEP else {"view": "render"}
     env = mjs.RecordEpisodes(env, tmp_path, 6, cameras=cameras)
-    assert isinstance(env, mjs.recording.RecordVectorEpisodes)
+    assert isinstance(env, mjs.recording.RecordVectorEpisodes) and isinstance(env, mjs.RecordEpisodes)
+    assert not isinstance(env.env, mjs.RecordEpisodes)
     env.reset(seed=5)
     for step in range(100):
         if env.recording.complete:
@@ -448,11 +449,20 @@ def test_replay_and_render_say_that_another_environment_cannot_be_simulated(use,
         use(tmp_path / "data", tmp_path / "out")
 
 
+def test_options_of_videos(tmp_path):
+    with mjs.RecordEpisodes(Counter(), tmp_path, 1, cameras={"view": "render"}, keyint=4, tune="") as env:
+        run(env)
+    video = mjs.Dataset(tmp_path).episodes[0]._recording.video
+    assert (video["keyint"], video["tune"]) == (4, "")
+
+
 def test_errors(tmp_path):
     with pytest.raises(TypeError, match="has no MuJoCo `model` and `data`"):
         mjs.RecordEpisodes(Counter(), tmp_path, 1, cameras={"front": "front"})
-    with pytest.raises(TypeError, match="unexpected arguments quality; options are house"):
-        mjs.RecordEpisodes(Counter(), tmp_path, 1, quality=3)
+    with pytest.raises(TypeError, match=r"RecordEpisodes\(\) .*'keyin'.*did you mean 'keyint'"):
+        mjs.RecordEpisodes(Counter(), tmp_path, 1, keyin=3)
+    with pytest.raises(ValueError, match="keyint is 0: must be at least 1"):
+        mjs.RecordEpisodes(Counter(), tmp_path, 1, keyint=0)
     with pytest.raises(ValueError, match="episodes is 0: must be at least 1"):
         mjs.RecordEpisodes(Counter(), tmp_path, 0)
     with pytest.raises(ValueError, match=r"do not see the last state of an episode with AutoresetMode.SAME_STEP"):

@@ -34,7 +34,7 @@ def read(recorder, *keys):
 def test_user_defined_loop(tmp_path):
     sim = simulation()
     heights = []
-    with mjs.Recorder(tmp_path, sim, [*sim.scene.sensors.values(), Height()], episodes=2, settings={"gravity": 9.81}) as recorder:
+    with mjs.Recorder(sim, tmp_path, [*sim.scene.sensors.values(), Height()], episodes=2, settings={"gravity": 9.81}) as recorder:
         for world in range(2):
             recorder.begin_episode(world, episode=world, seed=4)
         recorder.append()
@@ -64,7 +64,7 @@ def test_all_camera_fields_are_recorded(tmp_path):
         name="eye", pos=(0, -2, 0.5), quat=(0.7, 0.7, 0, 0), width=16, height=8, data_types=("rgb", "segmentation", "normals")
     )
     sim = mjs.Simulation(ball_scene(camera), num_worlds=1)
-    with mjs.Recorder(tmp_path, sim, episodes=1) as recorder:
+    with mjs.Recorder(sim, tmp_path, episodes=1) as recorder:
         recorder.begin_episode(0, episode=0)
         recorder.append()
         seen = {field: getattr(sim.scene["eye"].data, field)[0].copy() for field in ("segmentation", "normals", "intrinsics", "pose")}
@@ -80,7 +80,7 @@ def test_all_camera_fields_are_recorded(tmp_path):
 def test_unfinished_recording_can_be_resumed(tmp_path):
     sim = simulation()
     sensors = [Height()]
-    recorder = mjs.Recorder(tmp_path, sim, sensors, episodes=2)
+    recorder = mjs.Recorder(sim, tmp_path, sensors, episodes=2)
     recorder.begin_episode(0, 0)
     recorder.append([0])
     recorder.finish_episode(0)
@@ -94,8 +94,8 @@ def test_unfinished_recording_can_be_resumed(tmp_path):
     assert recorder.kept == 1 and recorder.decided(2) and not recorder.decided(1)
     del recorder
     with pytest.raises(ValueError, match="resume"):
-        mjs.Recorder(tmp_path, sim, sensors, episodes=2)
-    with mjs.Recorder(tmp_path, sim, sensors, episodes=2, resume=True) as recorder:
+        mjs.Recorder(sim, tmp_path, sensors, episodes=2)
+    with mjs.Recorder(sim, tmp_path, sensors, episodes=2, resume=True) as recorder:
         assert recorder.kept == 1 and recorder.decided(2)
         recorder.begin_episode(0, 1)
         recorder.append([0])
@@ -109,15 +109,15 @@ def test_errors(tmp_path):
 
     sim = simulation()
     for call, error, text in [
-        (lambda: mjs.Recorder(tmp_path, sim, [3]), TypeError, "not a sensor: 3 is not a mjsense.Sensor"),
-        (lambda: mjs.Recorder(tmp_path, sim, [Loose()]), ValueError, "sensor 'loose' cannot be recorded"),
-        (lambda: mjs.Recorder(tmp_path, sim, episodes=0), ValueError, "episodes"),
-        (lambda: mjs.Recorder(tmp_path, sim, fps=0), ValueError, "fps is 0"),
+        (lambda: mjs.Recorder(sim, tmp_path, [3]), TypeError, "not a sensor: 3 is not a mjsense.Sensor"),
+        (lambda: mjs.Recorder(sim, tmp_path, [Loose()]), ValueError, "sensor 'loose' cannot be recorded"),
+        (lambda: mjs.Recorder(sim, tmp_path, episodes=0), ValueError, "episodes"),
+        (lambda: mjs.Recorder(sim, tmp_path, fps=0), ValueError, "fps is 0"),
         (lambda: recorder.begin_episode(2, 0), ValueError, r"world 2: must be in \[0, 2\)"),
         (lambda: recorder.append([0], reward=[1, 2]), ValueError, r"reward has shape \(2,\), expected one value, or \(1,\) for the worlds \[0\]"),
         (lambda: recorder.append([1]), Exception, "1"),
     ]:
-        recorder = mjs.Recorder(tmp_path / str(len(list(tmp_path.iterdir()))), sim, [sim.scene["eye"]], episodes=1)
+        recorder = mjs.Recorder(sim, tmp_path / str(len(list(tmp_path.iterdir()))), [sim.scene["eye"]], episodes=1)
         recorder.begin_episode(0, 0)
         with pytest.raises(error, match=text):
             call()
@@ -128,7 +128,7 @@ def test_episodes_can_be_added_and_replaced(tmp_path):
     sim, height = simulation(), Height()
 
     def record(episodes, **options):
-        with mjs.Recorder(tmp_path, sim, [height], episodes=episodes, **options) as recorder:
+        with mjs.Recorder(sim, tmp_path, [height], episodes=episodes, **options) as recorder:
             for number in range(recorder.first_attempt, recorder.first_attempt + episodes):
                 recorder.begin_episode(0, number)
                 recorder.append([0])

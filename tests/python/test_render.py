@@ -3,13 +3,11 @@
 
 import inspect
 import json
-import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import gymnasium
 import h5py
@@ -19,6 +17,7 @@ import tasks
 from edited_recordings import changed, file_of
 
 import mjsense as mjs
+from mjsense.core.declared_fields import declared_fields
 from mjsense.dataset import render_cameras
 
 RECORDING = dict(num_worlds=2, episodes=3, keep_failures=True, horizon=8, seed=5, width=48, height=32, depth=True)
@@ -78,12 +77,10 @@ def test_the_same_cameras_give_the_same_files(recorded, tmp_path):
     assert dataset.episodes[0].settings["render"]["of"]["settings"]["task"] == "pick"
 
 
-def test_image_options_are_those_that_the_recorder_gives_to_its_cameras():
-    """An option that is added to the recorder is kept by render, whose table follows from the declarations."""
-    source = (Path(__file__).parents[2] / "src/mjsense_tasks/rollout/episode_cameras.cc").read_text()
-    given = {option: field for field, option in re.findall(r"out\.(\w+) = cfg\.(\w+);", source)}
-    assert render_cameras.image_options() == given and {"shadows", "samples", "shadow_samples"} <= given.keys()
-    assert not {"width", "height"} & given.keys()
+def test_image_options_are_those_of_cameras_and_of_render():
+    """An option that is added to ImageCfg is one of cameras and of render."""
+    given = render_cameras.image_options()
+    assert declared_fields("ImageCfg").keys() - given.keys() == {"width", "height", "depth", "segmentation"}
     assert set(given) <= inspect.signature(mjs.render).parameters.keys()
 
 
@@ -101,6 +98,15 @@ def test_every_image_option_is_kept(option, tmp_path):
     assert mjs.Dataset(tmp_path / "same").episodes[0].settings[option] == value
     mjs.render(tmp_path / "data", tmp_path / "back", **{option: default})
     assert videos(tmp_path / "back") == made["usual"]
+
+
+def test_options_of_files_are_as_recorded_unless_they_are_given(recorded, tmp_path):
+    before = mjs.Dataset(recorded).episodes[0]._recording
+    mjs.render(recorded, tmp_path / "videos", keyint=3)
+    mjs.render(recorded, tmp_path / "arrays", gzip=1)
+    encoded, copied = (mjs.Dataset(tmp_path / name).episodes[0]._recording for name in ("videos", "arrays"))
+    assert (encoded.video, encoded.gzip, copied.gzip) == (before.video | {"keyint": 3}, before.gzip, 1)
+    assert videos(tmp_path / "arrays") == videos(recorded) != videos(tmp_path / "videos")
 
 
 @pytest.mark.parametrize(
@@ -362,7 +368,7 @@ def test_errors(recorded, tmp_path):
         (dict(add_cameras={"top": {**TOP, "body": "hand"}}), "hand"),
         (dict(add_cameras={"wrist_camera": TOP}), "two cameras are named 'wrist_camera'"),
         (dict(camera_system="droit"), "droid"),
-        (dict(brightness=0.0), "brightness is 0.0: must be positive"),
+        (dict(brightness=0.0), "brightness is 0: must be above 0"),
         (dict(num_worlds=0), "worlds is 0: must be at least 1"),
         (dict(sensors=[mjs.ContactSensorCfg(name="c", primary=mjs.ContactMatch("body", "robot_0/base"), track_air_time=True)]),
          "sensor 'c' depends on the physics steps between observations"),

@@ -292,7 +292,7 @@ def test_a_recorder_compares_the_model(tmp_path):
         model = f'<mujoco><worldbody><body><geom name="g" size="{size}"/></body></worldbody></mujoco>'
         sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities={"box": mjs.EntityCfg(model=model)})), num_worlds=1)
         simulations.append(sim)
-        return mjs.Recorder(tmp_path, sim, [Height()], episodes=2, resume=True)
+        return mjs.Recorder(sim, tmp_path, [Height()], episodes=2, resume=True)
 
     def record(recorder, episode):
         recorder.begin_episode(0, episode)

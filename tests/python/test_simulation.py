@@ -445,13 +445,13 @@ def test_a_mask_selects_worlds_everywhere(sim, tmp_path):
         pipeline(np.full((4, 1), value))
     pipeline.reset(mask)
     assert (pipeline(np.full((4, 1), 3.0))[:, 0] == 3).tolist() == mask
-    with mjs.Recorder(tmp_path, sim) as recorder:
+    with mjs.Recorder(sim, tmp_path) as recorder:
         for world in range(4):
             recorder.begin_episode(world, world)
             recorder.append(np.arange(4) == world)
         recorder.finish_episode(2)
         for world in (0, 1, 3):
             recorder.abandon_episode(world)
-    for call in (sim.reset, sim.forward, pipeline.reset, mjs.Recorder(tmp_path / "more", sim).append):
+    for call in (sim.reset, sim.forward, pipeline.reset, mjs.Recorder(sim, tmp_path / "more").append):
         with pytest.raises(ValueError, match=r"world_ids: a mask of shape \(2,\) for 4 worlds"):
             call([True, False])

@@ -134,12 +134,12 @@ def test_ray_trims_as_one_process_does(recordings, tmp_path):
     ray.init("local", num_cpus=1, include_dashboard=False, log_to_driver=False, logging_level="ERROR")
     try:
         with pytest.raises(ValueError, match=r"trim_idle is an option of the formats .* and zarr; mcap shows episodes with their times"):
-            export_on_ray("mcap", recordings["pick_and_place"], tmp_path / "mcap", trim_idle=True)
+            export_on_ray(recordings["pick_and_place"], tmp_path / "mcap", format="mcap", trim_idle=True)
         for trim in (None, False):
             ours = export_on_ray(
-                "robomimic",
                 recordings["pick_and_place"],
                 tmp_path / f"ray_{trim}.hdf5",
+                format="robomimic",
                 **({} if trim is None else {"trim_idle": trim}),
             )
             theirs = mjs.exporting.export_robomimic(recordings["pick_and_place"], tmp_path / f"alone_{trim}.hdf5", trim_idle=trim)

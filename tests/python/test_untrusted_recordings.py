@@ -4,6 +4,7 @@ verify`` refuses what a reader refuses. Nothing outside of the recording is read
 
 import contextlib
 import json
+import math
 import os
 import re
 import resource
@@ -106,6 +107,7 @@ def test_an_unchanged_recording_is_read_and_verified(root, tmp_path):
         (lambda about: about.update(fps="nan"), "fps is 'nan'; it must be a rate"),
         (lambda about: about.update(fps="1" * 5000), "it must be a rate"),
         (lambda about: about.update(fps=[15]), "fps is [15]; it must be a rate"),
+        (lambda about: about.update(versions={"mujoco": math.nan}), "contains the number nan; all numbers must be finite"),
         (lambda about: about.update(gzip=12), "gzip is 12; it must be a whole number from 0 to 9"),
         (lambda about: about.update(model_archive="../../model.zip"), "model_archive is '../../model.zip'; it must be a plain name"),
         (lambda about: about.update(model_archive="/etc/hostname"), "model_archive is '/etc/hostname'; it must be a plain name"),
@@ -425,9 +427,18 @@ def test_a_rendering_names_a_scene_with_numbers_that_json_lacks(root, tmp_path):
     with changed(file_of(root)) as file:
         scene = bytes(file["traj_0/obs_scene"][()]).decode().rstrip("\0")
         del file["traj_0/obs_scene"]
-        file["traj_0"].create_dataset("obs_scene", data=list(('{"text": NaN, ' + scene[1:]).encode()), dtype="u1")
+        file["traj_0"].create_dataset("obs_scene", data='{"text": NaN, ' + scene[1:])
     with pytest.raises(ValueError, match=r"\.h5 traj_0/obs_scene is not JSON text: it has the word NaN$"):
         mjs.render(root, tmp_path / "rendered", cameras=["wrist_camera"])
+    assert any("traj_0/obs_scene" in error and "NaN or an infinite number" in error for error in errors_of(root))
+
+
+def test_a_text_of_numbers_is_named(root, tmp_path):
+    with changed(file_of(root)) as file:
+        del file["traj_0/obs_scene"]
+        file["traj_0"].create_dataset("obs_scene", data=np.array(-1))
+    with pytest.raises(ValueError, match=r"\.h5 traj_0/obs_scene is of the type int64; it must be a text$"):
+        mjs.Dataset(root).episodes[0].obs_scene
 
 
 def test_a_description_leaves_room_for_that_of_a_rendering(root):

@@ -127,8 +127,8 @@ def test_only_what_has_changed_is_sent(live):
     colours[1, ball] = 0.2, 0.4, 0.6, 1
     live.sim.randomize("geom_rgba", colours)
     old = set(messages(live))
-    live._picker.value = 1
-    live._pick()
+    live._world_box.value = 1
+    live._change_world()
     new = [m for key, m in messages(live).items() if key not in old and type(m).__name__ == "MeshMessage"]
     assert [m.props.color for m in new] == [(51, 102, 153)]
 
@@ -197,9 +197,9 @@ def test_a_taken_port_and_the_address(live, capsys):
 @needs_viser
 def test_controls_shapes_and_curves(live):
     live._curves.choose("scan/hit_pos_w" if "scan/hit_pos_w" in live._source.streams() else "qpos")
-    for box in live._drawn.values():
+    for box in live._shape_boxes.values():
         box.value = True
-    live._draw()
+    live._draw_shapes()
     for _ in range(5):
         live.sim.step()
         live.update()
@@ -273,8 +273,8 @@ def test_user_defined_sensors_come_first(port):
         sim.step()
         viewer.update()
         assert source.value("height/z", 0) == pytest.approx(sim.data.xpos[0, 1, 2]) and (source.picture("height/image", 0) == 7).all()
-        viewer._drawn["height"].value = True
-        viewer._draw()
+        viewer._shape_boxes["height"].value = True
+        viewer._draw_shapes()
         assert [node.name for node in viewer._layer._nodes] == ["/shapes/cylinder"]
 
 
@@ -297,9 +297,9 @@ def test_memory_stays_bounded(live):
         live._server._run_garbage_collector(force=True)
         return len(messages(live))
 
-    for box in live._drawn.values():
+    for box in live._shape_boxes.values():
         box.value = True
-    live._draw()
+    live._draw_shapes()
     live._curves.choose("qpos")
     first = run(40)
     assert run(200) <= first + 10
@@ -422,9 +422,9 @@ def test_results_and_warnings_of_a_task(port):
             assert source.time(0) < 20
         assert source.value("reward", 0)[0] > 0
         viewer._policy.value = False
-        viewer._switch()
-        viewer._controls[0].value = 0.5
-        viewer._write(source.set_control, 0, viewer._controls[0])
+        viewer._switch_policy()
+        viewer._sliders[0].handles[0].value = 0.5
+        viewer._sliders[0].apply(0)
         for _ in range(30):
             source.step()
         assert abs(source.value("qpos/arm", 0)[0] - 0.5) < 0.05

@@ -73,6 +73,14 @@ def test_warp_is_imported_only_if_asked_for():
 
 
 @needs_warp
+def test_it_is_a_simulation():
+    sim = simulation()
+    assert isinstance(sim, mjs.Simulation)
+    with pytest.raises(NotImplementedError, match=r"Simulation\.draw is not available with backend='warp'"):
+        sim.draw
+
+
+@needs_warp
 @pytest.mark.parametrize(
     "scene", ["quadruped on a plane", "quadruped on rough terrain", "objects", "stones", "table with a Franka", "kitchen"]
 )
@@ -401,7 +409,7 @@ def test_a_recording_has_the_rows_of_the_device(tmp_path):
     rows = []
     for sim, out in zip(sims, ("warp", "cpu")):
         sensors = [sim.scene[name] for name in ("touch", "gyro", "height", "eye")]
-        with mjs.Recorder(tmp_path / out, sim, sensors) as recorder:
+        with mjs.Recorder(sim, tmp_path / out, sensors) as recorder:
             recorder.begin_episode(1, 0)
             for _ in range(4):
                 recorder.append()

@@ -7,12 +7,14 @@
 #include <exception>
 #include <iostream>
 
+namespace rollout = mjsense::tasks::rollout;
+
 int main(int argc, char** argv) try {
   if (argc != 2) {
     std::cerr << "records DIRECTORY\n";
     return 2;
   }
-  mjsense::tasks::RecordJobCfg job;
+  rollout::RecordJobCfg job;
   job.out = argv[1];
   job.episodes = 2;
   job.rollout.task = "pick";
@@ -22,12 +24,12 @@ int main(int argc, char** argv) try {
   job.rollout.width = 160;
   job.rollout.height = 120;
 
-  const mjsense::tasks::RecordSummary made = mjsense::tasks::record_episodes(job);
+  const rollout::RecordSummary made = rollout::record_episodes(job);
   std::cout << made.progress.kept << " episodes, " << made.progress.frames << " images\n";
   for (const auto& [reason, count] : made.failures)
     std::cout << count << " attempts failed: " << reason << "\n";
 
-  const mjsense::VerifyResult checked = mjsense::verify(job.out);
+  const mjsense::replay::VerifyResult checked = mjsense::replay::verify(job.out);
   std::cout << checked.text();
   return made.enough && checked.ok() ? 0 : 1;
 } catch (const std::exception& error) {  // names the option, what was found, what was expected

@@ -13,18 +13,18 @@ int main(int argc, char** argv) try {
     std::cerr << "sees SCENE.xml CAMERA\n";
     return 2;
   }
-  auto camera = std::make_shared<mjsense::CameraSensorCfg>();
+  auto camera = std::make_shared<mjsense::sensors::CameraSensorCfg>();
   camera->name = "picture";
   camera->camera_name = argv[2];
   camera->width = 320;
   camera->height = 240;
   camera->use_shadows = true;
 
-  mjsense::SceneCfg cfg;
+  mjsense::scene::SceneCfg cfg;
   cfg.base.path = argv[1];
   cfg.sensors = {camera};
-  auto scene = std::make_shared<mjsense::Scene>(std::move(cfg));
-  mjsense::Simulation sim(scene, {.num_worlds = 2, .decimation = 5});
+  auto scene = std::make_shared<mjsense::scene::Scene>(std::move(cfg));
+  mjsense::sim::Simulation sim(scene, {.num_worlds = 2, .decimation = 5});
   sim.step();
 
   mjsense::Sensor& picture = scene->sensor("picture");

@@ -13,6 +13,7 @@ from typing import Any
 
 from mjsense.cluster.scratch import scratch_folder
 from mjsense.cluster.tasks import check_pickle, cluster, running
+from mjsense.core.old_names import old_order
 from mjsense.dataset.remote import absolute
 from mjsense.exporting.formats import module_of
 from mjsense.exporting.functions import export, source_of
@@ -22,11 +23,17 @@ from mjsense.exporting.output import new_output, own_folder
 _CHUNK = 16  # episodes of one task
 
 
+@old_order(
+    "export_on_ray(format, root, out)",
+    "export_on_ray(root, out, format=...)",
+    ("format", "root", "out"),
+    lambda given: len(given) == 3,
+)
 def export_on_ray(
-    format: str,
     root: str | Path,
     out: str | Path,
     *,
+    format: str,
     address: str = "local",
     runtime_env: dict[str, Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -39,9 +46,9 @@ def export_on_ray(
     of episodes from which idle steps are left out.
 
     Args:
-        format: Name of the format.
         root: A recording that all workers see: a path, an index, or an address.
         out: Output, which must not exist. Unless the format is LeRobot's, a path that all workers see.
+        format: Name of the format.
         address: ``local`` for a cluster of this machine's CPUs, ``auto``, or the address of a cluster.
         runtime_env: Ray's runtime environment.
         progress: Called with the number of written episodes and of all episodes.

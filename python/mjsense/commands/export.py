@@ -52,7 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.ray:
             from mjsense.cluster import export_on_ray
 
-            export_on_ray(arguments.format, arguments.path, arguments.out, **options, progress=report, **ray_options(arguments))
+            export_on_ray(
+                arguments.path, arguments.out, format=arguments.format, **options, progress=report, **ray_options(arguments)
+            )
             return 0
         export(arguments.path, arguments.out, format=arguments.format, progress=report, **options)
         if not arguments.quiet:

@@ -46,6 +46,8 @@ class Field(NamedTuple):
     is_list: bool = False
     is_on: bool = False
     """A bool that is true by default: its option is ``--no-FLAG``."""
+    is_either: bool = False
+    """A bool without a default: its options are ``--FLAG`` and ``--no-FLAG``."""
     hidden: bool = False
     """Without an option of its own."""
     low: float | None = None

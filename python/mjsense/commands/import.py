@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.commands.parser import Parser, field_values
+
 EXAMPLES = [
     ("mjsense import robomimic demo.hdf5 data", "Write a data set of robomimic or robosuite as a recording."),
     (
@@ -23,7 +25,7 @@ EXAMPLES = [
 ]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     parser.add_argument("format", choices=["robomimic", "lerobot"], help="Format of IN.")
     parser.add_argument(
         "path", metavar="IN", help="robomimic: HDF5 file with demonstrations; lerobot: folder of a v3.0 data set."
@@ -53,6 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="lerobot: joint of each number of observation.state, '' for none; by default the names of the numbers.",
     )
+    parser.add_fields("FilesCfg", skip=("episodes", "append", "overwrite", "house", "resume", "molmospaces_depth"))
+    setattr(parser.option("--crf"), "shown_default", "25; lerobot: 18")  # noqa: B010  # argparse declares no such attribute
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -65,7 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     if others:
         raise ValueError(f"--{others[0].replace('_', '-')} is not an option of the format {arguments.format}")
-    given = {name: getattr(arguments, name) for name in ("episodes", *options[arguments.format])}
+    given = field_values(arguments, "FilesCfg") | {
+        name: getattr(arguments, name) for name in ("episodes", *options[arguments.format])
+    }
     if arguments.format == "robomimic":
         from mjsense.dataset.import_robomimic import import_robomimic
 

@@ -69,9 +69,10 @@ class Parser(argparse.ArgumentParser):
                 continue
             flag = f"--{'no-' if field.is_on else ''}{field.flag.replace('_', '-')}"
             if field.kind == "bool":
-                self.add_argument(
-                    flag, dest=field.name, action="store_const", const=not field.is_on, default=argparse.SUPPRESS, help=field.help
-                )
+                switch: dict[str, Any] = {"action": "store_const", "const": not field.is_on}
+                if field.is_either:
+                    switch = {"action": argparse.BooleanOptionalAction}
+                self.add_argument(flag, dest=field.name, default=argparse.SUPPRESS, help=field.help, **switch)
                 continue
             names = NAMES.get(_NAMED.get(field.flag, ""), ())
             listed = f" One of: {', '.join(names)}." if field.flag in _LISTED else ""

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.commands.parser import Parser, field_values
+
 EXAMPLES = [
     ("mjsense play pick", "Drive the Franka until an object is lifted, and record it into demonstrations/."),
     ("mjsense play pick_and_place --robot i2rt_yam --episodes 10 --out mine", "Record ten demonstrations with another robot."),
@@ -12,15 +14,12 @@ EXAMPLES = [
 ]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     parser.add_argument("task", help="Name of the task.")
     parser.add_argument("--robot", help="Name or .toml of the robot; by default the task's.")
     parser.add_argument("--scene", default="", help="Name or file of the scene; by default the task's.")
     parser.add_argument("--out", default="demonstrations", help="Output directory; by default demonstrations.")
-    parser.add_argument("--episodes", type=int, default=1, metavar="N", help="Number of successful episodes to keep.")
     parser.add_argument("--keep-failures", action="store_true", help="Keep failed episodes too.")
-    parser.add_argument("--append", action="store_true", help="Add episodes to a completed recording.")
-    parser.add_argument("--resume", action="store_true", help="Continue an interrupted recording.")
     parser.add_argument(
         "--device",
         choices=("keyboard", "spacemouse"),
@@ -38,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one."
     )
+    parser.add_fields("FilesCfg")
+    parser.add_fields("ImageCfg")
     parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
 
 
@@ -45,23 +46,9 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.commands import FAILED
     from mjsense.tasks.teleoperation import play
 
-    given = {
-        name: getattr(arguments, name)
-        for name in (
-            "out",
-            "scene",
-            "episodes",
-            "keep_failures",
-            "append",
-            "resume",
-            "device",
-            "arm",
-            "gripper",
-            "seed",
-            "host",
-            "port",
-        )
-    }
+    names = ("out", "scene", "keep_failures", "device", "arm", "gripper", "seed", "host", "port")
+    given = {name: getattr(arguments, name) for name in names}
+    given |= field_values(arguments, "FilesCfg") | field_values(arguments, "ImageCfg")
     summary = play(arguments.task, arguments.robot, open_browser=not arguments.no_open, **given)
     print(f"{summary.kept} of {summary.wanted} episodes are in {summary.path}.")
     return 0 if summary.enough else FAILED

@@ -7,6 +7,7 @@ import argparse
 from typing import Any
 
 from mjsense.commands._ray import add_ray, ray_options
+from mjsense.commands.parser import Parser, field_values
 
 EXAMPLES = [
     (
@@ -51,7 +52,7 @@ def _camera(text: str) -> tuple[str, dict[str, Any]]:
     return name, camera
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: Parser) -> None:
     flag = argparse.BooleanOptionalAction
     parser.add_argument("path", help="A recording.")
     parser.add_argument("out", help="Output directory.")
@@ -73,36 +74,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="Name or file of a camera system of the robot, instead of the recorded cameras.",
     )
-    parser.add_argument("--width", type=int, metavar="N", help="Width of the images; by default as recorded.")
-    parser.add_argument("--height", type=int, metavar="N", help="Height of the images; by default as recorded.")
-    parser.add_argument("--depth", action=flag, help="Depth images of all cameras; by default as recorded.")
-    parser.add_argument("--segmentation", action=flag, help="Segmentation images of all cameras; by default as recorded.")
-    parser.add_argument("--shadows", action=flag, help="Shadows; by default as recorded.")
-    parser.add_argument("--samples", type=int, metavar="N", help="Rays per pixel of rgb; by default as recorded.")
-    parser.add_argument(
-        "--shadow-samples",
-        type=int,
-        metavar="N",
-        help="Points of each lamp at which shadows are computed; by default as recorded.",
-    )
-    parser.add_argument("--brightness", type=float, metavar="X", help="Factor of all lights; by default as recorded.")
     parser.add_argument("--sensors", metavar="FILE", help="TOML file with [[sensors]] tables, as in a robot.toml.")
     parser.add_argument("--copy", action=flag, default=True, help="Copy the videos of recorded cameras that do not change.")
     parser.add_argument(
         "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
     )
-    parser.add_argument(
-        "--worlds", dest="num_worlds", type=int, default=4, metavar="N", help="Number of episodes that are rendered in parallel."
-    )
-    parser.add_argument("--threads", type=int, default=0, metavar="N", help="Number of threads; 0: one per available CPU.")
-    parser.add_argument(
-        "--batches", type=int, default=0, metavar="N", help="Number of HDF5 files of a house; 0: one per four episodes."
-    )
-    parser.add_argument(
-        "--crf", type=int, metavar="N", help="Quality of the videos, from 0 (lossless) to 51 (worst); by default as recorded."
-    )
-    parser.add_argument("--preset", metavar="NAME", help="Speed preset of the video encoder; by default as recorded.")
-    parser.add_argument("--resume", action="store_true", help="Continue an interrupted rendering.")
+    parser.add_fields("RenderCfg")
     add_ray(parser)
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
 
@@ -116,53 +93,34 @@ def run(arguments: argparse.Namespace) -> int:
         if name in added:
             raise ValueError(f"--add-camera: '{name}' is given twice")
         added[name] = camera
-    same = (
-        "cameras",
-        "camera_system",
-        "width",
-        "height",
-        "depth",
-        "segmentation",
-        "shadows",
-        "samples",
-        "shadow_samples",
-        "brightness",
-        "copy",
-        "episodes",
-        "num_worlds",
-        "threads",
-        "batches",
-        "crf",
-        "preset",
-        "resume",
-    )
+    names = ("cameras", "camera_system", "copy", "episodes")
+    options: dict[str, Any] = {name: getattr(arguments, name) for name in names}
+    options |= field_values(arguments, "RenderCfg") | {"add_cameras": added}
     if arguments.ray:
-        return _on_ray(arguments, added, [name for name in same if name not in ("batches", "episodes", "resume")])
+        return _on_ray(arguments, options)
     made = render(
         arguments.path,
         arguments.out,
-        add_cameras=added,
         progress=False if arguments.quiet else None,
         sensors=(lambda: sensors_of(arguments.sensors)) if arguments.sensors else (),
-        **{name: getattr(arguments, name) for name in same},
+        **options,
     )
     if not arguments.quiet:
         print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
     return 0
 
 
-def _on_ray(arguments: argparse.Namespace, added: dict[str, Any], names: list[str]) -> int:
+def _on_ray(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
     from functools import partial
 
     from mjsense.cluster import render_on_ray
     from mjsense.dataset.sensor_tables import sensors_of
 
-    options: dict[str, Any] = {name: getattr(arguments, name) for name in names} | {"add_cameras": added}
-    options["threads"] = arguments.threads or 1
+    options.pop("batches", None)
+    options["threads"] = options.get("threads") or 1
     if arguments.sensors:
         options["sensors"] = partial(sensors_of, arguments.sensors)
-    options |= {"episodes": arguments.episodes, "resume": arguments.resume, **ray_options(arguments)}
-    made = render_on_ray(arguments.path, arguments.out, **options)
+    made = render_on_ray(arguments.path, arguments.out, **options, **ray_options(arguments))
     if not arguments.quiet:
         print(f"{made.kept} episodes in {made.seconds:.1f} s: {made.out}")
     return 0

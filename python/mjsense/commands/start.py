@@ -199,7 +199,8 @@ def _run(words: Sequence[str]) -> int:
     try:
         return module.run(arguments)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("; continue with --resume" if hasattr(arguments, "resume") else "") from None
+        resumes = any(action.dest == "resume" for action in parser_of(arguments.command)._actions)
+        raise KeyboardInterrupt("; continue with --resume" if resumes else "") from None
 
 
 def _help() -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Old names: modules, names at the top of ``mjsense``, and arguments. They work for one version, with a warning that gives the new name."""
+"""Old names: modules, names at the top of ``mjsense``, arguments and their order. They work for one version, with a warning that gives the new one."""
 
 from __future__ import annotations
 
@@ -165,6 +165,37 @@ def old_argument(old: str, new: str) -> Callable[[T], T]:
             if old in kwargs and new not in kwargs:
                 warnings.warn(f"{context}(): the argument {old} is now {new}", DeprecationWarning, stacklevel=2)
                 kwargs[new] = kwargs.pop(old)
+            return function(*args, **kwargs)
+
+        return cast(T, call)
+
+    return decorate
+
+
+def old_order(old: str, new: str, names: tuple[str, ...], is_old: Callable[[tuple[Any, ...]], bool]) -> Callable[[T], T]:
+    """Decorates a function, or a class, whose positional arguments have another order now.
+
+    Args:
+        old: The call with the old order, ``"f(out, root)"``.
+        new: The call with the new one.
+        names: All positional arguments in the old order.
+        is_old: Whether given positional arguments, of which there is at least one, have the old order.
+    """
+
+    def decorate(target: T) -> T:
+        if isinstance(target, type):
+            cls: Any = target
+            cls.__init__ = decorate(cls.__init__)
+            return cast(T, cls)
+        function: Any = target
+        start = 1 if function.__qualname__.endswith(".__init__") else 0
+
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            given = args[start:]
+            if given and is_old(given):
+                warnings.warn(f"{old} is now {new}", DeprecationWarning, stacklevel=2)
+                return function(*args[:start], **dict(zip(names, given)), **kwargs)
             return function(*args, **kwargs)
 
         return cast(T, call)

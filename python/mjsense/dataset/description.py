@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from mjsense.core.declared_fields import declared_fields
 from mjsense.dataset import bounded_json
 from mjsense.dataset.limits import DESCRIPTION_BYTES, IMAGE_PIXELS, IMAGE_SIDE, PERIOD_MS, RATE_DIGITS, RATES, TEXT_BYTES
 from mjsense.dataset.places import is_plain_name, printable
@@ -68,6 +69,17 @@ def _is_finite(v: Any) -> bool:
     return isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) < 1e300
 
 
+def _declared(option: dict[str, Any]) -> tuple[Check, str]:
+    """The rule of an option that is a number, from its declaration."""
+    kind, low, high = option["type"]["kind"], option.get("low", -1e300), option.get("high", 1e300)
+
+    def check(v: Any) -> bool:
+        is_of_kind = isinstance(v, int) or kind != "int"
+        return _is_finite(v) and is_of_kind and low <= v <= high and not (option["above_low"] and v == low)
+
+    return check, f"a{' whole' if kind == 'int' else ''} number from {low:g} to {high:g}"
+
+
 _BOOL: tuple[Check, str] = (lambda v: isinstance(v, bool), "true or false")
 _TEXT: tuple[Check, str] = (lambda v: isinstance(v, str) and len(v) <= TEXT_BYTES, f"a text of at most {TEXT_BYTES} characters")
 _NAME: tuple[Check, str] = (lambda v: isinstance(v, str) and is_plain_name(v), "a plain name, without a folder")
@@ -91,8 +103,6 @@ _VIDEO: dict[str, tuple[Check, str]] = {
 _SETTINGS: dict[str, tuple[Check, str]] = {
     "policy_dt_ms": _between(0, PERIOD_MS),
     "shadows": _BOOL,
-    "samples": _whole(1, 4096),
-    "shadow_samples": _whole(1, 4096),
     "meshes": _word(("shapes", "real", "auto")),
     "robot": _TEXT,
     "task": _TEXT,
@@ -146,6 +156,7 @@ class Description:
         """
         what = f"{where}: the attribute 'recording'"
         table = bounded_json.parse_object(text, what, DESCRIPTION_BYTES)
+        _check_finite(what, table)
         archive, settings, video = table.get("model_archive", ""), table.get("settings", {}), table.get("video")
         if archive != "":
             _check(what, "model_archive", archive, _NAME)
@@ -156,7 +167,6 @@ class Description:
             _check(what, "video", video, _TABLE)
             chosen = {"tune": "", **_chosen(what, "video", video, _VIDEO)}  # recordings of older versions have no tuning
             chosen = {"encoder_threads" if key == "threads" else key: value for key, value in chosen.items()}
-        _check_finite(f"{what}: settings", settings)
         known = _checked_settings(f"{what}: settings", settings)
         provenance = {key: table[key] for key in _PROVENANCE if key in table}
         if video is not None:
@@ -210,7 +220,8 @@ def _checked_settings(what: str, settings: dict[str, Any]) -> dict[str, Any]:
                 _check(what, name or key, value, rule)
             known.pop(key, None)
 
-    for key, rule in _SETTINGS.items():
+    colours = {name: _declared(field) for name, field in declared_fields("RgbCfg").items()}
+    for key, rule in (_SETTINGS | colours).items():
         if key in known:
             check(key, known[key], rule)
     if "brightness" in known.get("render", {}):
@@ -239,7 +250,7 @@ def _check_finite(what: str, value: Any) -> None:
         for inner in value:
             _check_finite(what, inner)
     elif isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{what} contain the number {value}; all numbers must be finite")
+        raise ValueError(f"{what} contains the number {value}; all numbers must be finite")
 
 
 def _chosen(what: str, place: str, table: dict[str, Any], rules: dict[str, tuple[Check, str]]) -> dict[str, Any]:

@@ -323,7 +323,7 @@ class EpisodeRows:
     def _read_scene(self) -> tuple[dict[str, Any], int]:
         with open_h5(self.path) as file:
             dataset = file[self.trajectory].get("obs_scene")
-            text = "{}" if dataset is None else text_of(dataset.read())
+            text = "{}" if dataset is None else dataset.text()
         scene = bounded_json.parse_object(text, f"{self.path} {self.trajectory}/obs_scene", SCENE_BYTES)
         if isinstance(scene.get("objects", {}), (bool, int, float, str, type(None))):
             raise ValueError(

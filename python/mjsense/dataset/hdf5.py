@@ -261,6 +261,12 @@ class Rows:
         self._compare(values)
         return values if self.shape else values.reshape(())[()]
 
+    def text(self) -> str:
+        """A text, or the bytes of one without the zeros at its end."""
+        if self.is_number and self.dtype != np.uint8:
+            raise ValueError(f"{self.where} is of the type {self.dtype}; it must be a text")
+        return text_of(self.read())
+
     def check_whole(self) -> None:
         """Raises an error if there is too much to read at once."""
         most = limits.UNPACKED_FREE + limits.UNPACKED_RATIO * self._file_bytes

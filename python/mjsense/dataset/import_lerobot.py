@@ -16,13 +16,14 @@ import numpy as np
 
 from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
+from mjsense.core.declared_fields import given_options
 from mjsense.core.errors import UnknownNameError
 from mjsense.core.input_files import missing, read_text
 from mjsense.core.new_output import new_output
 from mjsense.core.optional import optional
 from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
-from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
+from mjsense.dataset.import_rows import NOT_A_NUMBER, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
 from mjsense.dataset.model_sizes import image_size
 
@@ -47,7 +48,15 @@ def import_lerobot(
     episodes: Iterable[int] | None = None,
     scene: str | Path | None = None,
     joints: Sequence[str] | None = None,
+    # options of a recording
+    batches: int = 0,
+    gzip: int = 4,
+    ffmpeg: str = "",
     crf: int = 18,
+    preset: str = "veryfast",
+    tune: str = "fastdecode",
+    keyint: int = 20,
+    # end of options
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a LeRobot v3.0 data set as a recording, which can be inspected, verified and read, and with ``scene`` replayed and rendered.
@@ -64,7 +73,18 @@ def import_lerobot(
         scene: MJCF file of the robot and its surroundings.
         joints: With ``scene``: the joint of each number of ``observation.state``, in order; ``""``: none. By default the names of the
             numbers, which must then be names of joints.
+
+        Options:
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
         crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
+        Others:
         progress: Called with the number of written episodes and of all episodes.
 
     Returns:
@@ -75,6 +95,7 @@ def import_lerobot(
         ValueError: The data set has another version, or ``joints`` does not fit its state.
         UnknownNameError: The scene has no such joint.
     """
+    files = given_options("FilesCfg", locals())
     source = _Source(Path(root))
     wanted = sorted(source.episodes) if episodes is None else [int(i) for i in episodes]
     if wrong := [i for i in wanted if i not in source.episodes]:
@@ -84,7 +105,7 @@ def import_lerobot(
     wanted = _with_rows(source, wanted)
     pose = None if scene is None else _Pose(Path(scene), source, joints)
     with new_output(out) as part:
-        writer = _Writer(part, source, pose, wanted, crf)
+        writer = _Writer(part, source, pose, wanted, files)
         for number, index in enumerate(wanted):
             writer.write(number, index)
             if progress is not None:
@@ -498,7 +519,9 @@ class _Pose:
 
 
 class _Writer:
-    def __init__(self, out: str | Path, source: _Source, pose: _Pose | None, episodes: Sequence[int], crf: int) -> None:
+    def __init__(
+        self, out: str | Path, source: _Source, pose: _Pose | None, episodes: Sequence[int], files: dict[str, Any]
+    ) -> None:
         self._source, self._pose = source, pose
         streams = Rows()
         self._cameras: dict[str, np.ndarray] = {}
@@ -541,7 +564,7 @@ class _Writer:
             self._task = streams.add("observation/task", "int64", (), what)
         self._state = None if pose is None else streams.add_state(pose.model)
         settings = {"source": source.root.name, "robot": source.robot, "format": "lerobot"}
-        options = {**OPTIONS, "episodes": len(episodes), "crf": crf} | ({"archive": pose.archive} if pose else {})
+        options = {**files, "episodes": len(episodes)} | ({"archive": pose.archive} if pose else {})
         self._recorder = streams.recorder(out, source.rate, settings, options)
 
     def write(self, number: int, index: int) -> None:

@@ -17,11 +17,12 @@ import numpy as np
 
 from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
+from mjsense.core.declared_fields import given_options
 from mjsense.core.new_output import new_output
 from mjsense.dataset import bounded_json
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.hdf5 import open_h5
-from mjsense.dataset.import_rows import NOT_A_NUMBER, OPTIONS, Rows, archive_of, compile_archive, unique_name
+from mjsense.dataset.import_rows import NOT_A_NUMBER, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
 
 if TYPE_CHECKING:
@@ -43,6 +44,15 @@ def import_robomimic(
     fps: float | None = None,
     assets: str | Path | None = None,
     model: bool = True,
+    # options of a recording
+    batches: int = 0,
+    gzip: int = 4,
+    ffmpeg: str = "",
+    crf: int = 25,
+    preset: str = "veryfast",
+    tune: str = "fastdecode",
+    keyint: int = 20,
+    # end of options
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Writes a data set of robomimic, robosuite or LIBERO as a recording, which can be inspected, read, and replayed from its states.
@@ -60,6 +70,18 @@ def import_robomimic(
         assets: Folder of the package ``robosuite`` or of LIBERO's assets, for models that name their meshes and textures; by default the
             installed ``robosuite``.
         model: Whether the models are imported, which replay needs.
+
+        Options:
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
+        Others:
         progress: Called with the number of written demonstrations and of all demonstrations.
 
     Returns:
@@ -69,6 +91,7 @@ def import_robomimic(
         FileNotFoundError: A model names a file that does not exist in these folders.
         ValueError: The file has no demonstrations, arrays of a demonstration have different lengths, or a model and its states do not fit.
     """
+    files = given_options("FilesCfg", locals())
     path = Path(file)
     with open_h5(path) as source:
         data = foreign.group_at(source, "data", str(path))
@@ -95,7 +118,7 @@ def import_robomimic(
         with new_output(out) as part:
             for house, (archive, members) in enumerate(houses.items()):
                 settings = {"env": about.name, "source": path.name, "env_args": about.arguments}
-                options = {**OPTIONS, "house": house, "episodes": len(members)} | ({"archive": archive} if archive[0] else {})
+                options = {**files, "house": house, "episodes": len(members)} | ({"archive": archive} if archive[0] else {})
                 writer = _Writer(part, members[0], about, rate, settings, options)
                 for i, demo in enumerate(members):
                     writer.write(

@@ -20,7 +20,6 @@ from mjsense.core import libmujoco
 from mjsense.dataset.archive import MAX_BYTES, MODEL_FILE, archive_bytes, files_of
 from mjsense.dataset.closed_model import check_member, close_names, compile_closed, parsed
 from mjsense.dataset.model_sizes import check_sizes
-from mjsense.recording.recorder import FILE_OPTIONS, VIDEO_OPTIONS
 from mjsense.recording.written_rows import WrittenRows
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 else:
     mujoco = libmujoco.shared
 
-OPTIONS = FILE_OPTIONS | VIDEO_OPTIONS
 NOT_A_NUMBER = " NaN: as in the imported file."
 """The end of the descriptions of its numbers."""
 _WRITTEN = "Values written into the previous state before this step; NaN: not written."

@@ -46,5 +46,3 @@ RATES = (1e-5, 1e6)
 """Observations per second."""
 PERIOD_MS = 1e8
 """Duration of one observation: about a day. [ms]"""
-SUBSTEPS = 1_000_000
-"""Physics steps between two observations."""

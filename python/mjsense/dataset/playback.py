@@ -13,7 +13,7 @@ import numpy as np
 from mjsense.core import libmujoco
 from mjsense.dataset.archive import read_archive
 from mjsense.dataset.closed_model import check_archive, compile_closed
-from mjsense.dataset.hdf5 import open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.model_fields import INPUTS, ReplayInputs, check_inputs, check_model_fields, read_input
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def check_unchanged(episode: EpisodeRows) -> None:
     """Raises ValueError if the model was written during the episode, which therefore cannot be simulated again."""
     with open_h5(episode.path) as file:
         dataset = file[episode.trajectory].get("replay/changed")
-        names = "" if dataset is None else text_of(dataset[()])
+        names = "" if dataset is None else dataset.text()
     if names:
         raise ValueError(
             f"{where(episode)} cannot be simulated from its actions: {', '.join(names.split())} of the model changed during the episode, and the "

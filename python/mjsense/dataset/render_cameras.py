@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core import mujoco_names
+from mjsense.core.declared_fields import declared_fields
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.description import is_known_thing
@@ -30,28 +30,16 @@ _DEFAULT_SIZE = (640, 480)
 
 
 @functools.cache
-def _recording_options() -> dict[str, dict[str, Any]]:
-    """The options of a recording that decide all images, as the field table declares them, by name: those that are fields of a camera, too, but
-    for the size, which each camera has. The camera's name of a switch begins with ``use_``."""
-    structs = json.loads(_core.schema())["structs"]
-    fields = {field["name"] for field in structs["CameraSensorCfg"]["fields"]} - {"width", "height"}
-    options = {option["name"]: option for option in structs["RecordJobCfg"]["fields"]}
-    return {
-        name: {**option, "camera": field}
-        for name, option in options.items()
-        for field in (name, f"use_{name}")
-        if field in fields
-    }
-
-
 def image_options() -> dict[str, str]:
-    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras."""
-    return {name: option["camera"] for name, option in _recording_options().items()}
+    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras, but for the size, which each
+    camera has. The camera's name of a switch begins with ``use_``."""
+    fields = declared_fields("CameraSensorCfg").keys() - {"width", "height"}
+    return {name: field for name in declared_fields("ImageCfg") for field in (name, f"use_{name}") if field in fields}
 
 
 def recorded_images(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Values of :func:`image_options` in a recording with these settings. One that is older than an option has its default."""
-    return {name: settings.get(name, option["default"]) for name, option in _recording_options().items()}
+    return {name: settings.get(name, declared_fields("ImageCfg")[name]["default"]) for name in image_options()}
 
 
 @dataclass(frozen=True)

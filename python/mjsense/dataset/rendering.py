@@ -16,16 +16,17 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.arguments import checked
+from mjsense.core.declared_fields import declared_fields, given_options
 from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import line_of
 from mjsense.dataset import bounded_json, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.hdf5 import open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
-from mjsense.recording.recorder import FILE_OPTIONS, recorded_sensors
+from mjsense.recording.recorder import recorded_sensors
 from mjsense.sensors.core_sensors import CoreSensor
 
 if TYPE_CHECKING:
@@ -103,16 +104,17 @@ class _House:
         cameras, self._system, unchanged = render_cameras.choose(
             first,
             options["cameras"],
-            options["add_cameras"],
+            options["add_cameras"] or {},
             options["camera_system"],
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
         )
         settings = first._recording.settings
         images = render_cameras.recorded_images(settings)
-        given = {name: options[name] for name in (*images, "brightness", "crf", "preset") if options.get(name) is not None}
-        images |= {name: value for name, value in given.items() if name in images}
-        brightness = given.get("brightness", settings.get("render", {}).get("brightness", 1.0))
-        as_recorded = options["copy"] and not options["edit"] and not given
+        images |= {name: options[name] for name in images if options[name] is not None}
+        recorded = settings.get("render", {}).get("brightness", 1.0)
+        brightness = recorded if options["brightness"] is None else options["brightness"]
+        changes = {name for name in (*images, "brightness", *declared_fields("VideoCfg")) if options.get(name) is not None}
+        as_recorded = options["copy"] and not options["edit"] and not changes - {"ffmpeg"}
         copied = unchanged if as_recorded else []
         new_cameras = [camera for camera in cameras if camera not in copied]
         self._frames = sum(1 + camera.depth for camera in new_cameras)
@@ -168,18 +170,17 @@ class _House:
         """The recorder of the new recording, whose other options are those of the old one."""
         first, sim = self._episodes[0], self._worlds.sim
         description, archive, rate = first._recording, archive_of(first), Fraction(first.fps)
-        files = FILE_OPTIONS | {
+        recorded = {"gzip": description.gzip, **(description.video or {})}
+        files = {
+            **recorded,
+            **given_options("FilesCfg", options),
             "episodes": len(self._episodes),
-            "resume": options["resume"],
             "house": first.house or 0,
-            "batches": options["batches"],
-            "gzip": description.gzip,
             "archive": (archive.name, archive.read_bytes()),
         }
-        video = (description.video or {}) | {key: options[key] for key in ("crf", "preset") if options[key] is not None}
         use_installed_ffmpeg()
         text = json.dumps(settings, sort_keys=True, separators=(",", ":"))
-        return _core.Recorder(sim._core, sim.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, files | video)
+        return _core.Recorder(sim._core, sim.num_worlds, handles, str(out), rate.numerator, rate.denominator, text, files)
 
     def run(self) -> None:
         recorder, worlds = self._recorder, self._worlds
@@ -219,7 +220,7 @@ class _House:
 
     def _finish(self, world: int, episode: Episode) -> None:
         with open_h5(episode.path) as file:
-            scene = text_of(file[episode.trajectory]["obs_scene"].read())
+            scene = file[episode.trajectory]["obs_scene"].text()
             bounded_json.require_standard(scene, f"{episode.path} {episode.trajectory}/obs_scene")
         self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
         self._recorder.finish_episode(world, scene, episode.outcome)
@@ -264,6 +265,7 @@ def render(
     cameras: Sequence[str] | None = None,
     add_cameras: Mapping[str, Mapping[str, Any]] | None = None,
     camera_system: str = "",
+    # options of a recording
     width: int | None = None,
     height: int | None = None,
     depth: bool | None = None,
@@ -272,16 +274,22 @@ def render(
     samples: int | None = None,
     shadow_samples: int | None = None,
     brightness: float | None = None,
+    num_worlds: int = 4,
+    threads: int = 0,
+    resume: bool = False,
+    batches: int = 0,
+    gzip: int | None = None,
+    ffmpeg: str = "",
+    crf: int | None = None,
+    preset: str | None = None,
+    tune: str | None = None,
+    keyint: int | None = None,
+    molmospaces_depth: bool | None = None,
+    # end of options
     edit: Callable[[Any], None] | None = None,
     sensors: Callable[[], Iterable[Any]] | Iterable[Any] = (),
     copy: bool = True,
     episodes: Sequence[int] | None = None,
-    num_worlds: int = 4,
-    threads: int = 0,
-    batches: int = 0,
-    crf: int | None = None,
-    preset: str | None = None,
-    resume: bool = False,
     progress: bool | Callable[[RenderProgress], None] | None = None,
 ) -> RenderSummary:
     """Renders recorded episodes again, with other or more cameras and sensors, into a new recording.
@@ -299,51 +307,47 @@ def render(
             along -z), all in the frame of ``body`` (full name; by default the world); and optionally ``up``, ``fovy`` (degrees),
             ``width``, ``height`` (pixels), ``depth`` and ``segmentation``.
         camera_system: Name or file of a camera system of the robot.
-        width, height: Size of all images; one alone keeps the aspect ratio. By default as recorded. [pixels]
-        depth, segmentation: Whether every camera has depth and segmentation; by default as recorded.
-        shadows, samples, shadow_samples: Whether shadows are drawn, rays per pixel of rgb, and points of each lamp at which shadows are
-            computed; by default as recorded.
-        brightness: Factor of all lights; by default as recorded.
+
+        Options:
+        width: Width of the images; by default each camera's. ``width`` or ``height`` alone keeps the aspect ratio.
+            [pixels]
+        height: Height of the images; by default each camera's. [pixels]
+        depth: Add a lossless depth image for every camera. By default as recorded.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel. By default as
+            recorded.
+        shadows: Draw shadows. By default as recorded.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer. By default as recorded.
+        shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
+            more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points. By default as
+            recorded.
+        brightness: Factor of all lights. By default as recorded.
+        num_worlds: Number of episodes that are rendered in parallel.
+        threads: Number of threads; 0: one per available CPU.
+        resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9. By default as recorded.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst). By default as recorded.
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats. By default
+            as recorded.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger. By default as recorded.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller. By default as recorded.
+        molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video. By default as
+            recorded.
+        Others:
         edit: Function that edits the MjSpec before compilation: adds lights, replaces textures, hides geoms. Bodies, joints and geoms
             must stay as they are.
         sensors: Configurations of sensors, user-defined :class:`Sensor` objects, or sensors such as :class:`PoseSensor`; for a recording
             with several houses, a function that makes them for each house. One with the name of a recorded stream replaces it.
         copy: Copy the videos of recorded cameras of which no option changes the images. False: render them again, with the same result.
         episodes: Positions of episodes in the recording; by default all.
-        num_worlds: Number of episodes that are rendered in parallel.
-        threads: Number of threads; 0: one per available CPU.
-        batches: Number of HDF5 files over which the episodes of a house are distributed; 0: one per four episodes.
-        crf, preset: Quality and speed of the video encoder; by default as recorded.
-        resume: Continue an interrupted rendering with the same arguments.
         progress: Show the progress on stderr, or a function that is called with it about ten times per second; by default shown where
             stderr is a terminal or a notebook.
     """
-    options: dict[str, Any] = {
-        "cameras": cameras,
-        "add_cameras": add_cameras or {},
-        "camera_system": camera_system,
-        "width": width,
-        "height": height,
-        "depth": depth,
-        "segmentation": segmentation,
-        "shadows": shadows,
-        "samples": samples,
-        "shadow_samples": shadow_samples,
-        "brightness": brightness,
-        "edit": edit,
-        "copy": copy,
-        "num_worlds": num_worlds,
-        "threads": threads,
-        "batches": batches,
-        "crf": crf,
-        "preset": preset,
-        "resume": resume,
-    }
-    for name, value in (("num_worlds", num_worlds), ("width", width), ("height", height), ("samples", samples)):
-        if value is not None and value < 1:
-            raise ValueError(f"{name} is {value}: must be at least 1")
-    if brightness is not None and not brightness > 0:
-        raise ValueError(f"brightness is {brightness}: must be positive")
+    options: dict[str, Any] = dict(locals())
+    _core.check_options("RenderCfg", given_options("RenderCfg", {**options, "episodes": None}))
     dataset = opened(root, episodes)
     if not dataset.episodes:
         raise ValueError(f"{dataset.root} contains no episodes")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense.core.declared_fields import declared_fields
 from mjsense.core.installed_files import use_installed_meshes
 from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
@@ -26,7 +27,7 @@ from mjsense.dataset.model_fields import ReplayInputs
 from mjsense.dataset.places import open_plain
 from mjsense.dataset.playback import fields_of, inputs_of
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
-from mjsense.recording.recorder import FILE_OPTIONS, recorded_sensors
+from mjsense.recording.recorder import recorded_sensors
 from mjsense.scene.physics_options import PREFIX
 from mjsense.scene.randomizable import field_of
 from mjsense.sim.simulation import Simulation
@@ -64,7 +65,7 @@ class _Rebuilt:
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
         settings = episode._recording.settings
         cameras = settings["cameras"]
-        options = {key: settings[key] for key in _core.rollout_options() if key in settings}
+        options = {key: settings[key] for key in declared_fields("RolloutCfg") if key in settings}
         options |= {
             "policy": "",
             "replay_sensor": True,
@@ -183,7 +184,7 @@ def _recompute(worlds: Any, episodes: list[Episode], out: Path) -> None:
     first = episodes[0]
     rate = Fraction(first.fps)
     video = first._recording.video or {}
-    options = FILE_OPTIONS | {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
+    options = {"episodes": len(episodes), "batches": 1, "gzip": 0} | video
     recorder = _core.Recorder(
         worlds.sim._core, worlds.sim.num_worlds, worlds.handles, str(out), rate.numerator, rate.denominator, "{}", options
     )

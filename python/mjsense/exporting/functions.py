@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -71,140 +72,41 @@ def source_of(format: str, root: str | Path, chosen: dict[str, Any], options: di
     return source, {name: value for name, value in given.items() if not OPTIONS[name].of_source}
 
 
-@checked
-def export_lerobot(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    exact_rate: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a LeRobot v3.0 data set.
+def _export_to(name: str) -> Callable[..., Path]:
+    """:func:`export` to one format. The options of the format are arguments of the function."""
+    format = format_of(name)
 
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-    """
-    options = {"trim_idle": trim_idle, "exact_rate": exact_rate}
-    return export(root, out, format="lerobot", map=map, episodes=episodes, success=success, progress=progress, **options)
+    def function(root: str | Path, out: str | Path, **options: Any) -> Path:
+        return export(root, out, format=name, **options)
+
+    shared = [p for p in inspect.signature(export).parameters.values() if p.name not in ("format", "options")]
+    own = [
+        inspect.Parameter(option, inspect.Parameter.KEYWORD_ONLY, default=OPTIONS[option].default, annotation="bool | None")
+        for option in format.options
+    ]
+    function.__name__ = function.__qualname__ = f"export_{name}"
+    function.__doc__ = f"Writes a recording as {format.about}. The arguments are those of :func:`mjsense.export`."
+    function.__signature__ = inspect.Signature([*shared, *own], return_annotation="Path")  # pyright: ignore[reportFunctionMemberAccess]
+    return checked(function)
 
 
-@checked
-def export_lerobot21(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    exact_rate: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``.
-
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-    """
-    options = {"trim_idle": trim_idle, "exact_rate": exact_rate}
-    return export(root, out, format="lerobot21", map=map, episodes=episodes, success=success, progress=progress, **options)
-
-
-@checked
-def export_robomimic(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
-    data for replay. Images are decoded, because robomimic reads arrays.
-
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-    """
-    options = {"trim_idle": trim_idle}
-    return export(root, out, format="robomimic", map=map, episodes=episodes, success=success, progress=progress, **options)
-
-
-@checked
-def export_rlds(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG. The name of ``out`` is
-    that of the data set: small letters, digits and ``_``.
-
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-    """
-    return export(root, out, format="rlds", map=map, episodes=episodes, success=success, trim_idle=trim_idle, progress=progress)
-
-
-@checked
-def export_zarr(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    trim_idle: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion
-    Policy's ``ReplayBuffer`` reads them. Images are decoded.
-
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-    """
-    return export(root, out, format="zarr", map=map, episodes=episodes, success=success, trim_idle=trim_idle, progress=progress)
-
-
-@checked
-def export_rerun(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a folder of ``.rrd`` files, one for each episode, which ``rerun OUT/*.rrd`` shows: the videos as they are,
-    depth images, features as curves, and, if the recording has data for replay, the geoms of the scene.
-
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-    """
-    return export(root, out, format="rerun", map=map, episodes=episodes, success=success, progress=progress)
-
-
-@checked
-def export_mcap(
-    root: str | Path,
-    out: str | Path,
-    *,
-    map: Mapping | str | Path | dict[str, Any] | None = None,
-    episodes: Iterable[int] | None = None,
-    success: bool | None = None,
-    encode_again: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
-    calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages.
-
-    The arguments are those of :func:`mjsense.export`, and options of the format (:data:`mjsense.exporting.OPTIONS`).
-
-    Raises:
-        ValueError: A video has B-frames, and ``encode_again`` is False.
-    """
-    options = {"encode_again": encode_again}
-    return export(root, out, format="mcap", map=map, episodes=episodes, success=success, progress=progress, **options)
+export_lerobot = _export_to("lerobot")
+"""Writes a recording as a LeRobot v3.0 data set."""
+export_lerobot21 = _export_to("lerobot21")
+"""Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``."""
+export_robomimic = _export_to("robomimic")
+"""Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
+data for replay. Images are decoded, because robomimic reads arrays."""
+export_rlds = _export_to("rlds")
+"""Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG. The name of
+``out`` is that of the data set: small letters, digits and ``_``."""
+export_zarr = _export_to("zarr")
+"""Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion Policy's
+``ReplayBuffer`` reads them. Images are decoded."""
+export_rerun = _export_to("rerun")
+"""Writes a recording as a folder of ``.rrd`` files, one for each episode, which ``rerun OUT/*.rrd`` shows: the videos as they are, depth
+images, features as curves, and, if the recording has data for replay, the geoms of the scene."""
+export_mcap = _export_to("mcap")
+"""Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
+calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages. Raises ValueError if a video has
+B-frames and ``encode_again`` is False."""

@@ -18,13 +18,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from mjsense import _core
 from mjsense.recording.mujoco_envs import MujocoEnvs
-from mjsense.recording.recorder import FILE_OPTIONS, VIDEO_OPTIONS, recorded_handle
+from mjsense.recording.recorder import recorded_handle
 from mjsense.recording.written_rows import WrittenRows
 from mjsense.sensors.row_declarations import Row, is_rgb, leaves, rows_of_space
 from mjsense.sensors.sensor import encode_json
 
-_OPTIONS = ("house", "batches", "gzip", *VIDEO_OPTIONS)
-"""Options of the files, which are those of :class:`mjsense.Recorder`."""
 _RGB = 3  # channels
 
 
@@ -64,38 +62,30 @@ class EpisodeRecording:
         self,
         env: Any,
         out: str | Path,
-        episodes: int,
         cameras: Mapping[str, Any] | Sequence[str],
         sensors: Sequence[Any],
         camera_size: Sequence[float],
         decimation: int | None,
         fps: float | Fraction | None,
-        resume: bool,
         keep_partial: bool,
         image_videos: bool,
         info_bytes: int,
         settings: Mapping[str, Any] | None,
-        options: Mapping[str, Any],
+        options: dict[str, Any],
     ) -> None:
-        if episodes < 1:
-            raise ValueError(f"RecordEpisodes: episodes is {episodes}: must be at least 1")
+        _core.check_options("FilesCfg", options)
         if len(camera_size) != 2:
             raise ValueError(f"RecordEpisodes: camera_size is {camera_size}: must be (height, width)")
-        if unknown := options.keys() - set(_OPTIONS):
-            raise TypeError(
-                f"RecordEpisodes() got unexpected arguments {', '.join(sorted(unknown))}; options are {', '.join(_OPTIONS)}"
-            )
         self._env = env
         self._vector = isinstance(env, VectorEnv)
         self._worlds: int = env.num_envs if self._vector else 1
         self._cameras = dict(cameras) if isinstance(cameras, Mapping) else {str(name): name for name in cameras}
         self._size = [int(n) for n in camera_size]
         self._keep_partial, self._image_videos, self._info_bytes = keep_partial, image_videos, info_bytes
-        self._options = {**FILE_OPTIONS, **VIDEO_OPTIONS, **options, "episodes": episodes, "resume": resume}
-        self._episodes = episodes
+        self._options, self._episodes = options, options["episodes"]
         self.path = Path(out) / f"house_{self._options['house']}"
         """Folder of the episodes."""
-        if not resume and self.path.exists() and any(self.path.iterdir()):
+        if not options["resume"] and self.path.exists() and any(self.path.iterdir()):
             raise ValueError(
                 f"RecordEpisodes: '{self.path}' has a recording: pass resume=True to continue it, or choose another folder"
             )
@@ -313,7 +303,7 @@ class EpisodeRecording:
             self._fps.numerator,
             self._fps.denominator,
             json.dumps(self._settings, sort_keys=True),
-            {**self._options},
+            self._options,
         )
 
     def _is_video(self, name: str, row: Row) -> bool:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABCMeta
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import partial
@@ -14,6 +15,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv, VectorWrapper
 
 from mjsense.core.arguments import checked
+from mjsense.core.declared_fields import given_options
 from mjsense.recording.episode_recording import EpisodeRecording
 
 
@@ -55,24 +57,33 @@ class _Recorded:
         camera_size: Sequence[float] = (240, 320),
         decimation: int | None = None,
         fps: float | Fraction | None = None,
+        # options of a recording
         resume: bool = False,
+        house: int = 0,
+        batches: int = 0,
+        gzip: int = 4,
+        ffmpeg: str = "",
+        crf: int = 25,
+        preset: str = "veryfast",
+        tune: str = "fastdecode",
+        keyint: int = 20,
+        molmospaces_depth: bool = False,
+        # end of options
         keep_partial: bool = False,
         image_videos: bool = False,
         info_bytes: int = 2000,
         settings: Mapping[str, Any] | None = None,
-        **options: Any,
     ) -> None:
+        options = given_options("FilesCfg", locals())
         super().__init__(env)  # pyright: ignore[reportCallIssue]  # Gymnasium's
         self.recording = EpisodeRecording(
             env,
             out,
-            episodes,
             cameras,
             sensors,
             camera_size,
             decimation,
             fps,
-            resume,
             keep_partial,
             image_videos,
             info_bytes,
@@ -96,12 +107,13 @@ class _Recorded:
 
 
 @checked
-class RecordEpisodes(_Recorded, gymnasium.Wrapper):
+class RecordEpisodes(_Recorded, gymnasium.Wrapper, metaclass=ABCMeta):  # RecordVectorEpisodes is registered as a virtual subclass
     """Records the episodes of a Gymnasium environment, MuJoCo or not, to the files of :func:`mjsense.record`::
 
         env = mjs.RecordEpisodes(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"), "data", episodes=10, cameras={"view": "render"})
 
-    Given a ``gymnasium.vector.VectorEnv``, it returns a :class:`RecordVectorEpisodes`, which does the same for all its environments.
+    Given a ``gymnasium.vector.VectorEnv``, it returns a :class:`RecordVectorEpisodes`, which does the same for all its environments,
+    and which ``isinstance`` regards as a ``RecordEpisodes``.
 
     Recorded are the observation, as ``observation`` or one stream for each entry of a dict or tuple, the action that led to it, the reward,
     ``terminated``, ``truncated``, all infos that JSON can express, the cameras and the sensors. A finished episode is safe on disk. When
@@ -118,13 +130,27 @@ class RecordEpisodes(_Recorded, gymnasium.Wrapper):
         camera_size: Height and width of the images of the model's cameras, pixels.
         decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip`` or ``n_substeps``.
         fps: Steps per second; by default ``1 / env.unwrapped.dt``, else ``env.unwrapped.control_freq``, else the metadata's ``render_fps``, else 30.
-        resume: Continue an interrupted recording with the same settings.
+
+        Options:
+        resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        house: Number of the ``house_N`` folder in the output directory. Each house of a task has its own random
+            numbers.
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
+        molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+        Others:
         keep_partial: Keep episodes that ``reset()`` or ``close()`` cuts short; by default they are discarded.
         image_videos: Store RGB images in the observation, uint8 ``[H, W, 3]`` or ``[3, H, W]``, as videos, which exports contain and which are
             smaller, but not exact. By default they are stored exactly, as arrays.
         info_bytes: Maximum length of the JSON text of a step's infos.
         settings: Further settings that produced the data, as JSON: stored in every file, and equal when a recording is resumed.
-        options: ``house``, ``batches``, ``gzip``, ``ffmpeg``, ``crf``, ``preset`` and ``molmospaces_depth`` of :class:`mjsense.Recorder`.
 
     Raises:
         ValueError: If `out` has a recording and `resume` is False, or if a camera or sensor cannot be recorded.
@@ -176,3 +202,6 @@ class RecordVectorEpisodes(_Recorded, VectorWrapper):
         """Publishes the recording and closes the environments."""
         self.recording.close()
         self.env.close(**kwargs)
+
+
+RecordEpisodes.register(RecordVectorEpisodes)

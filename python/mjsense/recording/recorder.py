@@ -13,6 +13,8 @@ import numpy as np
 from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds
+from mjsense.core.declared_fields import given_options
+from mjsense.core.old_names import old_order
 from mjsense.sensors.given_sensor import as_sensor
 from mjsense.sensors.sensor import Sensor
 from mjsense.sensors.suite import SensorSuite, add_missing
@@ -20,20 +22,6 @@ from mjsense.sim.simulation import Simulation
 
 if TYPE_CHECKING:
     from fractions import Fraction
-
-
-FILE_OPTIONS: dict[str, Any] = {
-    "episodes": 1,
-    "resume": False,
-    "append": False,
-    "overwrite": False,
-    "house": 0,
-    "batches": 0,
-    "gzip": 4,
-}
-"""Options of the C++ recorder for the files, with their defaults."""
-VIDEO_OPTIONS: dict[str, Any] = {"ffmpeg": "", "crf": 25, "preset": "veryfast", "molmospaces_depth": False}
-"""Its options for the videos that it encodes."""
 
 
 class WarpSimulation(Protocol):
@@ -48,11 +36,17 @@ class WarpSimulation(Protocol):
     def _host_rows(self, sensors: Sequence[Any]) -> Any: ...
 
 
+@old_order(
+    "Recorder(out, simulation, ...)",
+    "Recorder(simulation, out, ...)",
+    ("out", "simulation", "sensors"),
+    lambda given: isinstance(given[0], (str, Path)),
+)
 @checked
 class Recorder(KnownAttributes):
     """Records sensors row by row to the same files as :func:`mjsense.record`::
 
-        with mjs.Recorder("data", sim, sensors, episodes=2) as recorder:
+        with mjs.Recorder(sim, "data", sensors, episodes=2) as recorder:
             recorder.begin_episode(world=0, episode=0)
             recorder.append([0])                     # the observation after the reset
             for _ in range(100):
@@ -67,12 +61,12 @@ class Recorder(KnownAttributes):
 
     def __init__(
         self,
-        out: str | Path,
         simulation: Simulation | WarpSimulation,
+        out: str | Path,
         sensors: Iterable[Any] | None = None,
         *,
+        # options of a recording
         episodes: int = 1,
-        fps: float | Fraction | None = None,
         resume: bool = False,
         append: bool = False,
         overwrite: bool = False,
@@ -85,52 +79,47 @@ class Recorder(KnownAttributes):
         tune: str = "fastdecode",
         keyint: int = 20,
         molmospaces_depth: bool = False,
+        # end of options
+        fps: float | Fraction | None = None,
         settings: Mapping[str, Any] | None = None,
     ) -> None:
         """
         Args:
-            out: Output directory; the files are in ``out/house_<house>/``.
             simulation: The simulation to record. With ``backend="warp"`` the rows come to the host in one transfer for each
                 ``append()``, and the recording cannot be replayed.
+            out: Output directory; the files are in ``out/house_<house>/``.
             sensors: A :class:`SensorSuite` or sensors, in the order of the files; by default all of the scene. A camera becomes
                 videos of its ``rgb`` and ``depth`` and arrays ``<camera>_<field>`` of its other fields. User-defined sensors need
                 an ``observation_space`` or ``is_dict``.
+
+            Options:
             episodes: Number of episodes to keep.
-            fps: Rows per second; by default one row per control step.
-            resume: Continue an interrupted recording with the same settings.
-            append: Add episodes to a completed recording with the same settings. Their numbers begin at ``first_attempt``.
+            resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+            append: Add new episodes to a completed recording; all settings that affect the data must be unchanged.
             overwrite: Replace an existing recording of this house.
-            house: Number of the ``house_N`` folder.
+            house: Number of the ``house_N`` folder in the output directory. Each house of a task has its own random
+                numbers.
             batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
             gzip: Compression level of arrays, 0 to 9.
             ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
             crf: Quality of the videos, from 0 (lossless) to 51 (worst).
-            preset: Speed preset of the video encoder, from ultrafast to veryslow.
-            tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a seventh larger.
-            keyint: Maximum number of frames between key frames.
-            molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read.
+            preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+            tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+                seventh larger.
+            keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+                makes files smaller.
+            molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+            Others:
+            fps: Rows per second; by default one row per control step.
             settings: Settings that produced the data, as JSON. They are stored in every file and must be equal when a recording
                 is resumed.
         """
+        options = given_options("FilesCfg", locals())
         chosen, handles = recorded_sensors(simulation, sensors)
         self._simulation = simulation
-        self._rows = None if isinstance(simulation, Simulation) else simulation._host_rows(chosen)
+        host_rows = getattr(simulation, "_host_rows", None)  # only WarpSimulation has it
+        self._rows = host_rows(chosen) if host_rows else None
         rate = _rate(fps, simulation)
-        options = {
-            "episodes": episodes,
-            "resume": resume,
-            "append": append,
-            "overwrite": overwrite,
-            "house": house,
-            "batches": batches,
-            "gzip": gzip,
-            "ffmpeg": ffmpeg,
-            "crf": crf,
-            "preset": preset,
-            "tune": tune,
-            "keyint": keyint,
-            "molmospaces_depth": molmospaces_depth,
-        }
         text = json.dumps(dict(settings or {}), sort_keys=True, separators=(",", ":"))
         self._core = _core.Recorder(
             None if self._rows else simulation._core,

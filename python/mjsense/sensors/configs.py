@@ -309,9 +309,6 @@ class CameraSensorCfg(SensorCfg):
     """Draw the textures of materials and the skybox."""
     use_shadows: bool = False
     """Draw the shadows of lights that cast shadows."""
-    shadow_samples: int = 1
-    """Soft shadows: number of points of a light with a position at which its shadows are computed, within the ball of
-    the model's ``light_bulbradius``. 1: hard shadows. A view has at most 32 lights and points."""
     enabled_geom_groups: Sequence[int] = (0, 1, 2)
     """Geom groups (0 to 5) that are visible."""
     orthographic: bool = False
@@ -337,7 +334,10 @@ class CameraSensorCfg(SensorCfg):
     phase: float = 0.0
     """Images are taken at the first control step at or after phase + k * update_period, and at a reset. [s]"""
     samples: int = 1
-    """Rays per pixel of rgb; more samples give smoother edges."""
+    """Rays per pixel of rgb; more samples give smoother edges and take longer."""
+    shadow_samples: int = 1
+    """Points of each light at which its shadows are computed, within the ball of its ``bulbradius``; more than 1 gives
+    soft shadows and takes longer. A view has at most 32 lights and points."""
     depth_kind: Literal["planar", "ray"] = "planar"
     """planar: distance to the camera plane; ray: distance along the pixel's ray."""
     intrinsics: CameraIntrinsics | None = None

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+from abc import ABCMeta
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -51,7 +52,7 @@ class _State:
 
 
 @checked
-class Simulation(KnownAttributes):
+class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is registered as a virtual subclass
     """B parallel worlds of a scene.
 
     After ``step()``, ``reset()`` and ``forward()``, every derived quantity and every sensor belongs to the current state. Worlds
@@ -91,7 +92,8 @@ class Simulation(KnownAttributes):
             threads: Number of threads; 0: one per CPU that is available to this process.
             seed: Seed of the random numbers (noise, delays).
             backend: ``"cpu"``, or ``"warp"``: the physics of mujoco_warp and sensors on its device. The result is then a
-                :class:`mjsense.warp.simulation.WarpSimulation`.
+                :class:`mjsense.warp.simulation.WarpSimulation`, which ``isinstance`` regards as a ``Simulation``. Attributes that
+                it does not have raise NotImplementedError.
             device: With warp: ``"cpu"``, ``"cuda:0"`` ...; by default the first CUDA device, or the CPU without one.
             nconmax: With warp: contacts for which each world has memory, on average over the worlds.
             njmax: With warp: constraint rows for which each world has memory.

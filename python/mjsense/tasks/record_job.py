@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from mjsense import _core
 from mjsense.core import representations
+from mjsense.core.declared_fields import declared_fields
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.installed_files import use_installed_meshes
 from mjsense.core.progress_line import clock, line_of
@@ -96,7 +96,7 @@ class RecordSummary(RecordProgress):
 
 def check_names(options: Iterable[str]) -> None:
     """Raises UnknownNameError that names an option which a recording does not have."""
-    known = {"worlds", *(field["name"] for field in json.loads(_core.schema())["structs"]["RecordJobCfg"]["fields"])}
+    known = {"worlds", *declared_fields("RecordJobCfg")}
     for name in options:
         if name not in known:
             raise UnknownNameError(f"record: unknown option '{name}'{did_you_mean(name, known)}")

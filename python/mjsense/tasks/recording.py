@@ -36,8 +36,8 @@ def record(
     height: int | None = None,
     depth: bool = False,
     segmentation: bool = False,
-    samples: int = 1,
     shadows: bool = True,
+    samples: int = 1,
     shadow_samples: int = 1,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
@@ -48,15 +48,9 @@ def record(
     terminate_upon_success: bool = False,
     max_penetration: float | None = None,
     episodes: int = 1,
-    max_attempts: int = 0,
-    num_attempts: int = 0,
-    first_attempt: int = 0,
-    shard: str = "",
-    keep_failures: bool = False,
     resume: bool = False,
     append: bool = False,
     overwrite: bool = False,
-    replay: bool = True,
     house: int = 0,
     batches: int = 0,
     gzip: int = 4,
@@ -66,6 +60,12 @@ def record(
     tune: str = "fastdecode",
     keyint: int = 20,
     molmospaces_depth: bool = False,
+    max_attempts: int = 0,
+    num_attempts: int = 0,
+    first_attempt: int = 0,
+    shard: str = "",
+    keep_failures: bool = False,
+    replay: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     format: str = "mjsense",
@@ -99,14 +99,15 @@ def record(
         seed: Random seed; the same seed gives the same episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.
         cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
-        width: Width of the images; by default the robot's. [pixels]
-        height: Height of the images; by default the robot's. [pixels]
+        width: Width of the images; by default each camera's. ``width`` or ``height`` alone keeps the aspect ratio.
+            [pixels]
+        height: Height of the images; by default each camera's. [pixels]
         depth: Add a lossless depth image for every camera.
         segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
-        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
         shadows: Draw shadows.
-        shadow_samples: Points of each lamp at which shadows are computed; more than 1 gives soft shadows and takes
-            longer.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
+            more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.
@@ -121,17 +122,11 @@ def record(
             any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
             deeper at the start do not count. [m]
         episodes: Number of episodes to keep.
-        max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
-        num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
-        first_attempt: Number of the first attempt.
-        shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
-            directory; requires ``num_attempts``, the number of attempts of all shards.
-        keep_failures: Keep failed episodes too.
         resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
         append: Add new episodes to a completed recording; all settings that affect the data must be unchanged.
         overwrite: Replace an existing recording of this house.
-        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
-        house: Number of the ``house_N`` folder in the output directory. Each house has its own random numbers.
+        house: Number of the ``house_N`` folder in the output directory. Each house of a task has its own random
+            numbers.
         batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
         gzip: Compression level of arrays, 0 to 9.
         ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
@@ -142,6 +137,13 @@ def record(
         keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+        max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
+        num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
+        first_attempt: Number of the first attempt.
+        shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
+            directory; requires ``num_attempts``, the number of attempts of all shards.
+        keep_failures: Keep failed episodes too.
+        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
         Others:
         sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is

@@ -423,8 +423,8 @@ def make_vec(
     height: int | None = None,
     depth: bool = False,
     segmentation: bool = False,
-    samples: int = 1,
     shadows: bool = True,
+    samples: int = 1,
     shadow_samples: int = 1,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
@@ -467,14 +467,15 @@ def make_vec(
             other episodes.
         camera_system: Name or file of the camera system; by default the cameras of the robot's model.
         cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
-        width: Width of the images; by default the robot's. [pixels]
-        height: Height of the images; by default the robot's. [pixels]
+        width: Width of the images; by default each camera's. ``width`` or ``height`` alone keeps the aspect ratio.
+            [pixels]
+        height: Height of the images; by default each camera's. [pixels]
         depth: Add a lossless depth image for every camera.
         segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
-        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
         shadows: Draw shadows.
-        shadow_samples: Points of each lamp at which shadows are computed; more than 1 gives soft shadows and takes
-            longer.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
+            more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.

@@ -47,10 +47,10 @@ def source_of(thing: Any, *, num_worlds: int = 1, seed: int = 0, **options: Any)
         raise unexpected_keyword("view()", "num_envs", ["num_worlds"])
     if isinstance(thing, (LiveSource, Dataset)):
         return thing
-    if isinstance(thing, Simulation):
-        return LiveSource(thing)
     if hasattr(thing, "warp_model"):
         raise NotImplementedError("mjs.view is not available with backend='warp'; use backend='cpu'")
+    if isinstance(thing, Simulation):
+        return LiveSource(thing)
     if not isinstance(thing, (str, Path)):
         return provided("task_source")(thing, num_worlds, seed, options)
     if is_address(thing):

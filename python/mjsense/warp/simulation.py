@@ -18,6 +18,7 @@ from mjsense.core.errors import did_you_mean
 from mjsense.scene.physics_options import PREFIX
 from mjsense.scene.randomizable import check_randomizable, valid_values
 from mjsense.sensors.sensor import Sensor
+from mjsense.sim.simulation import Simulation
 from mjsense.warp import arrays, builtin, host_rows, kernels, limits, physics
 from mjsense.warp.graphs import Graphs
 from mjsense.warp.scene_sensors import SceneSensors
@@ -28,7 +29,6 @@ from mjsense.warp.world_models import WorldModels
 
 if TYPE_CHECKING:
     from mjsense.scene.scene import Scene
-    from mjsense.sim.simulation import Simulation
 
 
 @checked
@@ -423,6 +423,9 @@ class WarpSimulation(KnownAttributes):
         if name[0] != "_" and hasattr(type(self._compiled), name):
             raise NotImplementedError(f"Simulation.{name} is not available with backend='warp'; use backend='cpu'")
         raise AttributeError(f"{type(self).__name__} has no attribute '{name}'")
+
+
+Simulation.register(WarpSimulation)
 
 
 def _worlds(compiled: Simulation, model: mjw.Model, data: mjw.Data, device: Any) -> Worlds:

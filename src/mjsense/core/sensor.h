@@ -2,14 +2,25 @@
 #pragma once
 // The central concept of mjsense: a named, typed, batched measurement. For B worlds a sensor owns
 // preallocated rows [B, ...] and fills row w from world w. Scene sensors, observation sensors and
-// user-defined sensors derive from this class. Their life cycle:
+// user-defined sensors derive from this class. Its calls, in the order of a sensor's life:
 //
-//   edit_spec(spec)   before compilation: add the MuJoCo elements it needs
-// initialize(init)  after compilation: resolve names to ids, declare fields; no later allocation
-// substep(world)    after each physics step, if wants_substep(): air time, history
-// compute(world)    fill row w; a pure function of (model, data, sensor state, RNG key)
-// cast(context)     stages kCast and kBatch: work that is done for many worlds at once
-// reset(world)      a new episode of this world begins; compute() follows before rows are read
+//   Once, while the scene is made
+//     edit_spec(spec)    before compilation: add the MuJoCo elements that the sensor needs
+//     initialize(init)   after compilation: resolve names to ids and declare the fields; nothing
+//                        is allocated later
+//     needs()            the last MuJoCo stage that the sensor reads
+//
+//   In each control step
+//     substep(world)     after each physics step, if wants_substep(): update state that must see
+//                        every step, such as air time
+//     compute(world)     when the row is read, or in every step if needs_every_step(): fill row w
+//                        from the model, the data, the sensor's own state and its random key only
+//     cast(context)      stages kCast and kBatch: rays and images of many worlds at once
+//
+//   When an episode begins in a world
+//     reset(world)       clear the sensor's state; the row is computed again before it is read
+//
+// Calls with a World may run on several threads at once, for different worlds.
 
 #include <mujoco/mujoco.h>
 
@@ -49,10 +60,10 @@ struct World {
   int id = 0;  // row, 0 .. B-1
   const mjModel* model = nullptr;
   mjData* data = nullptr;
-  std::int64_t substep =
-      0;  // physics steps since this world's last reset; time = substep * model->opt.timestep
-  std::int64_t tick =
-      0;  // physics steps since the last seeding, not reset with the episode; the step of the RNG
+  // Physics steps since this world's last reset; time = substep * model->opt.timestep.
+  std::int64_t substep = 0;
+  // Physics steps since the last seeding, which an episode does not reset; the step of the RNG.
+  std::int64_t tick = 0;
   std::int64_t episode = 0;  // resets of this world since the last seeding
   std::uint64_t seed = 0;
   bool first = false;     // no step since the reset
@@ -99,8 +110,7 @@ enum class Stage {
   kRow,       // compute() alone fills the row
   kCast,      // compute() prepares poses, cast() traces
   kPostCast,  // compute() reads rows of kCast sensors, so it runs after them
-  // only cast() is called, on the caller's thread, after all others: sensors written in Python
-  kBatch,
+  kBatch,  // only cast() is called, after all others and on the caller's thread: Python's sensors
 };
 
 class Sensor {
@@ -147,8 +157,8 @@ class Sensor {
   // Fields, valid after initialize(). Their addresses are stable.
   std::deque<Field>& fields() { return fields_; }
   const std::deque<Field>& fields() const { return fields_; }
-  const Field& field(
-      std::string_view name = "") const;  // throws KeyError with the names of the fields
+  // Throws KeyError with the names of the fields.
+  const Field& field(std::string_view name = "") const;
   std::size_t bytes_per_world() const;
 
  protected:

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/system/process_state.h"
 #include "mjsense/record/recorder_impl.h"
@@ -23,8 +24,8 @@ void validate(const RecordingCfg& cfg) {
   if (printable(cfg.out_dir.string()) != cfg.out_dir.string())
     throw ValueError(fmt::format("recording: the output directory '{}' contains control characters",
                                  printable(cfg.out_dir.string())));
+  check_fields<FilesCfg>(cfg, "recording");
   require(cfg.num_worlds > 0, "num_worlds", cfg.num_worlds, "at least 1");
-  require(cfg.house >= 0, "house", cfg.house, "0 or more");
   require(cfg.first_attempt >= 0, "first_attempt", cfg.first_attempt, "0 or more");
   require(cfg.num_attempts >= 0, "num_attempts", cfg.num_attempts, "0 (any) or more");
   if (cfg.resume + cfg.append + cfg.overwrite > 1)
@@ -33,16 +34,6 @@ void validate(const RecordingCfg& cfg) {
     throw ValueError("recording: append determines first_attempt; leave it out");
   require(cfg.fps.num > 0 && cfg.fps.den > 0, "fps", fmt::format("{}/{}", cfg.fps.num, cfg.fps.den),
           "a positive fraction");
-  require(cfg.gzip >= 0 && cfg.gzip <= 9, "gzip", cfg.gzip, "0 to 9");
-  require(cfg.video.crf >= 0 && cfg.video.crf <= 51, "crf", cfg.video.crf, "0 to 51");
-  require(cfg.video.keyint > 0, "keyint", cfg.video.keyint, "at least 1");
-  require(cfg.video.threads > 0, "threads per encoder", cfg.video.threads, "at least 1");
-  require(cfg.video.queue_frames > 0, "queue_frames", cfg.video.queue_frames, "at least 1");
-  require(cfg.video.max_encoders >= 0, "max_encoders", cfg.video.max_encoders, "0 (32) or more");
-  require(cfg.video.ffmpeg_timeout > 0, "ffmpeg_timeout", cfg.video.ffmpeg_timeout,
-          "seconds, positive");
-  require(cfg.video.depth_unit > 0, "depth_unit", cfg.video.depth_unit,
-          "metres per unit, positive");
 }
 
 }  // namespace

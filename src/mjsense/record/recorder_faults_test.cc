@@ -334,6 +334,7 @@ TEST(RecorderFaults, InvalidConfigurationsThrow) {
   EXPECT_THAT(error([](RecordingCfg& c) { c.num_worlds = -1; }), HasSubstr("num_worlds is -1"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.fps = {0, 1}; }), HasSubstr("fps is 0/1"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.gzip = 10; }), HasSubstr("gzip is 10"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.video.keyint = 0; }), HasSubstr("keyint is 0"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.settings = "{"; }), HasSubstr("settings is not JSON"));
   EXPECT_THAT(tree(dir.path), IsEmpty());
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Configuration of a recording: sensors, number of episodes, location and file formats.
+// Configuration of a recording: sensors, location and files.
 // docs/formats.md describes the files.
 
 #include <mujoco/mujoco.h>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
+#include "mjsense/record/files_cfg.h"
 
 namespace mjsense {
 class Sensor;
@@ -31,69 +32,8 @@ struct Fps {
   bool operator==(const Fps&) const = default;
 };
 
-struct VideoCfg {
-  std::string ffmpeg;
-  int max_encoders = 0;
-  int queue_frames = 3;
-  int threads = 1;
-  int crf = 25;
-  std::string preset = "veryfast";
-  std::string tune = "fastdecode";
-  int keyint = 20;
-  double depth_unit = 0.0002;
-  double ffmpeg_timeout = 60;
-  bool molmospaces_depth = false;
-};
-template <class V>
-void visit_fields(V& v, VideoCfg& c) {
-  v.object("VideoCfg", "How images are stored.");
-  v("ffmpeg", c.ffmpeg,
-    "Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.");
-  v("crf", c.crf, "Quality of the videos, from 0 (lossless) to 51 (worst).").within(0, 51);
-  v("preset", c.preset,
-    "Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.");
-  v("tune", c.tune,
-    "Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and "
-    "files are a seventh larger.");
-  v("keyint", c.keyint,
-    "Maximum number of frames between key frames. A small value makes random access faster, a "
-    "large value makes files smaller.")
-      .at_least(1);
-  v("molmospaces_depth", c.molmospaces_depth,
-    "Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.");
-  v("max_encoders", c.max_encoders,
-    "Maximum number of concurrent ffmpeg processes; 0: 32. Further streams wait in raw files on "
-    "disk.")
-      .at_least(0)
-      .hidden();
-  v("queue_frames", c.queue_frames,
-    "Number of frames of a stream that are buffered in memory; when the buffer is full, the "
-    "simulation waits.")
-      .at_least(1)
-      .hidden();
-  v("encoder_threads", c.threads,
-    "Number of threads of each encoder. The bytes of a video depend on it, so it does not follow "
-    "the number of CPUs.")
-      .at_least(1)
-      .hidden();
-  v("ffmpeg_timeout", c.ffmpeg_timeout,
-    "Time after which an ffmpeg process that accepts no frame, or does not finish, is killed.")
-      .unit("s")
-      .positive()
-      .hidden();
-  v("depth_unit", c.depth_unit,
-    "Unit of the 16-bit depth video; 0.0002 m covers distances up to 13.1 m.")
-      .unit("m")
-      .positive()
-      .hidden();
-}
-
-struct RecordingCfg {
+struct RecordingCfg : FilesCfg {
   std::filesystem::path out_dir;
-  int house = 0;     // {out_dir}/house_{house}/
-  int episodes = 1;  // episodes to keep
-  // Number of HDF5 files; 0: max(1, round(episodes / 4)), as in MolmoSpaces.
-  int batches = 0;
   int num_worlds = 1;
   Fps fps;
   // Initialized sensors, in the order of the suite. They must outlive the recorder. All their
@@ -105,21 +45,14 @@ struct RecordingCfg {
   // Compiled model, or null. Its checksums are stored in every file, and a recording cannot be
   // resumed with another model.
   const mjModel* model = nullptr;
-  bool resume = false;  // continue an existing recording; otherwise existing output is an error
-  // Add to a completed recording with the same settings: the numbers of attempts and of HDF5 files
-  // follow those that exist.
-  bool append = false;
-  bool overwrite = false;  // remove an existing recording first
   // Number of the first attempt. Attempts before it are not part of this recording. `append` sets
   // it.
   std::int64_t first_attempt = 0;
   std::int64_t num_attempts = 0;  // number of attempts, if it is fixed; 0: it is not
   int first_batch = 0;            // HDF5 files of the recordings that `append` continues; set by it
-  int gzip = 4;                   // compression level, 0 (none) to 9
   // File for replay, stored in the house once: its name, "model_1a2b3c4d.zip", and its bytes. Empty:
   // none. Recordings with the same model have the same name.
   std::string archive_name, archive;
-  VideoCfg video;
   // At 2 or more the user wants to stop immediately: a hanging ffmpeg gets 2 s instead of
   // ffmpeg_timeout.
   const std::atomic<int>* stop = nullptr;

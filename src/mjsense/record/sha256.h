@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// SHA-256 (FIPS 180-4), for names that depend on the contents of a file.
+// SHA-256 (FIPS 180-4), for the names of model archives. Stored recordings have these names, and
+// `mjsense verify` and `sha256sum` check an archive against them. XXH3, the key of equal textures and
+// meshes, could be forged: another model with the name of the recorded one would pass.
 
 #include <array>
 #include <cstddef>

@@ -26,8 +26,7 @@ constexpr bool equal_to_another() {
   T a, b;
   return a == b;
 }
-static_assert(equal_to_another<PixelGrid>() && equal_to_another<Fog>() &&
-              equal_to_another<View::Haze>());
+static_assert(equal_to_another<PixelGrid>() && equal_to_another<Fog>() && equal_to_another<Haze>());
 
 constexpr int kBodies = 40;
 
@@ -93,8 +92,8 @@ TEST_P(ChangedTilesOf, ImagesAreEqual) {
         s.view(builder, {side, -5, 2.5}, {1, 0, 0}, {0, std::sin(.4), std::cos(.4)}, grid);
     tiles.compare(view);
     ImageTargets some = targets_of(kept);
-    some.changed = tiles.changed();
-    some.lit = tiles.lit();
+    some.changed_tiles = tiles.changed();
+    some.receivers = tiles.receivers();
     s.draw(view, some);
     tiles.keep(view);
     s.draw(view, targets_of(whole));
@@ -156,8 +155,8 @@ TEST_P(ThinGeoms, AreSampledInTheirWindows) {
     targets.samples = 4;
     targets.multisampled = true;
     if (!all) {
-      targets.changed = tiles.changed();
-      targets.lit = tiles.lit();
+      targets.changed_tiles = tiles.changed();
+      targets.receivers = tiles.receivers();
     }
     s.draw(view, targets);
   };

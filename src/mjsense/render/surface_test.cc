@@ -416,7 +416,7 @@ TEST(FixedLayer, IsUsedWhileItsInputsAreUnchanged) {
   EXPECT_FALSE(layer.settles(build()));  // seen for the first time
   EXPECT_TRUE(layer.settles(build()));   // seen again, unchanged
   ImageTargets tiles;
-  tiles.fixed = layer.tiles();
+  tiles.fixed_tiles = layer.tiles();
   s.draw(build(), tiles);
   EXPECT_TRUE(layer.shows(build()));
   EXPECT_EQ(image(true).rgb, image(false).rgb);

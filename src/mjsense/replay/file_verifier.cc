@@ -158,8 +158,14 @@ class FileVerifier {
     record::Checksum sum;
     if (name == "obs_scene") {
       const std::string text = hdf5::read_text(trajectory, name);
-      if (const auto wrong = parse_json(text); !wrong.empty())
+      bool finite = true;
+      const auto number = [&](const std::string&, double x) {
+        finite = finite && std::isfinite(x);
+      };
+      if (const auto wrong = parse_json(text, number); !wrong.empty())
         error(context, "is not JSON text: " + wrong);
+      else if (ours_ && !finite)
+        error(context, "has NaN or an infinite number, which is never recorded");
       sum.add(text.data(), text.size());
       return compare(dataset.id(), context, sum);
     }

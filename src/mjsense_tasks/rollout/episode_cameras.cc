@@ -117,8 +117,7 @@ sensors::CameraSensorCfg camera_sensor_cfg(const cameras::CameraSystem& system, 
   out.data_types = {"rgb", "segmentation"};
   if (recorded.depth) out.data_types.push_back("depth");
   out.use_shadows = cfg.shadows;
-  out.shadow_samples = cfg.shadow_samples;
-  out.samples = cfg.samples;
+  static_cast<sensors::RgbCfg&>(out) = cfg;
   return out;
 }
 

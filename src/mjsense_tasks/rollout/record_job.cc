@@ -31,12 +31,10 @@ double since(Clock::time_point start) {
 record::RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout,
                                    const StopFlag* stop) {
   record::RecordingCfg cfg;
+  static_cast<record::FilesCfg&>(cfg) = job;
   cfg.out_dir = job.out;
-  cfg.house = job.house;
-  cfg.episodes = job.episodes;
   cfg.num_attempts = job.num_attempts;
   cfg.first_attempt = job.first_attempt;
-  cfg.batches = job.batches;
   cfg.num_worlds = rollout.num_worlds();
   cfg.fps = record::Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
   for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
@@ -49,11 +47,6 @@ record::RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout,
   }
   cfg.settings = recording_settings(job, rollout);
   cfg.model = rollout.task().model();
-  cfg.resume = job.resume;
-  cfg.append = job.append;
-  cfg.overwrite = job.overwrite;
-  cfg.gzip = job.gzip;
-  cfg.video = job.video;
   cfg.stop = stop;
   return cfg;
 }

@@ -16,30 +16,22 @@
 
 namespace mjsense::tasks::rollout {
 
-struct RecordJobCfg {
+struct RecordJobCfg : record::FilesCfg {
   RecordJobCfg() { rollout.num_worlds = 4; }
   RolloutCfg rollout;
   std::filesystem::path out;
-  int episodes = 1;
   int max_attempts = 0;
   int num_attempts = 0, first_attempt = 0;
   std::string shard;  // "2/8"; "": not a shard
   bool keep_failures = false;
-  bool resume = false;
-  bool append = false;
-  bool overwrite = false;
   bool replay = true;
-  int house = 0;
-  int batches = 0;
-  int gzip = 4;
-  record::VideoCfg video;
 };
 template <class V>
 void visit_fields(V& v, RecordJobCfg& c) {
   v.object("RecordJobCfg", "A recording of episodes.");
   v.include(c.rollout);
   v("out", c.out, "Output directory.");
-  v("episodes", c.episodes, "Number of episodes to keep.").at_least(1);
+  v.include(static_cast<record::FilesCfg&>(c));
   v("max_attempts", c.max_attempts,
     "Maximum number of episodes to attempt; 0: six times the number to keep.")
       .at_least(0);
@@ -52,23 +44,8 @@ void visit_fields(V& v, RecordJobCfg& c) {
     "``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the "
     "output directory; requires ``num_attempts``, the number of attempts of all shards.");
   v("keep_failures", c.keep_failures, "Keep failed episodes too.").decides_data();
-  v("resume", c.resume,
-    "Continue an interrupted recording; all settings that affect the data must be unchanged.");
-  v("append", c.append,
-    "Add new episodes to a completed recording; all settings that affect the data must be "
-    "unchanged.");
-  v("overwrite", c.overwrite, "Replace an existing recording of this house.");
   v("replay", c.replay,
     "Store what replay needs: the model, and the simulation's state and controls of every step.");
-  v("house", c.house,
-    "Number of the ``house_N`` folder in the output directory. Each house has its own random "
-    "numbers.")
-      .at_least(0);
-  v("batches", c.batches,
-    "Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.")
-      .at_least(0);
-  v("gzip", c.gzip, "Compression level of arrays, 0 to 9.").within(0, 9);
-  v.include(c.video);
 }
 
 // A job without `shard`: that part of the attempts, in its own directory. The shards are contiguous

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "mjsense/observe/suite.h"
+#include "mjsense/sensors/camera/image_cfg.h"
 #include "mjsense/sim/simulation.h"
 #include "mjsense_tasks/cameras/camera_system.h"
 #include "mjsense_tasks/episode/policy.h"
@@ -60,7 +61,7 @@ inline constexpr std::string_view kDefaultView = "default_view";
 // Value of RolloutCfg::robot for the task's default robot.
 inline constexpr std::string_view kTaskRobot = "auto";
 
-struct RolloutCfg {
+struct RolloutCfg : sensors::ImageCfg {
   std::string task = "pick";
   std::string robot{kTaskRobot};
   std::string arm_controller;
@@ -72,12 +73,6 @@ struct RolloutCfg {
   std::uint64_t seed = 0;
   std::string camera_system;
   std::optional<std::vector<std::string>> cameras;
-  std::optional<int> width, height;
-  bool depth = false;
-  bool segmentation = false;
-  int samples = 1;
-  bool shadows = true;
-  int shadow_samples = 1;
   std::string meshes = "auto";  // one of kMeshes
   std::optional<int> horizon, policy_dt_ms;
   bool action_noise = true;
@@ -139,28 +134,7 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("cameras", c.cameras,
     "Names of the cameras to render, in this order; by default all, an empty list renders none.")
       .decides_data_as("cameras");
-  v("width", c.width, "Width of the images; by default the robot's.")
-      .unit("pixels")
-      .at_least(1)
-      .decides_data_as("cameras");
-  v("height", c.height, "Height of the images; by default the robot's.")
-      .unit("pixels")
-      .at_least(1)
-      .decides_data_as("cameras");
-  v("depth", c.depth, "Add a lossless depth image for every camera.").decides_data_as("cameras");
-  v("segmentation", c.segmentation,
-    "Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.")
-      .decides_data_as("cameras");
-  v("samples", c.samples,
-    "Rays per pixel of rgb; more samples give smoother edges and take longer.")
-      .at_least(1)
-      .decides_data();
-  v("shadows", c.shadows, "Draw shadows.").decides_data();
-  v("shadow_samples", c.shadow_samples,
-    "Points of each lamp at which shadows are computed; more than 1 gives soft shadows and takes "
-    "longer.")
-      .within(1, 16)
-      .decides_data();
+  v.include(static_cast<sensors::ImageCfg&>(c));
   v("meshes", c.meshes,
     "Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: "
     "the meshes if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their "
@@ -300,6 +274,7 @@ class Rollout {
   void refuse_deep_contacts(std::span<const int> worlds);
   void finish_rows();
   bool guard_rows(const std::function<void()>& body);
+  void repeat_until_complete(const std::function<void()>& body);
   void sense();
   void take_failures();
   void check_speeds(std::span<const int> worlds);

@@ -283,8 +283,7 @@ void Rollout::step_chunk(std::span<const robots::Action> actions, bool stop_on_s
 void Rollout::sense() {
   const auto begun = Clock::now();
   const double cast = cast_cost();
-  while (!active_worlds().empty() && !guard_rows([this] { suite_.refresh(ids_); })) {
-  }
+  repeat_until_complete([this] { suite_.refresh(ids_); });
   if (replay_) {
     Sensor* const replay[] = {replay_.get()};
     simulation_->refresh(replay, active_worlds());
@@ -327,10 +326,8 @@ void Rollout::finish_rows() {
   }
   Sensor* info = task_->info_follows_evaluation() ? suite_.find("task_info") : nullptr;
   if (!info) return;
-  while (!active_worlds().empty() && !guard_rows([this, info] {
-    for_each(ids_, [info](const World& world) { info->compute(world); });
-  })) {
-  }
+  repeat_until_complete(
+      [this, info] { for_each(ids_, [info](const World& world) { info->compute(world); }); });
 }
 
 double Rollout::row_cost() const {

@@ -61,4 +61,11 @@ bool Rollout::guard_rows(const std::function<void()>& body) {
   }
 }
 
+// Runs `body` until all rows can be computed, or no episode is active: each failure ends the episodes
+// of the worlds that it names, so that the next run computes fewer rows.
+void Rollout::repeat_until_complete(const std::function<void()>& body) {
+  bool complete = false;
+  while (!complete && !active_worlds().empty()) complete = guard_rows(body);
+}
+
 }  // namespace mjsense::tasks::rollout

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import Seed, checked
+from mjsense.core.declared_fields import given_options
 from mjsense.core.old_names import old_argument
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
@@ -143,7 +144,28 @@ def play(
     device: str = "keyboard",
     arm: str = "arm",
     gripper: str = "gripper",
+    # options of a recording
     episodes: int = 1,
+    resume: bool = False,
+    append: bool = False,
+    overwrite: bool = False,
+    house: int = 0,
+    batches: int = 0,
+    gzip: int = 4,
+    ffmpeg: str = "",
+    crf: int = 25,
+    preset: str = "veryfast",
+    tune: str = "fastdecode",
+    keyint: int = 20,
+    molmospaces_depth: bool = False,
+    width: int | None = None,
+    height: int | None = None,
+    depth: bool = False,
+    segmentation: bool = False,
+    shadows: bool = True,
+    samples: int = 1,
+    shadow_samples: int = 1,
+    # end of options
     seed: Seed = 0,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -159,7 +181,34 @@ def play(
         device: ``keyboard`` or ``spacemouse``.
         arm: Move group that is driven.
         gripper: Move group that is opened and closed.
-        episodes: Number of successful episodes to keep.
+
+        Options:
+        episodes: Number of episodes to keep.
+        resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        append: Add new episodes to a completed recording; all settings that affect the data must be unchanged.
+        overwrite: Replace an existing recording of this house.
+        house: Number of the ``house_N`` folder in the output directory. Each house of a task has its own random
+            numbers.
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
+        molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+        width: Width of the images; by default each camera's. ``width`` or ``height`` alone keeps the aspect ratio.
+            [pixels]
+        height: Height of the images; by default each camera's. [pixels]
+        depth: Add a lossless depth image for every camera.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
+        shadows: Draw shadows.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
+            more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
+        Others:
         seed: Random seed of the starts.
         host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with the printed
             address, which contains a token.
@@ -174,17 +223,21 @@ def play(
         ValueError: The robot has no such move groups, or the arm has no controller ``ee_pose``.
         ModuleNotFoundError: viser, or the package of the device, is not installed.
     """
+    arguments = dict(locals())
     title = task if isinstance(task, str) else getattr(task, "__name__", type(task).__name__)
     policy = Teleoperation(title, arm=arm, gripper=gripper, device=device, host=host, port=port, open_browser=open_browser)
-    defaults = {
+    recorded = {
         "num_worlds": 1,
         "arm_controller": "ee_pose",
         "terminate_upon_success": True,
         "action_noise": False,
         "horizon": 6000,
         "max_attempts": 100 * episodes,
+        **given_options("FilesCfg", arguments),
+        **given_options("ImageCfg", arguments),
+        **options,
     }
     try:
-        return record(task, robot, policy, out=out, scene=scene, episodes=episodes, seed=seed, **{**defaults, **options})
+        return record(task, robot, policy, out=out, scene=scene, seed=seed, **recorded)
     finally:
         policy.close()

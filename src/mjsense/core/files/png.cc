@@ -28,15 +28,16 @@ void put_chunk(std::vector<std::uint8_t>& out, const char (&type)[5],
 }  // namespace
 
 std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int width, int height,
-                                     int channels, int level) {
-  const bool known = channels == 1 || channels == 3 || channels == 4;
-  if (width <= 0 || height <= 0 || !known ||
-      pixels.size() != static_cast<std::size_t>(width) * height * channels) {
-    throw ValueError(fmt::format(
-        "PNG: {} bytes do not match an image of {} x {} pixels with {} channels (1, 3 or 4)",
-        pixels.size(), width, height, channels));
+                                     int channels, int level, int bits) {
+  const bool known = (channels == 1 || channels == 3 || channels == 4) && (bits == 8 || bits == 16);
+  const std::size_t stride =
+      static_cast<std::size_t>(std::max(width, 0)) * channels * bits / 8;  // bytes of a row
+  if (width <= 0 || height <= 0 || !known || pixels.size() != stride * height) {
+    throw ValueError(
+        fmt::format("PNG: {} bytes do not match an image of {} x {} pixels with {} "
+                    "channels (1, 3 or 4) of {} bits (8 or 16)",
+                    pixels.size(), width, height, channels, bits));
   }
-  const std::size_t stride = static_cast<std::size_t>(width) * channels;
 
   // Filter 2: each row is stored as its difference from the row above, which compresses rendered
   // images well.
@@ -57,8 +58,8 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
   put_u32(header, width);
   put_u32(header, height);
   const std::uint8_t colour_type = channels == 1 ? 0 : channels == 3 ? 2 : 6;
-  for (std::uint8_t b :
-       {std::uint8_t{8}, colour_type, std::uint8_t{0}, std::uint8_t{0}, std::uint8_t{0}})
+  for (std::uint8_t b : {static_cast<std::uint8_t>(bits), colour_type, std::uint8_t{0},
+                         std::uint8_t{0}, std::uint8_t{0}})
     header.push_back(b);
 
   std::vector<std::uint8_t> out = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};

@@ -28,6 +28,16 @@ TEST(Png, DecodesToTheSamePixels) {
   }
 }
 
+TEST(Png, SixteenBitsHaveTheHighByteFirst) {
+  const std::vector<std::uint8_t> pixels{0x12, 0x34, 0x56, 0x78};  // 1 x 2
+  const auto png = encode_png(pixels, 1, 2, 1, 6, 16);
+  EXPECT_EQ(png[24], 16);
+  std::vector<std::uint8_t> rows(6);
+  uLongf size = rows.size();
+  ASSERT_EQ(uncompress(rows.data(), &size, &png[41], testing::png_number(&png[33])), Z_OK);
+  EXPECT_EQ(rows, (std::vector<std::uint8_t>{0, 0x12, 0x34, 2, 0x44, 0x44}));
+}
+
 TEST(Png, ReadsBackPixelByPixel) {
   const int width = 5, height = 3;
   std::vector<std::uint8_t> pixels(width * height * 3);
@@ -55,6 +65,7 @@ TEST(Png, RejectsWrongSizesAndPaths) {
   EXPECT_THROW(encode_png(pixels, 2, 2, 4), ValueError);
   EXPECT_THROW(encode_png(pixels, 0, 2, 3), ValueError);
   EXPECT_THROW(encode_png(pixels, 3, 2, 2), ValueError);
+  EXPECT_THROW(encode_png(pixels, 2, 2, 3, 6, 12), ValueError);
   EXPECT_THROW(write_png("/nonexistent_directory/x.png", pixels, 2, 2, 3), RuntimeError);
 }
 

@@ -62,10 +62,10 @@ void* DrawnMesh::shadow_bvh() {
   return better_tree_ ? better_tree_->scene.get() : bvh();
 }
 
-bool DrawnMesh::has_coordinates() const { return model_->mesh_texcoordadr[mesh_] >= 0; }
+bool DrawnMesh::has_uvs() const { return model_->mesh_texcoordadr[mesh_] >= 0; }
 
 void DrawnMesh::prepare_surface(bool coordinates) {
-  if (tables_ && (surface_.uvs || !coordinates || !has_coordinates())) return;
+  if (tables_ && (surface_.uvs || !coordinates || !has_uvs())) return;
   check_mesh_indices(*model_, mesh_);
   tables_ = hull_ ? hull_tables(coordinates) : mesh_tables(model_, mesh_, coordinates);
   surface_ = tables_->surface(vertices_.data(), faces_.data());
@@ -88,7 +88,7 @@ std::shared_ptr<const MeshTables> DrawnMesh::hull_tables(bool coordinates) const
     for (int corner = 0; corner < 3; ++corner)
       for (float x : n) tables->normals.push_back(length > 0 ? x / std::sqrt(length) : 0);
   }
-  if (coordinates && has_coordinates())
+  if (coordinates && has_uvs())
     tables->add_coordinates(model_->mesh_texcoord + 2 * model_->mesh_texcoordadr[mesh_], faces_);
   return tables;
 }

@@ -11,7 +11,7 @@
 
 #include "mjsense/rays/mesh_geometry.h"
 #include "mjsense/render/view/surface_assets.h"
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/view_geom.h"
 
 namespace mjsense::render {
 
@@ -38,12 +38,12 @@ class DrawnMesh final : public MeshOnDemand {
   bool has_tree() const { return tree_ != nullptr; }
   bool has_surface() const { return tables_ != nullptr; }
 
-  bool has_coordinates() const override;
+  bool has_uvs() const override;
   const rays::Clusters& clusters() override;
   const rays::Horizons& horizons() override;
   void* bvh() override;
   void* shadow_bvh() override;
-  void prepare_surface(bool coordinates) override;
+  void prepare_surface(bool uvs) override;
 
  private:
   const rays::MeshArrays& arrays();

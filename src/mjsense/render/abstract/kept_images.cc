@@ -48,8 +48,8 @@ void KeptImages::render(const View& view, const ImageTargets& targets, RenderTil
   if (targets.rgb) images.rgb = image.rgb.data();
   if (targets.depth) images.depth = image.depth.data();
   if (targets.segmentation) images.segmentation = image.segmentation.data();
-  images.changed = image.tiles.changed();
-  images.lit = image.tiles.lit();
+  images.changed_tiles = image.tiles.changed();
+  images.receivers = image.tiles.receivers();
   tiles(view, images, 0, (view.grid.height + kTileSize - 1) / kTileSize, scratch);
   image.tiles.keep(view);
   std::ranges::copy(image.rgb, targets.rgb);

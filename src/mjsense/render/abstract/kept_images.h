@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mjsense/render/view/changed_tiles.h"
+#include "mjsense/render/view/tile_kernels.h"
 
 namespace mjsense::render {
 

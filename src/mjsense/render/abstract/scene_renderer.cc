@@ -123,7 +123,7 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
     images.depth = nullptr;
     images.segmentation = nullptr;
     images.samples = static_cast<int>(std::bit_floor(
-        static_cast<unsigned>(std::clamp(settings_.samples, 1, ImageTargets::kMostMultisamples))));
+        static_cast<unsigned>(std::clamp(settings_.samples, 1, ImageTargets::kMaxMultisamples))));
     images.multisampled = images.samples > 1;
     draw(images, true);
   }
@@ -164,7 +164,7 @@ void SceneRenderer::read(const SceneMemory& scene, bool all) {
   // users add without an id of their own.
   for (DrawnGeom& drawn : drawn_) {
     const int segment = drawn.object_id;
-    std::tie(drawn.object_id, drawn.object) =
+    std::tie(drawn.object_id, drawn.object_type) =
         segment >= 0 && segment <= scene.num_geoms ? segments_[segment] : std::pair(-1, -1);
   }
 }
@@ -176,9 +176,9 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
   std::copy_n(geom.rgba, 4, out.rgba);
   // Some programs hide elements with a negative alpha. Depth and segmentation show all elements.
   out.rgba[3] = colored ? std::max(out.rgba[3], 0.0f) : 1;
-  out.object = geom.objtype;
+  out.object_type = geom.objtype;
   out.object_id = geom.segid;
-  out.casts =
+  out.casts_shadows =
       geom.category != mjCAT_DECOR && geom.type != mjGEOM_LINE && geom.type != mjGEOM_LINEBOX;
   out.material = {.specular = geom.specular,
                   .shininess = geom.shininess,
@@ -233,7 +233,7 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       if (geom.dataid < 0 || geom.dataid >= 2 * model_->nmesh) return;
       DrawnMesh* mesh = assets_.mesh(geom.dataid);
       if (!mesh) return;
-      out.on_demand = mesh;
+      out.mesh_on_demand = mesh;
       out.mesh = mesh->surface();
       set_box(mesh->box(), shape);
       break;
@@ -465,16 +465,17 @@ static void limit_shadows(const SceneSettings& settings, float cutoff, ViewLight
     std::copy_n(other, 3, up);
     length = up[0] * up[0] + up[2] * up[2];
   }
-  for (int k = 0; k < 3; ++k) light.square[0][k] = up[k] / std::sqrt(length);
+  for (int k = 0; k < 3; ++k) light.shadow_map_axes[0][k] = up[k] / std::sqrt(length);
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
-    light.square[1][k] = d[i] * light.square[0][j] - d[j] * light.square[0][i];
+    light.shadow_map_axes[1][k] =
+        d[i] * light.shadow_map_axes[0][j] - d[j] * light.shadow_map_axes[0][i];
   }
-  light.square_limit = settings.shadow_clip;
-  light.shadow_near = settings.shadow_near;
+  light.shadow_map_half_size = settings.shadow_clip;
+  light.shadow_map_near = settings.shadow_near;
   if (light.kind != LightKind::kDirectional) {
     const double fovy = std::min(2.0 * cutoff * settings.shadow_scale, 160.0);
-    light.square_limit = static_cast<float>(std::tan(fovy * std::numbers::pi / 360));
+    light.shadow_map_half_size = static_cast<float>(std::tan(fovy * std::numbers::pi / 360));
   }
 }
 
@@ -500,14 +501,14 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
     ViewLight& out = lights_.emplace_back();
     out = {};
     out.kind = directional ? LightKind::kDirectional : LightKind::kSpot;
-    out.shadows = light.castshadow != 0;
+    out.casts_shadows = light.castshadow != 0;
     std::copy_n(light.pos, 3, out.pos);
     std::copy_n(light.dir, 3, out.dir);
     std::copy_n(light.ambient, 3, out.ambient);
     std::copy_n(light.diffuse, 3, out.diffuse);
     std::copy_n(light.specular, 3, out.specular);
     out.attenuation[0] = 1;
-    if (out.shadows && !drawn_point) limit_shadows(settings_, light.cutoff, out);
+    if (out.casts_shadows && !drawn_point) limit_shadows(settings_, light.cutoff, out);
     if (directional) continue;
     if (!drawn_point) std::copy_n(light.attenuation, 3, out.attenuation);  // MuJoCo leaves it at 0
     out.exponent = light.exponent;

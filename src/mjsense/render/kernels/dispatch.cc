@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/core/system/cpu.h"
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/tile_kernels.h"
 
 namespace mjsense::render {
 namespace {

@@ -110,7 +110,7 @@ inline void add_thin(const PixelGrid& grid, const ViewGeom& g, const Tile& tile,
   const float* w = g.window;
   if (w[1] - w[0] > thin && w[3] - w[2] > thin) return;
   const float window[4] = {w[0] - x, w[1] + x, w[2] - y, w[3] + y};
-  for (PacketMask near = packets_in_reach(window, g.nearest, tile); near; near &= near - 1)
+  for (PacketMask near = packets_in_reach(window, g.min_depth, tile); near; near &= near - 1)
     edges[__builtin_ctz(near)] = 0xffffu;
 }
 

@@ -53,9 +53,9 @@ inline LitWindow window_of(const LightFrame& f, const float (*p)[kLanes], std::u
 
 // Returns which of kWidth windows from `first` on overlap b.
 inline std::uint32_t overlaps(const LightWindows& a, int first, const LitWindow& b) {
-  return bits((loadu(a.u0 + first) <= splat(b.u1)) & (splat(b.u0) <= loadu(a.u1 + first)) &
-              (loadu(a.v0 + first) <= splat(b.v1)) & (splat(b.v0) <= loadu(a.v1 + first)) &
-              (loadu(a.w + first) < splat(b.farthest)));
+  return bits((loadu(a.u_min + first) <= splat(b.u1)) & (splat(b.u0) <= loadu(a.u_max + first)) &
+              (loadu(a.v_min + first) <= splat(b.v1)) & (splat(b.v0) <= loadu(a.v_max + first)) &
+              (loadu(a.w_min + first) < splat(b.farthest)));
 }
 
 // Windows of a node's children.

@@ -27,7 +27,7 @@ inline void write_depth(const View& view, const ImageTargets& targets, int x0, i
   alignas(64) float depth[kLanes];
   for (int k = 0; k < kLanes; k += kWidth) {
     Float t = load(hits.t + k);
-    if (targets.ray_depth && !view.grid.orthographic) {
+    if (targets.depth_along_ray && !view.grid.orthographic) {
       const Float px = load(pixels.x + k), py = load(pixels.y + k);
       t = t * sqrt(fma(px, px, fma(py, py, splat(1.0f))));
     }
@@ -45,7 +45,7 @@ inline void write_segmentation(const View& view, std::int32_t* image, int x0, in
     if (hits.geom[i] != last) {  // cache: most packets show few geoms
       last = hits.geom[i];
       id = last < 0 ? -1 : view.geoms[last].object_id;
-      object = last < 0 ? -1 : view.geoms[last].object;
+      object = last < 0 ? -1 : view.geoms[last].object_type;
     }
     ids[i][0] = id;
     ids[i][1] = object;

@@ -41,7 +41,7 @@ inline void trace_tile(const View& view, Part part, const int* list, int count, 
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
     if (!belongs(g, part)) continue;
-    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
+    const PacketMask packets = packets_in_reach(g.window, g.min_depth, tile);
     if (!packets) continue;
     const PacketMask changed = draw_or_trace(view, list[i], packets, tile);
     if (changed) update_farthest(tile, changed);
@@ -53,8 +53,8 @@ inline void trace_tile(const View& view, Part part, const int* list, int count, 
 inline void trace_transparent(const View& view, const int* list, int count, Tile& tile) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
-    if (g.type == mjGEOM_PLANE && g.behind && !view.backs) continue;
-    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
+    if (g.type == mjGEOM_PLANE && g.shows_back && !view.shows_plane_backs) continue;
+    const PacketMask packets = packets_in_reach(g.window, g.min_depth, tile);
     if (packets) draw_or_trace(view, list[i], packets, tile);
   }
 }

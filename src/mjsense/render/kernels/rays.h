@@ -9,7 +9,7 @@
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/triangle_clusters.h"
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/tile_kernels.h"
 
 namespace mjsense::render {
 namespace {

@@ -140,13 +140,13 @@ inline void add_light(const ViewLight& light, const LightTerm& term, const Surfa
 // which of them are shadowed by fixed geoms.
 struct Shadows {
   // If the view is not layered, all casters are in `moving`.
-  Casters fixed[View::kMaxLights], moving[View::kMaxLights];
+  Casters fixed[kMaxLights], moving[kMaxLights];
   const FixedTile* known = nullptr;
   // State of the current packet:
   int packet = 0;
   std::uint32_t fixed_lanes = 0;
-  bool settled = false;  // all lanes show fixed geoms and settled_dark is valid
-  std::uint32_t settled_dark[View::kMaxLights];  // dark lanes, per light
+  bool settled = false;                    // all lanes show fixed geoms and settled_dark is valid
+  std::uint32_t settled_dark[kMaxLights];  // dark lanes, per light
 };
 
 // Lanes that light `index` does not reach: in shadow, or facing away.
@@ -167,18 +167,20 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
     // MuJoCo's directional lights have a position: geoms behind it cast no shadow.
     Float end = directional ? dot(p - splat(light.pos), splat(light.dir)) : splat(1.0f);
     Mask shadowed = splat(0.0f) < end;
-    if (light.square_limit > 0) {
+    if (light.shadow_map_half_size > 0) {
       const Vec3f from = p - splat(light.pos);
-      const Float u = dot(from, splat(light.square[0])), v = dot(from, splat(light.square[1]));
+      const Float u = dot(from, splat(light.shadow_map_axes[0])),
+                  v = dot(from, splat(light.shadow_map_axes[1]));
       const Float depth = directional ? splat(1.0f) : dot(from, splat(light.dir));
-      end = end - splat(light.shadow_near) / depth;
-      shadowed = (splat(0.0f) < end) & (max(abs(u), abs(v)) < splat(light.square_limit) * depth);
+      end = end - splat(light.shadow_map_near) / depth;
+      shadowed =
+          (splat(0.0f) < end) & (max(abs(u), abs(v)) < splat(light.shadow_map_half_size) * depth);
     }
     reachable |= bits(shadowed) << k;
     store(rays.end + k, end);
   }
   std::uint32_t dark = ~facing;
-  if (shadows.known) dark |= shadows.known->dark[index][shadows.packet] & shadows.fixed_lanes;
+  if (shadows.known) dark |= shadows.known->unlit[index][shadows.packet] & shadows.fixed_lanes;
   const std::uint32_t active = reachable & lanes & ~dark;
   if (!active || shadows.fixed[index].count + shadows.moving[index].count == 0) return dark;
   rays.p = s.p;
@@ -202,7 +204,7 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
   const ToEye eye(s);
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
-    const bool barred = shadows && light.shadows;
+    const bool barred = shadows && light.casts_shadows;
     if (!barred) {
       for (int k = 0; k < kLanes; k += kWidth)
         add_light(light, light_term(light, s, k), s, eye, k, lanes, 0, false, out);

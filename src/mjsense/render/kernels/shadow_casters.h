@@ -20,11 +20,11 @@ struct Casters {
 
   void add(int geom, const LightWindows& from, int k) {
     list[count] = geom;
-    windows.u0[count] = from.u0[k];
-    windows.u1[count] = from.u1[k];
-    windows.v0[count] = from.v0[k];
-    windows.v1[count] = from.v1[k];
-    windows.w[count++] = from.w[k];
+    windows.u_min[count] = from.u_min[k];
+    windows.u_max[count] = from.u_max[k];
+    windows.v_min[count] = from.v_min[k];
+    windows.v_max[count] = from.v_max[k];
+    windows.w_min[count++] = from.w_min[k];
   }
 };
 
@@ -46,7 +46,7 @@ inline bool divides(const ViewGeom& plane, const ViewLight& light, const float* 
 
 // Returns those of kWidth geoms from `first` on whose bounding box has a side that faces both the
 // light and all points in the box around `middle`. Such geoms are not between them.
-inline std::uint32_t turned_to(const LightSides& sides, int first, Vec3f middle, Vec3f half,
+inline std::uint32_t turned_to(const FacingSides& sides, int first, Vec3f middle, Vec3f half,
                                Float error) {
   Mask turned = mask_of(0);
   for (int i = 0; i < 3; ++i) {
@@ -119,7 +119,7 @@ inline void find_casters(const View& view, int light, Part part, const float* lo
   for (int i = 0; i < view.num_geoms; i += kWidth) {
     std::uint32_t near = overlaps(f.windows, i, points);
     if (near)
-      near &= ~turned_to(view.light_sides[light], i, splat(middle), splat(half), splat(out.error));
+      near &= ~turned_to(view.facing_sides[light], i, splat(middle), splat(half), splat(out.error));
     for (; near; near &= near - 1) {
       const int g = i + __builtin_ctz(near);
       if (g >= view.num_geoms) break;

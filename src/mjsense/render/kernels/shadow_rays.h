@@ -41,7 +41,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
     const Vec3f n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
     const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
     const Vec3f o = along(foot, lift, n);
-    const Interval inside = box(o, d, g.box, g.box + 3);
+    const Interval inside = box(o, d, g.aabb, g.aabb + 3);
     const Float end = load(rays.end + k);
     Mask hit =
         mask_of(active >> k & kAllLanes) & (inside.enter < end) & (inside.exit > splat(0.0f));

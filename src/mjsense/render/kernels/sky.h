@@ -34,7 +34,7 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
     for (int c = 0; c < 3; ++c) {
       Float part = parts[c];
       if (view.skybox && view.fog.slope != 0)
-        part = behind_fog(view.fog, splat(view.sky_radius) / cylinder_reach(w), part, c);
+        part = behind_fog(view.fog, splat(view.sky_fog_radius) / cylinder_reach(w), part, c);
       store(out.rgb[c] + k, select(m, part, load(out.rgb[c] + k)));
     }
   }
@@ -45,11 +45,11 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
 // the height of the camera. It is densest where the plane meets the cylinder and fades towards both
 // of its borders.
 inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
-  const View::Haze& haze = view.haze;
+  const Haze& haze = view.haze;
   const Float zero = splat(0.0f), one = splat(1.0f), distance = splat(view.sky_distance);
   for (int k = 0; k < kLanes; k += kWidth) {
     Float t = load(hits.t + k);
-    if (!any(splat(view.sky_from) < t)) continue;
+    if (!any(splat(view.sky_min_depth) < t)) continue;
     const Vec3f d{load(pixels.x + k), load(pixels.y + k), splat(-1.0f)};
     const Vec3f w = from_geom(view.r_wc, d);
     const Mask hidden = less(int_of(-1), load(hits.geom + k)) & (distance < t * cylinder_reach(w));

@@ -60,7 +60,7 @@ inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixe
   const bool ortho = view.grid.orthographic;
   const Float zero = splat(0.0f), one = splat(1.0f);
   const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k), splat(-1.0f)};
-  if (g.behind) n = {-n.x, -n.y, -n.z};
+  if (g.shows_back) n = {-n.x, -n.y, -n.z};
   const Float inverse = one / min(dot(n, d), splat(-1e-4f));
   const Float scale = ortho ? one : load(hits.t + k);
   const auto step = [&](Float along_n, Float ex, Float ey, float size) {
@@ -138,7 +138,7 @@ inline void map_mesh(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, M
     const FacePlane plane(mesh, face);
     LaneCoordinates at{};
     const float* uv = nullptr;
-    if (g.surface.mapped) {
+    if (g.surface.uses_mesh_uvs) {
       uv = mesh.uvs + 6 * face;
       for (int k = 0; k < 3; ++k) {
         at.du[k] = plane.second[k] * (uv[2] - uv[0]) + plane.third[k] * (uv[4] - uv[0]);
@@ -169,7 +169,7 @@ inline void map_curved(const ViewGeom& g, std::uint32_t lanes, const float (*loc
   }
 }
 
-// Samples the texture for `lanes`, which all show geom g. The mip level follows from the surface's own
+// Samples the texture for `lanes`, which all show geom g. The mipmap level follows from the surface's own
 // plane, not from the normal by which it is shaded.
 inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pixels,
                           const Hits& hits, std::uint32_t lanes, const float (*local)[kLanes],
@@ -179,7 +179,7 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   const float width = texture.width[0], height = texture.height[0];
   const bool plane = g.type == mjGEOM_PLANE;
   const bool round = g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
-  const bool curved = !texture.cube && !s.from_above &&
+  const bool curved = !texture.cube && !s.projected_along_z &&
                       (round || g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID);
   const bool seen_through = g.transparent && texture.alpha;
   Mapped mapped;
@@ -204,7 +204,7 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
     };
     if (texture.cube) {
       const auto stretched = [&](Vec3f v) -> Vec3f {
-        return {v.x * s.stretch[0], v.y * s.stretch[1], v.z * s.stretch[2]};
+        return {v.x * s.cube_scale[0], v.y * s.cube_scale[1], v.z * s.cube_scale[2]};
       };
       const CubeFace face(stretched(q));
       const Float footprint =
@@ -215,28 +215,28 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
     }
     // The maximum component, as in Mesa; it gives a sharper image than the length of the vector.
     Float u, v, footprint;
-    if (plane || s.from_above) {
+    if (plane || s.projected_along_z) {
       const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
       const float size_y = round ? g.size[0] : g.size[1];
       const float sy = size_y > 0 ? 0.5f / size_y : 0.5f;
-      u = fma(q.x, splat(sx), splat(!s.from_above && g.size[0] > 0 ? 0.5f : 0.0f));
-      v = fma(q.y, splat(-sy), splat(!s.from_above && g.size[1] > 0 ? 0.5f : 0.0f));
-      const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
+      u = fma(q.x, splat(sx), splat(!s.projected_along_z && g.size[0] > 0 ? 0.5f : 0.0f));
+      v = fma(q.y, splat(-sy), splat(!s.projected_along_z && g.size[1] > 0 ? 0.5f : 0.0f));
+      const Float ku = splat(sx * s.uv_scale[0] * width), kv = splat(sy * s.uv_scale[1] * height);
       const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
       footprint = max(texels(steps.x), texels(steps.y));
     } else {
       const Coordinates at =
-          curved || s.mapped ? mapped.coordinates(k) : box_uv(g, q, load3(normal, k));
+          curved || s.uses_mesh_uvs ? mapped.coordinates(k) : box_uv(g, q, load3(normal, k));
       u = at.u;
       v = at.v;
-      const Float ku = splat(s.repeat[0] * width), kv = splat(s.repeat[1] * height);
+      const Float ku = splat(s.uv_scale[0] * width), kv = splat(s.uv_scale[1] * height);
       const auto texels = [&](Vec3f w) {
         return max(abs(ku * dot(at.du, w)), abs(kv * dot(at.dv, w)));
       };
       footprint = max(texels(steps.x), texels(steps.y));
     }
-    const Float place_s = fma(u, splat(s.repeat[0]), splat(s.shift[0])),
-                place_t = fma(v, splat(s.repeat[1]), splat(s.shift[1]));
+    const Float place_s = fma(u, splat(s.uv_scale[0]), splat(s.uv_offset[0])),
+                place_t = fma(v, splat(s.uv_scale[1]), splat(s.uv_offset[1]));
     store_sample([&](auto texel) {
       return sample<decltype(texel)>(texture, m, int_of(0), place_s, place_t, footprint);
     });
@@ -267,7 +267,7 @@ template <bool first>
 void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const ViewGeom& g,
                  std::uint32_t mine, bool color, Surfaces& out) {
   const Surface& s = g.surface;
-  if (g.on_demand) g.on_demand->prepare_surface(color && s.mapped);
+  if (g.mesh_on_demand) g.mesh_on_demand->prepare_surface(color && s.uses_mesh_uvs);
   alignas(64) float local[3][kLanes], normal[3][kLanes];
   for (int k = 0; k < kLanes; k += kWidth) {
     const Mask m = mask_of(mine >> k & kAllLanes);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Texture coordinates and filtering as in OpenGL: bilinear within a mip level, linear between two
+// Texture coordinates and filtering as in OpenGL: bilinear within a mipmap level, linear between two
 // levels. Part of the tile kernels.
 
 #include "mjsense/render/kernels/rays.h"
@@ -42,7 +42,7 @@ inline Float mantissa_of(Float x) {
   return fma(to_float(bits_and(bits_of(x), 0x7fffff)), splat(1.0f / 0x800000), splat(1.0f));
 }
 
-// Size and offset of a mip level, per lane.
+// Size and offset of a mipmap level, per lane.
 struct Level {
   Float width, height;
   Int offset;
@@ -64,7 +64,7 @@ struct Level {
   }
 };
 
-// Samples one mip level at (s, t) in [0, 1]. Texel: Rgb or Alpha.
+// Samples one mipmap level at (s, t) in [0, 1]. Texel: Rgb or Alpha.
 template <class Texel>
 inline Texel bilinear(const Texture& texture, const Level& level, Int face, Float s, Float t) {
   const Float zero = splat(0.0f), one = splat(1.0f), half = splat(0.5f);

@@ -68,22 +68,23 @@ inline void find_row(const View& view, int ty, TileScratch& scratch) {
   const float top = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
   const float reach = 0.5f * grid.dy;  // of samples
   const float high = top - reach, low = top + grid.dy * kTileSize + reach;
-  scratch.row_count = 0;
+  scratch.num_row_geoms = 0;
   for (int i = 0; i < view.num_opaque + view.num_transparent; ++i) {
     const float* w = view.geoms[i].window;
-    if (grid.distorted_rays || (w[2] <= high && w[3] >= low)) scratch.row[scratch.row_count++] = i;
+    if (grid.distorted_rays || (w[2] <= high && w[3] >= low))
+      scratch.row_geoms[scratch.num_row_geoms++] = i;
   }
 }
 
 inline TileLists find_geoms(const View& view, const float* window, TileScratch& scratch) {
   TileLists lists;
-  for (int i = 0; i < scratch.row_count; ++i) {
-    const int g = scratch.row[i];
+  for (int i = 0; i < scratch.num_row_geoms; ++i) {
+    const int g = scratch.row_geoms[i];
     if (!overlap(view.geoms[g].window, window)) continue;
     if (g < view.num_opaque) {
-      scratch.opaque[lists.opaque++] = g;
+      scratch.opaque_geoms[lists.opaque++] = g;
     } else {
-      scratch.transparent[lists.transparent++] = g;
+      scratch.transparent_geoms[lists.transparent++] = g;
     }
   }
   return lists;
@@ -155,26 +156,26 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
                          Shadows& shadows, Colors& colors) {
   shade_packet(view, fixed, reflection, q, tile.pixels[q], tile.hits[q], shadows, colors);
   if (lists.transparent)
-    shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.hits[q],
-                      colors);
+    shade_transparent(view, scratch.transparent_geoms, lists.transparent, tile.pixels[q],
+                      tile.hits[q], colors);
 }
 
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
 // the surface of its centre keeps its colour, unless it is among the lanes `always` of its packet.
 inline void shade_samples(const View& view, const TileLists& lists, const std::uint32_t* always,
-                          SampledPixels& pixels, TileScratch& scratch, TileBox* lit,
+                          SampledPixels& pixels, TileScratch& scratch, TileBox* receivers,
                           Colors* colors) {
   auto& [centers, reflection, tile, triangles] = *static_cast<TileSpace*>(scratch.tile);
   start_samples(view, centers, pixels, tile);
   tile.kept = &triangles;
-  trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  trace_tile(view, Part::kAll, scratch.opaque_geoms, lists.opaque, tile);
   tile.kept = nullptr;
   keep_differing(view, centers, always, pixels, tile);
   if (!pixels.count) return;
   const int packets = pixels.packets(), samples = pixels.samples;
   const float part = 1.0f / samples;
   Shadows shadows;
-  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, lit);
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, receivers);
   if (view.reflection) trace_reflection(view, packets, tile, reflection);
   for (int q = 0; q < packets; ++q) {
     Colors sampled;
@@ -204,7 +205,7 @@ inline void find_reflected_edges(const View& beyond, const Reflection& reflectio
 inline void find_transparent_edges(const View& view, int index, const Tile& tile, int across,
                                    int down, Hits* layer, std::uint32_t* edges) {
   const ViewGeom& g = view.geoms[index];
-  const PacketMask near = packets_in_reach(g.window, g.nearest, tile);
+  const PacketMask near = packets_in_reach(g.window, g.min_depth, tile);
   if (!near) return;
   for (int q = 0; q < across * down; ++q) {
     clear(layer[q], kInfinity);
@@ -237,19 +238,22 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   const TileLists lists = find_geoms(view, tile.reach, scratch);
   triangles.clear();
   tile.keep = &triangles;
-  trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+  trace_tile(view, Part::kAll, scratch.opaque_geoms, lists.opaque, tile);
   tile.keep = nullptr;
   Shadows shadows;
-  TileBox* const lit = targets.lit ? targets.lit + tile_index(grid, x0, y0) : nullptr;
-  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, lit);
+  TileBox* const receivers =
+      targets.receivers ? targets.receivers + tile_index(grid, x0, y0) : nullptr;
+  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, receivers);
   std::uint32_t edges[kTilePackets] = {};
   find_edges(grid, tile.hits, across, down, edges);
-  for (int i = 0; i < lists.opaque; ++i) add_thin(grid, view.geoms[scratch.opaque[i]], tile, edges);
+  for (int i = 0; i < lists.opaque; ++i)
+    add_thin(grid, view.geoms[scratch.opaque_geoms[i]], tile, edges);
   std::uint32_t always[kTilePackets] = {};
   if (view.reflection && trace_reflection(view, packets, tile, reflection))
     find_reflected_edges(*view.reflection, reflection, across, down, always);
   for (int i = 0; i < lists.transparent; ++i)
-    find_transparent_edges(view, scratch.transparent[i], tile, across, down, sampled.hits, always);
+    find_transparent_edges(view, scratch.transparent_geoms[i], tile, across, down, sampled.hits,
+                           always);
   Colors colors[kTilePackets];
   for (int q = 0; q < packets; ++q) {
     shade_pixels(view, nullptr, reflection, q, lists, scratch, tile, shadows, colors[q]);
@@ -261,11 +265,11 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
       pixels.packet[pixels.count] = q;
       pixels.lane[pixels.count++] = __builtin_ctz(lanes);
       if (pixels.count < pixels.maximum()) continue;
-      shade_samples(view, lists, always, pixels, scratch, lit, colors);
+      shade_samples(view, lists, always, pixels, scratch, receivers, colors);
       pixels.count = 0;
     }
   }
-  if (pixels.count) shade_samples(view, lists, always, pixels, scratch, lit, colors);
+  if (pixels.count) shade_samples(view, lists, always, pixels, scratch, receivers, colors);
   for (int q = 0; q < packets; ++q)
     write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), colors[q].rgb, 1);
 }
@@ -279,9 +283,10 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
   const int packets = across * down;
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
-  tile.shaded = targets.rgb || targets.normals || targets.fixed;
+  tile.shaded = targets.rgb || targets.normals || targets.fixed_tiles;
   const int samples = targets.rgb ? targets.samples : 1;
-  TileBox* const lit = targets.lit ? targets.lit + tile_index(grid, x0, y0) : nullptr;
+  TileBox* const receivers =
+      targets.receivers ? targets.receivers + tile_index(grid, x0, y0) : nullptr;
   alignas(64) float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
        ++sample) {
@@ -294,26 +299,26 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     const TileLists lists = find_geoms(view, tile.around, scratch);
     const FixedTile* fixed = nullptr;  // the tile's cached layer
     if (!view.layered || samples > 1) {
-      trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+      trace_tile(view, Part::kAll, scratch.opaque_geoms, lists.opaque, tile);
     } else {
       const int at = tile_index(grid, x0, y0);
-      if (targets.fixed) {
-        make_fixed(view, lists.opaque, packets, tile, scratch, targets.fixed[at]);
+      if (targets.fixed_tiles) {
+        make_fixed(view, lists.opaque, packets, tile, scratch, targets.fixed_tiles[at]);
         return;
       }
-      if (view.fixed) {
-        fixed = view.fixed + at;
+      if (view.fixed_tiles) {
+        fixed = view.fixed_tiles + at;
         load_fixed(view, *fixed, packets, tile);
         if (targets.normals)
           for (int q = 0; q < packets; ++q) load_rest(*fixed, q, 0xffffu, tile.hits[q]);
       } else {  // same order as with a cached layer, so that the pixels are identical
-        trace_tile(view, Part::kFixed, scratch.opaque, lists.opaque, tile);
+        trace_tile(view, Part::kFixed, scratch.opaque_geoms, lists.opaque, tile);
       }
-      trace_tile(view, Part::kMoving, scratch.opaque, lists.opaque, tile);
+      trace_tile(view, Part::kMoving, scratch.opaque_geoms, lists.opaque, tile);
     }
     if (targets.rgb && sample < samples) {
       Shadows shadows;
-      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows, lit);
+      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows, receivers);
       if (view.reflection) trace_reflection(view, packets, tile, reflection);
       for (int q = 0; q < packets; ++q) {
         Colors colors;
@@ -326,7 +331,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       }
     }
     if (geometry && centered) {
-      trace_transparent(view, scratch.transparent, lists.transparent, tile);
+      trace_transparent(view, scratch.transparent_geoms, lists.transparent, tile);
       for (int q = 0; q < packets; ++q) {
         write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q],
                        tile.hits[q]);
@@ -344,7 +349,7 @@ inline void render_tiles(const View& view, const ImageTargets& targets, int firs
   for (int ty = first; ty < last; ++ty) {
     find_row(view, ty, scratch);
     for (int tx = 0; tx < across; ++tx) {
-      if (targets.changed && !targets.changed[ty * across + tx]) continue;
+      if (targets.changed_tiles && !targets.changed_tiles[ty * across + tx]) continue;
       if (targets.multisampled) {
         render_multisampled(view, targets, tx * kTileSize, ty * kTileSize, scratch);
       } else {

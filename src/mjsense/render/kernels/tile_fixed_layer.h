@@ -77,28 +77,28 @@ inline void include(const TileBounds& bounds, TileBox& box) {
 inline void find_casters(const View& view, Part part, const TileBounds& bounds,
                          TileScratch& scratch, int& used, int& spare, Casters* out) {
   for (int i = 0; i < view.num_lights; ++i) {
-    const LightWindows& w = scratch.windows;
+    const LightWindows& w = scratch.caster_windows;
     out[i] = {scratch.casters + used,
-              {w.u0 + used, w.u1 + used, w.v0 + used, w.v1 + used, w.w + used},
+              {w.u_min + used, w.u_max + used, w.v_min + used, w.v_max + used, w.w_min + used},
               0,
               -1,
               nullptr,
               0};
-    if (!view.lights[i].shadows || bounds.low[0] > bounds.high[0]) continue;
+    if (!view.lights[i].casts_shadows || bounds.low[0] > bounds.high[0]) continue;
     find_casters(view, i, part, bounds.low, bounds.high, bounds.only, spare, out[i]);
     used += out[i].count;
   }
 }
 
 // `fixed`: the tile's layer, which stores the shadows that fixed geoms cast on fixed geoms; null if
-// the view is not layered. `lit`: if not null, grows to contain everything that the tile shows.
+// the view is not layered. `receivers`: if not null, grows to contain everything that the tile shows.
 inline void find_all_casters(const View& view, const FixedTile* fixed, const Tile& tile,
-                             int packets, TileScratch& scratch, Shadows& out, TileBox* lit) {
-  int used = 0, spare = scratch.spare_casters;
+                             int packets, TileScratch& scratch, Shadows& out, TileBox* receivers) {
+  int used = 0, spare = scratch.max_caster_parts;
   out.known = fixed;
   for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
   const TileBounds all = bounds_of_tile(view, nullptr, tile, packets);
-  if (lit) include(all, *lit);
+  if (receivers) include(all, *receivers);
   if (fixed) {
     find_casters(view, Part::kFixed, bounds_of_tile(view, fixed, tile, packets), scratch, used,
                  spare, out.fixed);
@@ -126,10 +126,10 @@ inline void copy_lanes(const T* from, T* to) {
 // result in `out`.
 inline void make_fixed(const View& view, int count, int packets, Tile& tile, TileScratch& scratch,
                        FixedTile& out) {
-  trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
+  trace_tile(view, Part::kFixed, scratch.opaque_geoms, count, tile);
   Shadows shadows;
   if (view.shadows) {
-    int used = 0, spare = scratch.spare_casters;
+    int used = 0, spare = scratch.max_caster_parts;
     find_casters(view, Part::kFixed, bounds_of_tile(view, nullptr, tile, packets), scratch, used,
                  spare, shadows.fixed);
     for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
@@ -144,10 +144,10 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
     Surfaces surfaces;
     gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
     for (int i = 0; i < view.num_lights && view.shadows; ++i) {
-      if (!view.lights[i].shadows) continue;
+      if (!view.lights[i].casts_shadows) continue;
       const Lit lit(view.lights[i], surfaces);
       const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
-      out.dark[i][q] = static_cast<std::uint16_t>(dark & lanes);
+      out.unlit[i][q] = static_cast<std::uint16_t>(dark & lanes);
     }
     Shadows known = shadows;
     known.known = &out;
@@ -177,9 +177,9 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
   bool darker = false;
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
-    const std::uint32_t known = shadows.known->dark[i][shadows.packet];
+    const std::uint32_t known = shadows.known->unlit[i][shadows.packet];
     shadows.settled_dark[i] = known;
-    if (!light.shadows || shadows.moving[i].count == 0) continue;
+    if (!light.casts_shadows || shadows.moving[i].count == 0) continue;
     Lit lit;
     for (int k = 0; k < kLanes; k += kWidth) {
       LightTerm& term = lit.terms[k / kWidth];
@@ -218,7 +218,7 @@ inline void load_fixed(const View& view, const FixedTile& from, int packets, Til
     for (int i = 0; i < kLanes; ++i) {
       if (hits.id[i] != last) {  // cache: most packets show few geoms
         last = hits.id[i];
-        index = last < 0 ? -1 : view.index_of_id[last];
+        index = last < 0 ? -1 : view.geom_index[last];
       }
       hits.geom[i] = index;
     }

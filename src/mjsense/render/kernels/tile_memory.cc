@@ -11,17 +11,17 @@ constexpr int kSpareCasters = 4096;  // parts (nodes or blocks of triangles)
 
 TileMemory::TileMemory(int max_geoms)
     : geoms_(3 * static_cast<std::size_t>(max_geoms)),
-      casters_(View::kMaxLights * static_cast<std::size_t>(max_geoms) + kSpareCasters),
+      casters_(kMaxLights * static_cast<std::size_t>(max_geoms) + kSpareCasters),
       windows_(5 * (casters_.size() + kWindowPadding)),
       tile_(DType::kUint8, Shape{static_cast<std::int64_t>(tile_bytes())}) {
-  scratch_.row = geoms_.data();
-  scratch_.opaque = scratch_.row + max_geoms;
-  scratch_.transparent = scratch_.opaque + max_geoms;
+  scratch_.row_geoms = geoms_.data();
+  scratch_.opaque_geoms = scratch_.row_geoms + max_geoms;
+  scratch_.transparent_geoms = scratch_.opaque_geoms + max_geoms;
   scratch_.casters = casters_.data();
-  scratch_.spare_casters = kSpareCasters;
+  scratch_.max_caster_parts = kSpareCasters;
   const std::size_t stride = windows_.size() / 5;
   float* w = windows_.data();
-  scratch_.windows = {w, w + stride, w + 2 * stride, w + 3 * stride, w + 4 * stride};
+  scratch_.caster_windows = {w, w + stride, w + 2 * stride, w + 3 * stride, w + 4 * stride};
   scratch_.tile = tile_.data();
 }
 

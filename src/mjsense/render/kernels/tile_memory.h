@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/tile_kernels.h"
 
 namespace mjsense::render {
 

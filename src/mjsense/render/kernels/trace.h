@@ -90,7 +90,7 @@ inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limi
                       rays::EmbreeRayHits& rays, int* valid) {
   const ViewGeom& g = at.geom;
   const LocalRay ray = at.ray(pixels, k);
-  const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
+  const Interval inside = box(ray.o, ray.d, g.aabb, g.aabb + 3);
   const Float near = load(pixels.near + k);
   const Mask hit = (inside.enter < limit) & (inside.exit > near);
   if (!any(hit)) return false;
@@ -253,7 +253,7 @@ inline PacketMask trace_geom(const View& view, int index, const Pixels* pixels, 
   const auto surface = [&](auto enter) { return trace_surface(at, pixels, hits, packets, enter); };
   switch (g.type) {
     case mjGEOM_PLANE:
-      return surface([&](Vec3f o, Vec3f d) { return plane(g, o, d, g.behind); });
+      return surface([&](Vec3f o, Vec3f d) { return plane(g, o, d, g.shows_back); });
     case mjGEOM_SPHERE:
       return surface([&](Vec3f o, Vec3f d) { return sphere(o, d, g.size[0]).enter; });
     case mjGEOM_CAPSULE:

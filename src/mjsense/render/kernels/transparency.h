@@ -62,7 +62,7 @@ struct Reflection {
 inline std::uint32_t mirror_lanes(const View& view, const Pixels& pixels, const Hits& hits) {
   std::uint32_t lanes = 0;
   for (int k = 0; k < kLanes; k += kWidth)
-    lanes |= bits(load(hits.id + k) == int_of(view.mirror)) << k;
+    lanes |= bits(load(hits.id + k) == int_of(view.mirror_id)) << k;
   if (!lanes) return 0;
   const ViewGeom& g = view.geoms[hits.geom[__builtin_ctz(lanes)]];
   if (g.type != mjGEOM_BOX) return lanes;
@@ -105,7 +105,7 @@ inline PacketMask trace_reflection(const View& view, int packets, const Tile& ti
   for (int i = 0; i < beyond.num_opaque; ++i) {
     const ViewGeom& g = beyond.geoms[i];
     if (!overlap(g.window, tile.around)) continue;
-    const PacketMask some = packets_in_reach(g.window, g.nearest, out.tile);
+    const PacketMask some = packets_in_reach(g.window, g.min_depth, out.tile);
     if (!some) continue;
     const PacketMask changed = draw_or_trace(beyond, i, some, out.tile);
     if (changed) update_farthest(out.tile, changed);

@@ -12,7 +12,7 @@
 #include <span>
 #include <string>
 
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/image_targets.h"
 
 namespace mjsense::rays {
 class RayWorld;

@@ -82,7 +82,7 @@ void Appearance::copy_lights(const mjModel* m) {
       continue;
     ViewLight& light =
         add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
-    light.shadows = m->light_castshadow[i] && !is_black(light);
+    light.casts_shadows = m->light_castshadow[i] && !is_black(light);
     light.kind = m->light_type[i] == mjLIGHT_DIRECTIONAL ? LightKind::kDirectional
                  : m->light_type[i] == mjLIGHT_SPOT      ? LightKind::kSpot
                                                          : LightKind::kPoint;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mjsense/rays/flex_surface.h"
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/view_light.h"
 
 namespace mjsense::render {
 
@@ -32,7 +32,7 @@ inline constexpr int kClassicLights = 8;
 class Appearance {
  public:
   // max_lights: maximum number of active lights that are used, counting the headlight first; at
-  // most View::kMaxLights.
+  // most kMaxLights.
   explicit Appearance(const mjModel* model, int max_lights = kClassicLights);
   void copy(const mjModel* model);  // no allocation
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/pixel_grid.h"
 
 namespace mjsense::render {
 
@@ -37,7 +37,7 @@ enum class Lens { kBrownConrady, kFisheye };
 std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficients, double x,
                                    double y);
 
-// Rays [H, W, 2] for PixelGrid::bent: the direction of each pixel through a lens with these
+// Rays [H, W, 2] for PixelGrid::distorted_rays: the direction of each pixel through a lens with these
 // coefficients (defined in CameraSensorCfg). Throws ValueError, with a message that starts with
 // `context`, if the lens cannot be inverted over the image or would see 180 degrees.
 std::vector<float> distorted_rays(const PixelGrid& grid, Lens lens,

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "mjsense/render/view/image_window.h"
+#include "mjsense/render/view/tile_kernels.h"
 
 namespace mjsense::render {
 namespace {
@@ -17,8 +18,9 @@ int tiles_along(int pixels) { return (pixels + kTileSize - 1) / kTileSize; }
 // Whether everything is equal but the geoms and what is computed from geoms and lights.
 bool same_surroundings(const View& a, const View& b) {
   const auto values = [](const View& v) {
-    return std::tie(v.grid, v.near, v.far, v.num_lights, v.shadows, v.backs, v.global_ambient,
-                    v.skybox, v.sky_distance, v.haze, v.sky_from, v.fog, v.sky_radius, v.mirror);
+    return std::tie(v.grid, v.near, v.far, v.num_lights, v.shadows, v.shows_plane_backs,
+                    v.global_ambient, v.skybox, v.sky_distance, v.haze, v.sky_min_depth, v.fog,
+                    v.sky_fog_radius, v.mirror_id);
   };
   return values(a) == values(b) && std::ranges::equal(a.r_wc, b.r_wc) &&
          std::equal(a.lights, a.lights + a.num_lights, b.lights) && !a.reflection == !b.reflection;
@@ -107,18 +109,18 @@ bool overlap(const LightWindow& shadow, const LightWindow& points) {
 }  // namespace
 
 const ViewGeom* ChangedTiles::Kept::find(const ViewGeom& geom) const {
-  const int at = geom.id < std::ssize(index_of_id) ? index_of_id[geom.id] : -1;
+  const int at = geom.id < std::ssize(geom_index) ? geom_index[geom.id] : -1;
   return at < 0 ? nullptr : &geoms[at];
 }
 
 void ChangedTiles::Kept::assign(const View& from) {
   view = from;
   geoms.assign(from.geoms, from.geoms + from.num_geoms);
-  std::ranges::fill(index_of_id, -1);
+  std::ranges::fill(geom_index, -1);
   for (int i = 0; i < from.num_geoms; ++i) {
     const int id = geoms[i].id;
-    if (id >= std::ssize(index_of_id)) index_of_id.resize(id + 1, -1);
-    index_of_id[id] = i;
+    if (id >= std::ssize(geom_index)) geom_index.resize(id + 1, -1);
+    geom_index[id] = i;
   }
 }
 
@@ -138,15 +140,15 @@ void ChangedTiles::compare(const View& view) {
   changed_.assign(
       static_cast<std::size_t>(tiles_along(view.grid.width)) * tiles_along(view.grid.height),
       !comparable);
-  lit_.resize(changed_.size());
+  receivers_.resize(changed_.size());
   if (comparable) {
     // The reflected view has the same pixels, and no shadows.
     if (view.reflection) mark_changes(reflected_, *view.reflection);
     mark_changes(shown_, view);
     if (view.shadows) mark_shadows(view);
   }
-  for (std::size_t i = 0; i < lit_.size(); ++i)
-    if (changed_[i]) lit_[i] = {};
+  for (std::size_t i = 0; i < receivers_.size(); ++i)
+    if (changed_[i]) receivers_[i] = {};
 }
 
 void ChangedTiles::keep(const View& view) {
@@ -207,10 +209,10 @@ std::span<const LightWindow> ChangedTiles::shadow_windows(const View& view,
   windows.clear();
   const LightWindows& all = frame.windows;
   for (const auto& [before, now] : changes_) {
-    if (before && before->casts) windows.push_back(shadow_window(frame, *before));
-    if (!now || !now->casts) continue;
+    if (before && before->casts_shadows) windows.push_back(shadow_window(frame, *before));
+    if (!now || !now->casts_shadows) continue;
     const std::ptrdiff_t i = now - view.geoms;
-    windows.push_back({{all.u0[i], all.v0[i]}, {all.u1[i], all.v1[i]}, all.w[i]});
+    windows.push_back({{all.u_min[i], all.v_min[i]}, {all.u_max[i], all.v_max[i]}, all.w_min[i]});
   }
   return windows;
 }
@@ -223,7 +225,7 @@ void ChangedTiles::mark_shadows(const View& view) {
     for (int k = 0; k < frames.count; ++k) {
       const LightFrame& frame = frames.first[k];
       for (std::size_t tile = 0; tile < changed_.size(); ++tile) {
-        const TileBox& box = lit_[tile];
+        const TileBox& box = receivers_[tile];
         if (changed_[tile] || box.low[0] > box.high[0]) continue;
         if (&frame_towards(frames, box.low, box.high) != &frame) continue;
         const LightWindow points = lit_window(frame, box);

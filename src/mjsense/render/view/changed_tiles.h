@@ -25,9 +25,9 @@ class ChangedTiles {
   void compare(const View& view);
   void keep(const View& view);
 
-  // For ImageTargets::changed and ImageTargets::lit.
+  // For ImageTargets::changed_tiles and ImageTargets::receivers.
   const std::uint8_t* changed() const { return changed_.data(); }
-  TileBox* lit() { return lit_.data(); }
+  TileBox* receivers() { return receivers_.data(); }
 
  private:
   // A geom that differs: null where it is absent.
@@ -38,7 +38,7 @@ class ChangedTiles {
   struct Kept {
     View view;
     std::vector<ViewGeom> geoms;
-    std::vector<int> index_of_id;  // in `geoms`, or -1
+    std::vector<int> geom_index;  // in `geoms`, or -1
 
     const ViewGeom* find(const ViewGeom& geom) const;  // with the same id; null: none
     void assign(const View& view);
@@ -51,7 +51,7 @@ class ChangedTiles {
   bool complete_ = false;
   Kept shown_, reflected_;
   std::vector<std::uint8_t> changed_;
-  std::vector<TileBox> lit_;
+  std::vector<TileBox> receivers_;
   // Working memory.
   std::vector<Change> changes_;
   std::vector<std::uint8_t> present_;  // by geom

@@ -41,7 +41,7 @@ std::size_t FixedLayer::bytes(int width, int height) {
 FixedLayer::FixedLayer(const mjModel* m, int width, int height)
     : tiles_(std::make_unique_for_overwrite<FixedTile[]>(count_tiles(width, height))) {
   geoms_.reserve(ViewBuilder::max_geoms(m));
-  lights_.reserve(View::kMaxLights);
+  lights_.reserve(kMaxLights);
 }
 
 bool FixedLayer::settles(const View& view) {

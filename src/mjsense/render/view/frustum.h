@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/pixel_grid.h"
 
 namespace mjsense::rays {
 class BoxList;
@@ -18,7 +18,7 @@ namespace mjsense::render {
 // The part of the world that an image can show: a pyramid, or a box for an orthographic camera.
 class Frustum {
  public:
-  // position, rotation: X_WC, row-major; grid.bent must be null.
+  // position, rotation: X_WC, row-major; grid.distorted_rays must be null.
   Frustum(const PixelGrid& grid, const double position[3], const double rotation[9]);
 
   // True if no point of the box (corners in the world frame, m) can be in the image. False is not a

@@ -14,7 +14,7 @@ constexpr float kNearest = 1e-4f;  // m; nearer points count as behind the camer
 }  // namespace
 
 void box_corners(const ViewGeom& g, float (*corners)[3]) {
-  const float* h = g.box + 3;
+  const float* h = g.aabb + 3;
   for (int i = 0; i < 3; ++i) {
     const float x = h[0] * g.rot[3 * i], y = h[1] * g.rot[3 * i + 1], z = h[2] * g.rot[3 * i + 2];
     const float left = g.center[i] - x, right = g.center[i] + x;
@@ -32,14 +32,14 @@ void box_corners(const ViewGeom& g, float (*corners)[3]) {
 bool find_window(const View& view, ViewGeom& g) {
   const PixelGrid& grid = view.grid;
   for (int i = 0; i < 3; ++i)
-    g.center[i] = g.pos[i] + g.rot[3 * i] * g.box[0] + g.rot[3 * i + 1] * g.box[1] +
-                  g.rot[3 * i + 2] * g.box[2];
-  const float* h = g.box + 3;
+    g.center[i] = g.pos[i] + g.rot[3 * i] * g.aabb[0] + g.rot[3 * i + 1] * g.aabb[1] +
+                  g.rot[3 * i + 2] * g.aabb[2];
+  const float* h = g.aabb + 3;
   g.radius =
       g.type == mjGEOM_SPHERE ? g.size[0] : std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
   g.window[0] = g.window[2] = -kEndless;
   g.window[1] = g.window[3] = kEndless;
-  g.nearest = 0;
+  g.min_depth = 0;
   if (g.type == mjGEOM_PLANE) {
     g.radius = kEndless;
     return true;
@@ -51,7 +51,7 @@ bool find_window(const View& view, ViewGeom& g) {
     farthest = std::max(farthest, -c[2]);
   }
   if (farthest <= view.near || (view.far > 0 && nearest >= view.far)) return false;
-  g.nearest = std::max(nearest - 1e-5f * (1 + std::abs(nearest)), 0.0f);
+  g.min_depth = std::max(nearest - 1e-5f * (1 + std::abs(nearest)), 0.0f);
   float window[4] = {kEndless, -kEndless, kEndless, -kEndless};
   const auto show = [&](float x, float y, float depth, float error) {
     const float scale = 1.0f / depth;

@@ -33,7 +33,8 @@ void complete(LightFrame& f) {
 
 // A shadow ray from a surface of triangles starts slightly above it; see shadow_of_triangles().
 float lift(const ViewGeom& g) {
-  return g.bvh || g.on_demand ? 1e-4f * std::max(g.radius, std::abs(g.center[2]) + g.radius) : 0;
+  return g.bvh || g.mesh_on_demand ? 1e-4f * std::max(g.radius, std::abs(g.center[2]) + g.radius)
+                                   : 0;
 }
 
 constexpr int kCorners = 8;
@@ -116,7 +117,7 @@ class Seen {
 };
 
 // Sets the side of the geom's box that faces the light along the box's axis i.
-void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, LightSides& out) {
+void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, FacingSides& out) {
   float from = 0, along = 0;
   for (int k = 0; k < 3; ++k) {
     const float axis = g.rot[3 * k + i];
@@ -124,7 +125,7 @@ void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, LightSid
         axis * (light.kind == LightKind::kDirectional ? -light.dir[k] : light.pos[k] - g.center[k]);
     along += axis * g.center[k];
   }
-  const float side = g.box[3 + i], lit = light.kind == LightKind::kDirectional ? 0 : side;
+  const float side = g.aabb[3 + i], lit = light.kind == LightKind::kDirectional ? 0 : side;
   const float sign = from > lit ? 1.0f : from < -lit ? -1.0f : 0.0f;
   for (int k = 0; k < 3; ++k) out.normal[i][k][at] = sign * g.rot[3 * k + i];
   const bool faces = sign != 0 && g.type != mjGEOM_PLANE;
@@ -147,7 +148,7 @@ const LightFrame& frame_towards(const LightFrames& frames, const float* low, con
 }
 
 LightWindow shadow_window(const LightFrame& frame, const ViewGeom& geom) {
-  if (!geom.casts) return {{kEndless, kEndless}, {-kEndless, -kEndless}, kEndless};
+  if (!geom.casts_shadows) return {{kEndless, kEndless}, {-kEndless, -kEndless}, kEndless};
   if (geom.type == mjGEOM_PLANE) return kEverywhere;
   Corners corners;
   box_corners(geom, corners);
@@ -173,9 +174,9 @@ LightWindow lit_window(const LightFrame& frame, const TileBox& box) {
 
 LightSpace::LightSpace(int lights, std::size_t geoms)
     : stride_(geoms + kWindowPadding),
-      frames_(static_cast<std::size_t>(kFaces) * std::min(lights, View::kMaxLights)),
+      frames_(static_cast<std::size_t>(kFaces) * std::min(lights, kMaxLights)),
       windows_(kArrays * stride_ * frames_.size()),
-      sides_(kSideArrays * stride_ * std::min(lights, View::kMaxLights)) {}
+      sides_(kSideArrays * stride_ * std::min(lights, kMaxLights)) {}
 
 void LightSpace::fill(View& view) {
   std::size_t used = 0;
@@ -183,13 +184,13 @@ void LightSpace::fill(View& view) {
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
     view.light_frames[i] = {};
-    if (!light.shadows) continue;
+    if (!light.casts_shadows) continue;
     const bool directional = light.kind == LightKind::kDirectional;
     const float size = length(light.dir), cosine = light.cos_cutoff / size;
     const bool narrow = directional || (light.kind == LightKind::kSpot && cosine > kNarrow);
     const int count = narrow ? 1 : kFaces;
     view.light_frames[i] = {&frames_[used], count};
-    LightSides& sides = view.light_sides[i];
+    FacingSides& sides = view.facing_sides[i];
     for (int k = 0; k < 3; ++k) {
       for (float*& component : sides.normal[k]) component = std::exchange(side, side + stride_);
       sides.offset[k] = std::exchange(side, side + stride_);
@@ -210,11 +211,11 @@ void LightSpace::fill(View& view) {
       f.windows = {at, at + stride_, at + 2 * stride_, at + 3 * stride_, at + 4 * stride_};
       for (int g = 0; g < view.num_geoms; ++g) {
         const LightWindow window = shadow_window(f, view.geoms[g]);
-        f.windows.u0[g] = window.low[0];
-        f.windows.u1[g] = window.high[0];
-        f.windows.v0[g] = window.low[1];
-        f.windows.v1[g] = window.high[1];
-        f.windows.w[g] = window.w;
+        f.windows.u_min[g] = window.low[0];
+        f.windows.u_max[g] = window.high[0];
+        f.windows.v_min[g] = window.low[1];
+        f.windows.v_max[g] = window.high[1];
+        f.windows.w_min[g] = window.w;
       }
     }
   }

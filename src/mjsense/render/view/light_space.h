@@ -23,7 +23,7 @@ LightWindow shadow_window(const LightFrame& frame, const ViewGeom& geom);
 // Contains the points in the box; their w is at most that of the window.
 LightWindow lit_window(const LightFrame& frame, const TileBox& box);
 
-// Owns View::light_frames and light_sides of one view. fill() allocates nothing.
+// Owns View::light_frames and facing_sides of one view. fill() allocates nothing.
 class LightSpace {
  public:
   // Maximum numbers of lights that cast shadows, and of geoms.
@@ -33,7 +33,7 @@ class LightSpace {
   void fill(View& view);
 
  private:
-  static constexpr int kArrays = 5, kSideArrays = 12;  // arrays in LightWindows and LightSides
+  static constexpr int kArrays = 5, kSideArrays = 12;  // arrays in LightWindows and FacingSides
 
   std::size_t stride_;
   std::vector<LightFrame> frames_;

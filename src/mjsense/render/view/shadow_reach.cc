@@ -90,7 +90,7 @@ void reach_lights(const rays::RayWorld& world, const Appearance& appearance, int
   for (std::size_t i = 0; i < appearance.lights().size(); ++i) {
     const ViewLight& light = appearance.lights()[i];
     const int id = appearance.light_ids()[i];
-    if (!light.shadows || id < 0) continue;
+    if (!light.casts_shadows || id < 0) continue;
     any = true;
     const rays::RayLight& source = world.lights()[id];
     if (light.kind != LightKind::kDirectional) {

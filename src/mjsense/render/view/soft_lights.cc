@@ -10,7 +10,8 @@ namespace {
 
 bool is_soft(const Appearance& appearance, std::size_t i) {
   const ViewLight& light = appearance.lights()[i];
-  return light.shadows && light.kind != LightKind::kDirectional && appearance.light_radii()[i] > 0;
+  return light.casts_shadows && light.kind != LightKind::kDirectional &&
+         appearance.light_radii()[i] > 0;
 }
 
 // Van der Corput's sequence in base 2, for k < 64.
@@ -27,7 +28,7 @@ int light_samples(const Appearance& appearance, std::size_t index, int samples) 
   int soft = 0;
   const int all = static_cast<int>(appearance.lights().size());
   for (int i = 0; i < all; ++i) soft += is_soft(appearance, i) ? 1 : 0;
-  return std::clamp((View::kMaxLights - (all - soft)) / soft, 1, samples);
+  return std::clamp((kMaxLights - (all - soft)) / soft, 1, samples);
 }
 
 void sample_position(const double center[3], float radius, int k, int count, double out[3]) {

@@ -8,7 +8,7 @@
 namespace mjsense::render {
 
 // Number of lights that a view draws instead of light `index`: at most `samples`, and fewer if all
-// lights of the view together would exceed View::kMaxLights. 1 for lights without a position, a
+// lights of the view together would exceed kMaxLights. 1 for lights without a position, a
 // radius or shadows.
 int light_samples(const Appearance& appearance, std::size_t index, int samples);
 

@@ -25,16 +25,19 @@ std::array<std::uint8_t, 256> linear_values() {
   return table;
 }
 
-// The two texels of a row of `size` between which texel i of the next level's row of `half` lies.
-struct Between {
+// Linear interpolation between two neighbouring texels of a row or column.
+struct Interpolation {
   int first, second;
   float weight;  // of the second
 };
-Between between(int i, int size, int half) {
+
+// How texel i of a level, which has `coarse` texels along one axis, follows from those of the next
+// finer level, which has `fine` texels there.
+Interpolation interpolation_at(int i, int fine, int coarse) {
   const float x =
-      (static_cast<float>(i) + 0.5f) * static_cast<float>(size) / static_cast<float>(half) - 0.5f;
+      (static_cast<float>(i) + 0.5f) * static_cast<float>(fine) / static_cast<float>(coarse) - 0.5f;
   const int first = static_cast<int>(x);
-  return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
+  return {first, std::min(first + 1, fine - 1), x - static_cast<float>(first)};
 }
 
 // Functions that go over all texels are compiled for wide vectors too. Without fused operations, so
@@ -45,9 +48,10 @@ Between between(int i, int size, int half) {
 #define MJSENSE_VECTORS
 #endif
 
-// The texels (a + b + c + d + 2) / 4 of pairs of neighbours in two rows.
-MJSENSE_VECTORS void mean_row(const std::uint32_t* above, const std::uint32_t* below, int count,
-                              std::uint32_t* out) {
+// A row of the coarser level with half the width: each texel is the rounded mean
+// (a + b + c + d + 2) / 4 of 2 x 2 texels of two rows of the finer level.
+MJSENSE_VECTORS void average_2x2(const std::uint32_t* above, const std::uint32_t* below, int count,
+                                 std::uint32_t* out) {
   // A pair as four sums of 16 bits: red and blue, then green and alpha.
   constexpr std::uint64_t kChannels = 0x00ff00ff00ff00ff;
   constexpr std::uint32_t kHalf = 0x00020002;  // rounds the division by four
@@ -75,10 +79,11 @@ MJSENSE_VECTORS void mean_row(const std::uint32_t* above, const std::uint32_t* b
   }
 }
 
-// The texels between the two rows (`below` has the weight v) and between the given columns.
-MJSENSE_VECTORS void interpolated_row(const std::uint32_t* above, const std::uint32_t* below,
-                                      float v, std::span<const Between> columns,
-                                      std::uint32_t* out) {
+// A row of the coarser level by bilinear interpolation: between two rows of the finer level, where
+// `below` has the weight v, and between their columns.
+MJSENSE_VECTORS void interpolate_row(const std::uint32_t* above, const std::uint32_t* below,
+                                     float v, std::span<const Interpolation> columns,
+                                     std::uint32_t* out) {
   using Channels [[gnu::vector_size(16)]] = float;
   using Words [[gnu::vector_size(16)]] = std::int32_t;
   constexpr Words kShifts = {0, 8, 16, 24};
@@ -87,7 +92,7 @@ MJSENSE_VECTORS void interpolated_row(const std::uint32_t* above, const std::uin
     const Words words = Words{word, word, word, word} >> kShifts & 255;
     return __builtin_convertvector(words, Channels);
   };
-  for (const Between& u : columns) {
+  for (const Interpolation& u : columns) {
     const auto mix = [&](const std::uint32_t* row) {
       const Channels first = unpacked(row[u.first]);
       return first + u.weight * (unpacked(row[u.second]) - first);
@@ -115,36 +120,39 @@ MJSENSE_VECTORS void opaque_row(const mjtByte* from, int count, std::uint32_t* o
   for (; x < count; ++x, from += 3) out[x] = from[0] | from[1] << 8 | from[2] << 16 | 0xff000000;
 }
 
-// From the rows of one level to those of the next, by interpolation at its texels' centres, as
-// OpenGL drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts
-// the image nor drops its border.
-class Halving {
+// Computes a mipmap level from the next finer one, by interpolation at the centres of its texels, as
+// OpenGL drivers do. If the finer level has twice its size, this is the mean of 2 x 2 texels. For odd
+// sizes, it neither shifts the image nor drops its border.
+class MipmapFilter {
  public:
-  Halving(const Texture& texture, int from)
-      : width_(static_cast<int>(texture.width[from + 1])),
-        source_height_(static_cast<int>(texture.height[from])),
-        height_(static_cast<int>(texture.height[from + 1])) {
-    const int source_width = static_cast<int>(texture.width[from]);
-    even_ = source_width == 2 * width_ && source_height_ == 2 * height_;
-    for (int x = 0; x < width_ && !even_; ++x) columns_.push_back(between(x, source_width, width_));
+  // For the level after `finer`.
+  MipmapFilter(const Texture& texture, int finer)
+      : width_(static_cast<int>(texture.width[finer + 1])),
+        height_(static_cast<int>(texture.height[finer + 1])),
+        finer_height_(static_cast<int>(texture.height[finer])) {
+    const int finer_width = static_cast<int>(texture.width[finer]);
+    exact_half_ = finer_width == 2 * width_ && finer_height_ == 2 * height_;
+    for (int x = 0; x < width_ && !exact_half_; ++x)
+      columns_.push_back(interpolation_at(x, finer_width, width_));
   }
 
-  // Computes row y from row(i) of the finer level, whose last two results must stay valid.
-  template <class Row>
-  void compute(int y, Row row, std::uint32_t* out) const {
-    const Between v = even_ ? Between{2 * y, 2 * y + 1, 0} : between(y, source_height_, height_);
-    const std::uint32_t *above = row(v.first), *below = row(v.second);
-    if (even_) {
-      mean_row(above, below, width_, out);
+  // Computes row y from finer_row(i), row i of the finer level. Its last two results must stay valid.
+  template <class FinerRow>
+  void compute(int y, FinerRow finer_row, std::uint32_t* out) const {
+    const Interpolation v = exact_half_ ? Interpolation{2 * y, 2 * y + 1, 0}
+                                        : interpolation_at(y, finer_height_, height_);
+    const std::uint32_t *above = finer_row(v.first), *below = finer_row(v.second);
+    if (exact_half_) {
+      average_2x2(above, below, width_, out);
     } else {
-      interpolated_row(above, below, v.weight, columns_, out);
+      interpolate_row(above, below, v.weight, columns_, out);
     }
   }
 
  private:
-  int width_, source_height_, height_;
-  bool even_;
-  std::vector<Between> columns_;  // unless even_
+  int width_, height_, finer_height_;  // texels
+  bool exact_half_;
+  std::vector<Interpolation> columns_;  // by texel of a row, unless exact_half_
 };
 
 // Models of MuJoCo before 3.3.3 have no colour spaces.
@@ -152,9 +160,10 @@ int color_space(const mjModel* model, int id) {
   return model->tex_colorspace ? model->tex_colorspace[id] : mjCOLORSPACE_AUTO;
 }
 
+// Images that are stored in each level.
 int num_images(const Texture& texture) { return texture.cube && !texture.same_faces ? 6 : 1; }
 
-// Rows of the model's texture.
+// Rows of level 0, converted from the model's texture to linear RGBA8.
 class SourceRows {
  public:
   SourceRows(const mjModel* model, int id, const Texture& texture, int face)
@@ -182,13 +191,13 @@ class SourceRows {
   const mjtByte* data_;
 };
 
-// Rows of a level that is computed from the source without storing the levels in between.
+// Rows of a mipmap level, computed from the source without storing the finer levels.
 class LevelRows {
  public:
   LevelRows(const SourceRows& source, const Texture& texture, int level) : source_(source) {
     if (level > 0) {
       finer_ = std::make_unique<LevelRows>(source, texture, level - 1);
-      halving_ = std::make_unique<Halving>(texture, level - 1);
+      filter_ = std::make_unique<MipmapFilter>(texture, level - 1);
     }
     for (std::vector<std::uint32_t>& row : rows_)
       row.resize(static_cast<std::size_t>(texture.width[level]));
@@ -196,12 +205,11 @@ class LevelRows {
 
   void compute(int y, std::uint32_t* out) {
     if (!finer_) return source_.compute(y, out);
-    halving_->compute(
+    filter_->compute(
         y, [this](int i) { return finer_->row(i); }, out);
   }
 
  private:
-  // The last even and the last odd row are kept.
   const std::uint32_t* row(int y) {
     std::vector<std::uint32_t>& kept = rows_[y % 2];
     if (std::exchange(indices_[y % 2], y) != y) compute(y, kept.data());
@@ -209,48 +217,50 @@ class LevelRows {
   }
 
   const SourceRows& source_;
-  std::unique_ptr<LevelRows> finer_;  // null: the source
-  std::unique_ptr<Halving> halving_;
-  std::vector<std::uint32_t> rows_[2];
-  int indices_[2] = {-1, -1};
+  std::unique_ptr<LevelRows> finer_;      // null: level 0, which is the source
+  std::unique_ptr<MipmapFilter> filter_;  // from `finer_`
+  std::vector<std::uint32_t> rows_[2];    // the last even and the last odd row
+  int indices_[2] = {-1, -1};             // of rows_
 };
 
-void fill_texture(const mjModel* model, int id, StoredTexture& out) {
+// Sets the offsets of the stored levels, and allocates their texels.
+void allocate_levels(StoredTexture& out) {
   Texture& texture = out.texture;
-  const int faces = num_images(texture);
   std::size_t total = 0;
-  for (int n = texture.finest; n < texture.levels; ++n) {
-    texture.offset[n] = static_cast<int>(total);
-    total += faces * static_cast<std::size_t>(texture.width[n] + 1) *
-             static_cast<std::size_t>(texture.height[n]);
+  for (int level = texture.finest; level < texture.levels; ++level) {
+    texture.offset[level] = static_cast<int>(total);
+    total += num_images(texture) * static_cast<std::size_t>(texture.width[level] + 1) *
+             static_cast<std::size_t>(texture.height[level]);
   }
   out.texels = std::make_unique_for_overwrite<std::uint32_t[]>(total);
   texture.texels = out.texels.get();
-  for (int f = 0; f < faces; ++f) {
-    const SourceRows source(model, id, texture, f);
-    LevelRows first(source, texture, texture.finest);
-    std::uint32_t* finer = nullptr;  // the level before
-    for (int n = texture.finest; n < texture.levels; ++n) {
-      const int width = static_cast<int>(texture.width[n]),
-                height = static_cast<int>(texture.height[n]);
-      const std::size_t stride = width + 1;
-      std::uint32_t* level = out.texels.get() + texture.offset[n] + f * stride * height;
-      std::unique_ptr<Halving> halving;
-      if (finer) halving = std::make_unique<Halving>(texture, n - 1);
-      const auto finer_row = [&](int y) {
-        return finer + y * static_cast<std::size_t>(texture.width[n - 1] + 1);
-      };
-      for (int y = 0; y < height; ++y) {
-        std::uint32_t* row = level + y * stride;
-        if (finer) {
-          halving->compute(y, finer_row, row);
-        } else {
-          first.compute(y, row);
-        }
-        row[width] = row[texture.cube ? width - 1 : 0];
+}
+
+// Fills the stored levels of one image: the finest from the source, each other from the one before.
+void fill_levels(const SourceRows& source, int image, StoredTexture& out) {
+  const Texture& texture = out.texture;
+  LevelRows finest(source, texture, texture.finest);
+  const std::uint32_t* finer = nullptr;  // texels of the level before; null for the finest
+  std::size_t finer_stride = 0;          // texels from one of its rows to the next
+  for (int n = texture.finest; n < texture.levels; ++n) {
+    const int width = static_cast<int>(texture.width[n]),
+              height = static_cast<int>(texture.height[n]);
+    const std::size_t stride = width + 1;
+    std::uint32_t* level = out.texels.get() + texture.offset[n] + image * stride * height;
+    std::unique_ptr<MipmapFilter> filter;
+    if (finer) filter = std::make_unique<MipmapFilter>(texture, n - 1);
+    for (int y = 0; y < height; ++y) {
+      std::uint32_t* row = level + y * stride;
+      if (finer) {
+        filter->compute(
+            y, [&](int i) { return finer + i * finer_stride; }, row);
+      } else {
+        finest.compute(y, row);
       }
-      finer = level;
+      row[width] = row[texture.cube ? width - 1 : 0];
     }
+    finer = level;
+    finer_stride = stride;
   }
 }
 
@@ -289,7 +299,9 @@ std::shared_ptr<const StoredTexture> stored_texture(const mjModel* m, int id, in
                              .add(std::span(m->tex_data + m->tex_adr[id], bytes));
   return all.get(key, [&] {
     made->texture.finest = finest;
-    fill_texture(m, id, *made);
+    allocate_levels(*made);
+    for (int image = 0; image < num_images(made->texture); ++image)
+      fill_levels(SourceRows(m, id, made->texture, image), image, *made);
     return made;
   });
 }

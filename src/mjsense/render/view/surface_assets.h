@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Appearance data that all cameras and worlds share, prepared once per model: textures with their
-// mip levels, and the normals and texture coordinates of mesh faces as MuJoCo's classic renderer
+// mipmaps, and the normals and texture coordinates of mesh faces as MuJoCo's classic renderer
 // uses them.
 
 #include <mujoco/mujoco.h>

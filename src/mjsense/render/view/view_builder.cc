@@ -30,14 +30,14 @@ void rotate_back(const double r[9], const double v[3], double out[3]) {
 // Sets the fields of shapes that are defined by their sizes alone.
 void set_primitive(int type, int object, int object_id, ViewGeom& g) {
   g.type = type;
-  g.behind = type == mjGEOM_PLANE && g.eye[2] < 0;
-  g.object = object;
+  g.shows_back = type == mjGEOM_PLANE && g.eye[2] < 0;
+  g.object_type = object;
   g.object_id = object_id;
   g.bvh = nullptr;
   g.clusters = nullptr;
   g.horizons = nullptr;
   g.mesh = nullptr;
-  g.on_demand = nullptr;
+  g.mesh_on_demand = nullptr;
   g.height_field = nullptr;
   g.deforms = false;
 }
@@ -77,7 +77,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   candidates_.resize((static_cast<std::size_t>(model->ngeom + model->nflex) + 63) / 64);
   if (options.layered) {
     view_.layered = true;
-    index_of_id_.resize(unsorted_.size());
+    geom_index_.resize(unsorted_.size());
     for (int i = 0; i < model->ngeom; ++i)
       fixed_.push_back(is_fixed_body(model, model->geom_bodyid[i]));
   }
@@ -105,10 +105,10 @@ void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rg
   const bool sight = find_window(view_, g) && rgba[3] > 0;
   if (!sight && !view_.shadows) return;
   set_surface(source, rgba, material, texture, g);
-  Order order{sight ? g.transparent : 2, g.nearest, index};
+  Order order{sight ? g.transparent : 2, g.min_depth, index};
   if (order.rank == 1) {
     const float* p = g.pos;
-    const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
+    const bool soft = g.object_type == mjOBJ_FLEX || g.object_type == mjOBJ_SKIN;
     const float reach = soft ? 0 : g.radius;  // as in MuJoCo
     order.key =
         g.type == mjGEOM_PLANE ? 1e10f : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
@@ -125,13 +125,13 @@ void ViewBuilder::sort_geoms(const double rotation[9]) {
   view_.num_opaque = view_.num_transparent = 0;
   for (std::size_t i = 0; i < order_.size(); ++i) {
     const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
-    if (view_.layered) index_of_id_[g.id] = static_cast<int>(i);
+    if (view_.layered) geom_index_[g.id] = static_cast<int>(i);
     view_.num_opaque += order_[i].rank == 0;
     view_.num_transparent += order_[i].rank == 1;
   }
   view_.geoms = sorted_.data();
-  view_.index_of_id = index_of_id_.data();
-  view_.fixed = nullptr;
+  view_.geom_index = geom_index_.data();
+  view_.fixed_tiles = nullptr;
   view_.num_geoms = static_cast<int>(order_.size());
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
 }
@@ -228,7 +228,7 @@ bool ViewBuilder::ends_mirror_search(const rays::RayGeom& g, int id, float alpha
   for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
   mirrored_->tint_ = reflectance;
   view_.reflection = &build(p, r);
-  view_.mirror = id;
+  view_.mirror_id = id;
   return true;
 }
 
@@ -240,7 +240,7 @@ ViewBuilder::ViewBuilder(std::size_t geoms, std::size_t lights)
 const View& ViewBuilder::build(const DrawnScene& scene, const double position[3],
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
-  view_.backs = true;
+  view_.shows_plane_backs = true;
   projected_ = scene.projected_textures;
   sized_soft_ = scene.sized_soft_textures;
   view_.near = scene.near;
@@ -256,14 +256,14 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
       endless = &shape;
     if (id++ == excluded_geom_) continue;
     add_shape(shape, id - 1, geom.rgba, &geom.material, position, rotation, [&](ViewGeom& g) {
-      set_primitive(shape.type, geom.object, geom.object_id, g);
-      if (geom.bvh || geom.on_demand) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
-      g.casts = geom.casts;
+      set_primitive(shape.type, geom.object_type, geom.object_id, g);
+      if (geom.bvh || geom.mesh_on_demand) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
+      g.casts_shadows = geom.casts_shadows;
       g.bvh = geom.bvh;
       g.clusters = geom.clusters;
       g.horizons = geom.horizons;
       g.mesh = geom.mesh;
-      g.on_demand = geom.on_demand;
+      g.mesh_on_demand = geom.mesh_on_demand;
       g.height_field = geom.height_field;
       g.deforms = geom.bvh && !geom.height_field;  // a flex, a skin or a decoration
       return geom.texture;
@@ -279,18 +279,19 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     place_light(from, to, position, rotation, view_.lights[i]);
     for (int axis = 0; axis < 2; ++axis) {
       double in_camera[3];
-      const double in_world[3] = {scene.lights[i].square[axis][0], scene.lights[i].square[axis][1],
-                                  scene.lights[i].square[axis][2]};
+      const double in_world[3] = {scene.lights[i].shadow_map_axes[axis][0],
+                                  scene.lights[i].shadow_map_axes[axis][1],
+                                  scene.lights[i].shadow_map_axes[axis][2]};
       rotate_back(rotation, in_world, in_camera);
-      std::copy_n(in_camera, 3, view_.lights[i].square[axis]);
+      std::copy_n(in_camera, 3, view_.lights[i].shadow_map_axes[axis]);
     }
   }
   if (view_.shadows) light_space_.fill(view_);
   view_.sky_distance = 0;
-  view_.sky_radius = scene.sky.distance;
+  view_.sky_fog_radius = scene.sky.distance;
   view_.fog = scene.fog;
   if (view_.skybox) set_sky(scene.haze ? endless : nullptr, scene.sky, position, rotation);
-  view_.mirror = -1;
+  view_.mirror_id = -1;
   view_.reflection = nullptr;
   if (!scene.reflections) return view_;
   if (!mirrored_) mirrored_ = std::make_unique<ViewBuilder>(unsorted_.size(), 0);
@@ -311,7 +312,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
 void ViewBuilder::set_mirror(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
                              const Appearance& appearance, std::span<const Marker> markers,
                              const double position[3], const double rotation[9]) {
-  view_.mirror = -1;
+  view_.mirror_id = -1;
   view_.reflection = nullptr;
   // Returns true if the search is over. As in MuJoCo, there is at most one mirror.
   const auto settles = [&](const rays::RayGeom& g, int id, float alpha, float reflectance) {
@@ -344,8 +345,8 @@ void ViewBuilder::place(const rays::RayGeom& source, const double position[3],
     g.pos[i] = static_cast<float>(p[i]);
     g.eye[i] = static_cast<float>(-eye[i]);
     g.size[i] = source.size[i];
-    g.box[i] = source.center[i];
-    g.box[3 + i] = source.half[i];
+    g.aabb[i] = source.center[i];
+    g.aabb[3 + i] = source.half[i];
     for (int j = 0; j < 3; ++j)
       g.rot[3 * i + j] =
           static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
@@ -369,19 +370,19 @@ void ViewBuilder::set_shape(const rays::RayWorld& world, const rays::SharedGeome
   } else if (g.type == rays::kFlexType) {
     const int part = g.id - world.num_geoms();
     const rays::FlexShapes::Part& shape = world.flexes()->parts()[part];
-    g.object = mjOBJ_FLEX;
+    g.object_type = mjOBJ_FLEX;
     g.bvh = shape.scene;
     g.mesh =
         soft_surface(part, *assets_->flex_part(part), shape.normals, shape.positions, shape.faces);
   } else if (g.type == rays::kSkinType) {
     const int id = source.data;
-    g.object = mjOBJ_SKIN;
+    g.object_type = mjOBJ_SKIN;
     g.bvh = world.skins()->scene(id);
     const rays::SkinShapes& skins = *world.skins();
     g.mesh = soft_surface(assets_->num_flex_parts() + id, *assets_->skin(id), skins.normals(id),
                           skins.positions(id).data(), skins.faces(id));
   }
-  if (g.object != mjOBJ_GEOM) {
+  if (g.object_type != mjOBJ_GEOM) {
     g.object_id = source.data;
     g.type = mjGEOM_MESH;
     g.deforms = true;
@@ -403,8 +404,8 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   s = {};
   std::copy_n(rgba, 4, s.rgba);
   for (int i = 0; i < 3; ++i) s.rgba[i] *= tint_;
-  if (g.behind) s.rgba[3] *= kFromBehind;
-  g.transparent = s.rgba[3] < kOpaque || g.behind;
+  if (g.shows_back) s.rgba[3] *= kFromBehind;
+  g.transparent = s.rgba[3] < kOpaque || g.shows_back;
   s.specular = 0.5f;
   s.exponent = 128.0f * (material ? material->shininess : 0.5f);
   s.highlight_threshold = highlight_threshold_of(s.exponent);
@@ -415,30 +416,30 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   s.texture = texture && texture->levels > 0 ? texture : nullptr;
   if (!s.texture) return;
   const bool uniform = material->uniform;
-  const bool coordinates = g.on_demand ? g.on_demand->has_coordinates() : g.mesh && g.mesh->uvs;
-  s.mapped = coordinates && !s.texture->cube;
+  const bool coordinates = g.mesh_on_demand ? g.mesh_on_demand->has_uvs() : g.mesh && g.mesh->uvs;
+  s.uses_mesh_uvs = coordinates && !s.texture->cube;
   // MuJoCo textures flexes by their own coordinates only.
-  if (g.object == mjOBJ_FLEX && !s.mapped) {
+  if (g.object_type == mjOBJ_FLEX && !s.uses_mesh_uvs) {
     s.texture = nullptr;
     return;
   }
-  const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
+  const bool soft = g.object_type == mjOBJ_FLEX || g.object_type == mjOBJ_SKIN;
   const std::array<float, 3> extent =
       soft && !sized_soft_ ? std::array<float, 3>{} : drawn_extent(g);
-  s.from_above = (g.mesh && !s.mapped) || g.height_field || (projected_ && !g.mesh);
+  s.projected_along_z = (g.mesh && !s.uses_mesh_uvs) || g.height_field || (projected_ && !g.mesh);
   const bool endless = g.type == mjGEOM_PLANE && (g.size[0] <= 0 || g.size[1] <= 0);
   for (int i = 0; i < 2; ++i) {
-    s.repeat[i] = material->repeat[i];
-    if (s.repeat[i] <= 0 && !s.from_above) s.repeat[i] = 1;
-    if (uniform && extent[i] > 0) s.repeat[i] *= extent[i];
-    if (projected_ && s.mapped) s.repeat[i] = 1;
-    if (s.from_above || endless) s.shift[i] = -0.5f;
-    if (s.from_above && g.object == mjOBJ_SKIN) {
+    s.uv_scale[i] = material->repeat[i];
+    if (s.uv_scale[i] <= 0 && !s.projected_along_z) s.uv_scale[i] = 1;
+    if (uniform && extent[i] > 0) s.uv_scale[i] *= extent[i];
+    if (projected_ && s.uses_mesh_uvs) s.uv_scale[i] = 1;
+    if (s.projected_along_z || endless) s.uv_offset[i] = -0.5f;
+    if (s.projected_along_z && g.object_type == mjOBJ_SKIN) {
       if (!sized_soft_) {
-        s.repeat[i] = s.shift[i] = 0;
+        s.uv_scale[i] = s.uv_offset[i] = 0;
       } else {  // the texture stays fixed in the world; kernels divide by the size
-        s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
-        if (g.size[i] > 0) s.repeat[i] *= g.size[i];
+        s.uv_offset[i] += (i ? -0.5f : 0.5f) * s.uv_scale[i] * static_cast<float>(source.pos[i]);
+        if (g.size[i] > 0) s.uv_scale[i] *= g.size[i];
       }
     }
   }
@@ -447,16 +448,16 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
   for (int i = 0; i < 3; ++i) {
     if (in_meters) {
-      s.stretch[i] = uniform && !soft ? extent[i] : 1.0f;
+      s.cube_scale[i] = uniform && !soft ? extent[i] : 1.0f;
     } else {
-      s.stretch[i] = uniform || extent[i] <= 0 ? 1.0f : 1.0f / extent[i];
+      s.cube_scale[i] = uniform || extent[i] <= 0 ? 1.0f : 1.0f / extent[i];
     }
   }
 }
 
 // The sky's cylinder and the haze are at least (1 - width) times the cylinder's radius away; the
 // longest rays go through the image's corners.
-float ViewBuilder::sky_from(const Sky& sky) const {
+float ViewBuilder::sky_min_depth(const Sky& sky) const {
   const PixelGrid& grid = view_.grid;
   if (grid.distorted_rays) return 0;
   const float x = std::max(std::abs(grid.left), std::abs(grid.left + grid.dx * grid.width));
@@ -469,8 +470,8 @@ float ViewBuilder::sky_from(const Sky& sky) const {
 void ViewBuilder::set_sky(const rays::RayGeom* plane, const Sky& sky, const double position[3],
                           const double rotation[9]) {
   view_.sky_distance = view_.grid.orthographic ? 0 : sky.distance;
-  view_.sky_from = sky_from(sky);
-  View::Haze& haze = view_.haze;
+  view_.sky_min_depth = sky_min_depth(sky);
+  Haze& haze = view_.haze;
   haze.height = 0;
   if (!plane) return;
   const double normal[3] = {plane->mat[2], plane->mat[5], plane->mat[8]};

@@ -40,11 +40,11 @@ struct DrawnGeom {
   rays::RayGeom shape;  // `center` and `half` are set
   float rgba[4];
   Material material;
-  const Texture* texture;   // null: none
-  int object_id, object;    // for segmentation
-  bool casts;               // casts shadows
-  const MeshSurface* mesh;  // null unless the shape has triangles
-  MeshOnDemand* on_demand;  // as in ViewGeom
+  const Texture* texture;      // null: none
+  int object_id, object_type;  // for segmentation
+  bool casts_shadows;
+  const MeshSurface* mesh;       // null unless the shape has triangles
+  MeshOnDemand* mesh_on_demand;  // as in ViewGeom
   void* bvh;
   const rays::Clusters* clusters;
   const rays::Horizons* horizons;
@@ -69,7 +69,7 @@ struct DrawnScene {
   bool sized_soft_textures;
 };
 
-// Computes Surface::dull: the value below which the kernels' power() returns 0, with a margin for
+// Computes Surface::highlight_threshold: the value below which the kernels' power() returns 0, with a margin for
 // rounding. power() returns 0 for x below 0.3 if the exponent is at least 4, and where x^exponent
 // is below e^-32.3.
 float highlight_threshold_of(float exponent);
@@ -90,7 +90,9 @@ class ViewBuilder {
                     const PixelGrid& grid);
 
   const View& view() const { return view_; }
-  void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // tiles of the last view built
+  void use_fixed(const FixedTile* tiles) {
+    view_.fixed_tiles = tiles;
+  }  // tiles of the last view built
   // Without markers.
   static std::size_t max_geoms(const mjModel* model) {
     return static_cast<std::size_t>(model->ngeom + model->nskin) + rays::flex_parts(model).size();
@@ -125,7 +127,7 @@ class ViewBuilder {
   void set_mirror(const rays::RayWorld& world, const rays::SharedGeometry& shapes,
                   const Appearance& appearance, std::span<const Marker> markers,
                   const double position[3], const double rotation[9]);
-  float sky_from(const Sky& sky) const;
+  float sky_min_depth(const Sky& sky) const;
   void set_sky(const rays::RayGeom* plane, const Sky& sky, const double position[3],
                const double rotation[9]);
   void set_lights(const rays::RayWorld& world, const Appearance& appearance,
@@ -141,7 +143,7 @@ class ViewBuilder {
   std::vector<std::uint64_t> candidates_;  // bit per object that may be visible
   LightSpace light_space_;
   std::vector<std::uint8_t> fixed_;  // per geom; empty if not layered
-  std::vector<int> index_of_id_;
+  std::vector<int> geom_index_;
   // By flex part, then by skin, with the world's normals.
   std::vector<MeshSurface> soft_surfaces_;
   bool projected_ = false;                 // DrawnScene::projected_textures

@@ -79,12 +79,44 @@ bool CameraSensor::wants(std::string_view type) const {
 }
 
 void CameraSensor::initialize(const SensorInit& init) {
-  const std::string context = fmt::format("camera '{}'", name());
   model_ = init.model;
+  find_camera();
+  set_clip_planes();
+  assets_ =
+      surface_assets_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
+  clear_fields();
+  declare_fields(init.num_worlds);
+  worlds_.assign(init.num_worlds, PerWorld{{},
+                                           render::Appearance(model_, cfg_.max_lights),
+                                           render::Markers(model_, marker_options(cfg_))});
+  due_.reserve(init.num_worlds);
+  prepare_grids(init);
+  owners_.reset();
+  if (bodies_ || entities_) owners_ = std::make_unique<PixelOwners>(init, cfg_.width, cfg_.height);
+  clean_.clear();
+  if (cfg_.depth_noise != DepthNoise::kNone)
+    clean_.assign(init.threads,
+                  std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
+  gl_.reset();
+  workspace_.reset();
+  if (cfg_.renderer == CameraRenderer::kOpenGl) {
+    gl_ = make_gl_renderer(init.num_worlds);
+  } else {
+    prepare_layers(init.num_worlds);
+    allocate_workspace(init);
+  }
+}
+
+std::string CameraSensor::context() const { return fmt::format("camera '{}'", name()); }
+
+void CameraSensor::find_camera() {
   const std::string& camera = cfg_.camera_name.empty() ? name() : cfg_.camera_name;
   camera_ = mj_name2id(model_, mjOBJ_CAMERA, camera.c_str());
   if (camera_ < 0)
-    throw_unknown(context, "camera", camera, scene::model_names(model_, mjOBJ_CAMERA));
+    throw_unknown(context(), "camera", camera, scene::model_names(model_, mjOBJ_CAMERA));
+}
+
+void CameraSensor::set_clip_planes() {
   const auto plane = [&](ClipPlane clip, double at, double of_model) {
     return clip == ClipPlane::kModel ? of_model * model_->stat.extent : at;
   };
@@ -94,17 +126,11 @@ void CameraSensor::initialize(const SensorInit& init) {
     throw ValueError(
         fmt::format("{}: clips at near {:.6g} m and far {:.6g} m ('model': znear and zfar times "
                     "the extent {:.6g} m): need near < far",
-                    context, near_, far_, model_->stat.extent));
-  assets_ =
-      surface_assets_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
-  workspace_.reset();
-  clear_fields();
-  declare_fields(init.num_worlds);
-  worlds_.assign(init.num_worlds, PerWorld{{},
-                                           render::Appearance(model_, cfg_.max_lights),
-                                           render::Markers(model_, marker_options(cfg_))});
-  due_.reserve(init.num_worlds);
+                    context(), near_, far_, model_->stat.extent));
+}
 
+// Sets the worlds' pixel rays, with the lens distortion, and what computes optical flow from them.
+void CameraSensor::prepare_grids(const SensorInit& init) {
   render::PixelGrid grid = grid_in(model_);
   check_grid(grid);
   std::optional<LensModel> lens;
@@ -112,7 +138,8 @@ void CameraSensor::initialize(const SensorInit& init) {
     lens = {cfg_.distortion.model == LensKind::kFisheye ? render::Lens::kFisheye
                                                         : render::Lens::kBrownConrady,
             cfg_.distortion.coefficients};
-    distorted_rays_ = render::distorted_rays(grid, lens->lens, lens->coefficients, context.c_str());
+    distorted_rays_ =
+        render::distorted_rays(grid, lens->lens, lens->coefficients, context().c_str());
     grid.distorted_rays = distorted_rays_.data();
   }
   for (PerWorld& w : worlds_) w.grid = grid;
@@ -120,54 +147,56 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (wants("flow"))
     optical_flow_ = std::make_unique<OpticalFlow>(model_, camera_, lens, cfg_.update_period > 0,
                                                   grid, init.num_worlds, init.threads);
-  owners_.reset();
-  if (bodies_ || entities_) owners_ = std::make_unique<PixelOwners>(init, cfg_.width, cfg_.height);
+}
 
-  clean_.clear();
-  if (cfg_.depth_noise != DepthNoise::kNone)
-    clean_.assign(init.threads,
-                  std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
-  const std::size_t markers = worlds_.empty() ? 0 : worlds_[0].markers.capacity();
-  gl_.reset();
-  if (cfg_.renderer == CameraRenderer::kOpenGl) {
-    render::GlRendererCfg gl;
-    gl.num_worlds = init.num_worlds;
-    gl.camera = camera_;
-    gl.width = cfg_.width;
-    gl.height = cfg_.height;
-    gl.groups = bits_of(cfg_.enabled_geom_groups);
-    gl.textures = cfg_.use_textures;
-    gl.shadows = cfg_.use_shadows;
-    gl.samples = cfg_.samples;
-    gl.max_lights = cfg_.max_lights;
-    gl.markers = markers;
-    if (!cfg_.camera_name.empty()) {
-      gl.fovy = cfg_.fovy;
-      gl.orthographic = cfg_.orthographic;
-    }
-    gl_ = render::make_gl_renderer(model_, gl, context);
-    return;
+std::unique_ptr<render::GlRenderer> CameraSensor::make_gl_renderer(int num_worlds) const {
+  render::GlRendererCfg gl;
+  gl.num_worlds = num_worlds;
+  gl.camera = camera_;
+  gl.width = cfg_.width;
+  gl.height = cfg_.height;
+  gl.groups = bits_of(cfg_.enabled_geom_groups);
+  gl.textures = cfg_.use_textures;
+  gl.shadows = cfg_.use_shadows;
+  gl.samples = cfg_.samples;
+  gl.max_lights = cfg_.max_lights;
+  gl.markers = max_markers();
+  if (!cfg_.camera_name.empty()) {
+    gl.fovy = cfg_.fovy;
+    gl.orthographic = cfg_.orthographic;
   }
-  // Allocates all that cast() needs, except the shapes of the ray scene and the last views.
+  return render::make_gl_renderer(model_, gl, context());
+}
+
+// Prepares the parts of images that are kept for later ones, where the camera cannot move.
+void CameraSensor::prepare_layers(int num_worlds) {
+  const bool fixed = render::FixedLayer::possible(model_, camera_);
+  changed_tiles_.clear();
+  // The other fields follow from images that are not stored.
+  if (fixed && !optical_flow_ && !owners_ && clean_.empty()) changed_tiles_.resize(num_worlds);
+  fixed_layers_.reset();
+  if (rgb_ && cfg_.samples == 1 && fixed)
+    fixed_layers_ =
+        std::make_unique<render::FixedLayers>(model_, cfg_.width, cfg_.height, num_worlds);
+}
+
+// Allocates all that cast() needs, except the shapes of the ray scene and the last views.
+void CameraSensor::allocate_workspace(const SensorInit& init) {
   const int slots =
       std::max(init.threads, std::min(init.num_worlds, kImagesPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
   workspace_->making.resize(slots);
-  const bool fixed = render::FixedLayer::possible(model_, camera_);
-  changed_tiles_.clear();
-  // The other fields follow from images that are not stored.
-  if (fixed && !optical_flow_ && !owners_ && clean_.empty()) changed_tiles_.resize(init.num_worlds);
-  fixed_layers_.reset();
-  if (rgb_ && cfg_.samples == 1 && fixed)
-    fixed_layers_ =
-        std::make_unique<render::FixedLayers>(model_, cfg_.width, cfg_.height, init.num_worlds);
   render::ViewOptions options = view_options(cfg_, near_, far_);
-  options.markers = markers;
+  options.markers = max_markers();
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
-  const int geoms = static_cast<int>(render::ViewBuilder::max_geoms(model_) + markers);
+  const int geoms = static_cast<int>(render::ViewBuilder::max_geoms(model_) + options.markers);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
+}
+
+std::size_t CameraSensor::max_markers() const {
+  return worlds_.empty() ? 0 : worlds_[0].markers.capacity();
 }
 
 // The camera of the world's `model`, with this configuration's changes, which do not affect other
@@ -188,13 +217,13 @@ render::PixelGrid CameraSensor::grid_in(const mjModel* model) const {
 
 // Checks that need the camera of the model, in addition to validate().
 void CameraSensor::check_grid(const render::PixelGrid& grid) const {
-  const std::string context = fmt::format("camera '{}'", name());
   const bool orthographic = model_->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
-  if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, context);
+  if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, context());
   if (orthographic && (cfg_.intrinsics || cfg_.distortion.model != LensKind::kNone))
-    throw ValueError(context + ": an orthographic camera has no intrinsics and no lens distortion");
+    throw ValueError(context() +
+                     ": an orthographic camera has no intrinsics and no lens distortion");
   if (orthographic && cfg_.depth_noise != DepthNoise::kNone)
-    throw ValueError(context +
+    throw ValueError(context() +
                      ": depth_noise applies only to the planar depth of a perspective camera");
 }
 
@@ -280,7 +309,7 @@ render::ImageTargets CameraSensor::targets(int world, int thread) {
   if (segmentation_) t.segmentation = segmentation_->data.row<std::int32_t>(world).data();
   if (normals_) t.normals = normals_->data.row<float>(world).data();
   if (points_) t.points = points_->data.row<float>(world).data();
-  t.ray_depth = cfg_.depth_kind == DepthKind::kRay;
+  t.depth_along_ray = cfg_.depth_kind == DepthKind::kRay;
   t.samples = cfg_.samples;
   if (optical_flow_) optical_flow_->complete(t, thread);
   if (owners_) owners_->complete(t, thread);
@@ -301,7 +330,7 @@ const render::View& CameraSensor::build_view(const rays::RayScene& rays, int wor
 void CameraSensor::make_fixed(const render::View& view, render::FixedTile* tiles, int first,
                               int last, int thread) {
   render::ImageTargets targets;
-  targets.fixed = tiles;
+  targets.fixed_tiles = tiles;
   workspace_->render(view, targets, first, last, workspace_->memory[thread].scratch());
 }
 
@@ -315,7 +344,7 @@ void CameraSensor::settle_common_layer(const CastContext& context, int tile_rows
 }
 
 render::FixedTile* CameraSensor::settle_layer(int world, const render::View& view) {
-  return fixed_layers_ && !view.fixed ? fixed_layers_->settle(world, view) : nullptr;
+  return fixed_layers_ && !view.fixed_tiles ? fixed_layers_->settle(world, view) : nullptr;
 }
 
 void CameraSensor::cast(const CastContext& context) {
@@ -340,8 +369,8 @@ void CameraSensor::render_rows(const render::View& view, int world, int first, i
                                int thread) {
   render::ImageTargets image = targets(world, thread);
   if (render::ChangedTiles* tiles = changed_tiles(world)) {
-    image.changed = tiles->changed();
-    image.lit = tiles->lit();
+    image.changed_tiles = tiles->changed();
+    image.receivers = tiles->receivers();
   }
   workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
   derive(world, image, first * render::kTileSize, std::min(last * render::kTileSize, cfg_.height));

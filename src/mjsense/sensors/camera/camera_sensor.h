@@ -3,6 +3,7 @@
 // The sensor that CameraSensorCfg builds.
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "mjsense/core/rng.h"
@@ -55,7 +56,16 @@ class CameraSensor final : public Sensor {
     bool due = false;
     Rng rng{0, 0, 0, 0};  // at the time of the image
   };
+  std::string context() const;  // for errors: "camera 'NAME'"
   bool wants(std::string_view type) const;
+  // The parts of initialize(), in order.
+  void find_camera();
+  void set_clip_planes();
+  void prepare_grids(const SensorInit& init);
+  std::unique_ptr<render::GlRenderer> make_gl_renderer(int num_worlds) const;
+  void prepare_layers(int num_worlds);
+  void allocate_workspace(const SensorInit& init);
+  std::size_t max_markers() const;  // of a world
   void declare_fields(int num_worlds);
   void render_due(const CastContext& context);
   void add_noise(const CastContext& context);

@@ -35,6 +35,7 @@
 
 #include "mjsense/core/fields/named_enum.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/sensors/camera/image_cfg.h"
 
 namespace mjsense::sensors {
 
@@ -123,7 +124,7 @@ inline constexpr std::array<std::string_view, 8> kCameraDataTypes{
     "rgb",     "depth",       "segmentation", "body_segmentation", "entity_segmentation",
     "normals", "point_cloud", "flow"};
 
-struct CameraSensorCfg : SensorCfg {
+struct CameraSensorCfg : SensorCfg, RgbCfg {
   std::string camera_name;
   std::string parent_body;
   std::array<double, 3> pos{0, 0, 1};
@@ -133,7 +134,6 @@ struct CameraSensorCfg : SensorCfg {
   std::vector<std::string> data_types{"rgb"};
   bool use_textures = true;
   bool use_shadows = false;
-  int shadow_samples = 1;
   std::vector<int> enabled_geom_groups{0, 1, 2};
   bool orthographic = false;
   bool clone_data = false;  // used by the Python package
@@ -144,7 +144,6 @@ struct CameraSensorCfg : SensorCfg {
   double near = 0, far = 0;
   NamedEnum<ClipPlane> clip_near, clip_far;
   double update_period = 0, phase = 0;
-  int samples = 1;
   NamedEnum<DepthKind> depth_kind;
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
@@ -186,11 +185,6 @@ void visit_fields(V& v, CameraSensorCfg& c) {
   v("data_types", c.data_types, "The image types to compute.").one_of(kCameraDataTypes).not_empty();
   v("use_textures", c.use_textures, "Draw the textures of materials and the skybox.");
   v("use_shadows", c.use_shadows, "Draw the shadows of lights that cast shadows.");
-  v("shadow_samples", c.shadow_samples,
-    "Soft shadows: number of points of a light with a position at which its shadows are computed, "
-    "within the ball of the model's ``light_bulbradius``. 1: hard shadows. A view has at most 32 "
-    "lights and points.")
-      .within(1, 16);
   v("enabled_geom_groups", c.enabled_geom_groups, "Geom groups (0 to 5) that are visible.")
       .within(0, 5)
       .not_empty();
@@ -228,7 +222,7 @@ void visit_fields(V& v, CameraSensorCfg& c) {
     "reset.")
       .unit("s")
       .within(0, 1e6);
-  v("samples", c.samples, "Rays per pixel of rgb; more samples give smoother edges.").within(1, 64);
+  v.include(static_cast<RgbCfg&>(c));
   v("depth_kind", c.depth_kind,
     "planar: distance to the camera plane; ray: distance along the pixel's ray.");
   v("intrinsics", c.intrinsics,

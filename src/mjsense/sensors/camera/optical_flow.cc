@@ -150,7 +150,7 @@ void OpticalFlow::write(int world, const render::ImageTargets& image, int first,
                         float* flow) const {
   const PerWorld& w = worlds_[world];
   const render::PixelGrid& grid = w.now.grid;
-  const bool pinhole = !grid.distorted_rays && !image.ray_depth && !grid.orthographic;
+  const bool pinhole = !grid.distorted_rays && !image.depth_along_ray && !grid.orthographic;
   for (int y = first; y < last; ++y) {
     const std::size_t row = static_cast<std::size_t>(y) * grid.width;
     const std::int32_t* ids = image.segmentation + 2 * row;
@@ -165,7 +165,7 @@ void OpticalFlow::write(int world, const render::ImageTargets& image, int first,
       } else if (pinhole) {
         follow_pinhole(w, *move, y, x, end, image.depth + row, out);
       } else {
-        follow(w, *move, y, x, end, image.depth + row, image.ray_depth, out);
+        follow(w, *move, y, x, end, image.depth + row, image.depth_along_ray, out);
       }
     }
   }

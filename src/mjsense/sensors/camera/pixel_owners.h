@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mjsense/core/sensor.h"
-#include "mjsense/render/view/view.h"
+#include "mjsense/render/view/image_targets.h"
 
 namespace mjsense::sensors {
 
