@@ -7,8 +7,8 @@
     mujoco_warp.step(model, data)
 
 ``step``, ``forward``, ``step1``, ``step2``, ``reset_data`` and ``rays`` then compute all worlds with MuJoCo and mjsense, on all cores, if the
-arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models with callbacks, they are
-mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
+arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models with callbacks or with
+``opt.run_collision_detection=False``, they are mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
 """
 
 from __future__ import annotations
@@ -281,7 +281,8 @@ def _array_fields(part: Any) -> list[str]:
 
 
 def _on_cpu(model: Any, data: Any) -> bool:
-    return data.qpos.device.is_cpu and not any(vars(model.callback).values())
+    own = any(vars(model.callback).values()) or not model.opt.run_collision_detection
+    return data.qpos.device.is_cpu and not own
 
 
 def _call(name: str) -> Callable[[Any, Any], None]:

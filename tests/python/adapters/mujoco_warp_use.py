@@ -181,7 +181,16 @@ called = start()
 called[0].callback.control = lambda model, data: data.ctrl.fill_(0.5)
 mjw.step(*called)
 assert (called[1].ctrl.numpy() == 0.5).all()
+called[0].callback.control, called[0].opt.run_collision_detection = None, False
+mjw.step(*called)
 assert id(called[1]) not in compat._worlds
+
+if not mujoco.__version__.startswith("4."):
+    soft = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2"
+        mass="1"/></worldbody></mujoco>""")
+    pair = mjw.put_model(soft), mjw.put_data(soft, mujoco.MjData(soft))
+    raises(ValueError, r"^mujoco_warp on the CPU: the model has flexes, which cannot be simulated from MuJoCo 3", lambda: mjw.step(*pair))
+    pair = None
 
 # Two simulations in two threads.
 pairs, alone = [start(), start()], start()
