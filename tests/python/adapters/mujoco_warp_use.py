@@ -189,7 +189,7 @@ if not mujoco.__version__.startswith("4."):
     soft = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2"
         mass="1"/></worldbody></mujoco>""")
     pair = mjw.put_model(soft), mjw.put_data(soft, mujoco.MjData(soft))
-    raises(ValueError, r"^mujoco_warp on the CPU: the model has flexes, which cannot be simulated from MuJoCo 3", lambda: mjw.step(*pair))
+    raises(ValueError, r"^mujoco_warp on the CPU: the model has flexes, which cannot be simulated from MuJoCo 3", lambda pair=pair: mjw.step(*pair))
     pair = None
 
 # Two simulations in two threads.
