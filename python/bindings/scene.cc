@@ -167,7 +167,9 @@ void bind_scene(nb::module_& m) {
   m.def(
       "check_options",
       [](const std::string& name, nb::dict options) {
-        const StructDecl& decl = *find_struct(name);
+        const StructDecl* found = find_struct(name);
+        if (!found) throw nb::key_error(name.c_str());
+        const StructDecl& decl = *found;
         const std::shared_ptr<void> object = decl.make();
         read_options(options, decl, object.get());
         check_fields(decl, object.get(), "");

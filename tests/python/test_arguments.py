@@ -315,5 +315,6 @@ def test_the_source_comes_before_the_output(tmp_path, monkeypatch):
     with pytest.raises(TypeError, match=r"Recorder\(\): simulation must be a Simulation.*, not 'data'"), pytest.warns(DeprecationWarning):
         mjs.Recorder("data", "data")
     monkeypatch.setattr(cluster_exporting, "module_of", lambda format: (_ for _ in ()).throw(ValueError(format)))
-    with pytest.warns(DeprecationWarning, match=r"^export_on_ray\(format, root, out\) is now"), pytest.raises(ValueError, match=r"^mcap$"):
-        cluster_exporting.export_on_ray("mcap", tmp_path, tmp_path / "out")
+    for given, named in [(("mcap", tmp_path, tmp_path / "out"), {}), (("mcap",), {"root": tmp_path, "out": tmp_path / "out"})]:
+        with pytest.warns(DeprecationWarning, match=r"^export_on_ray\(format, root, out\) is now"), pytest.raises(ValueError, match=r"^mcap$"):
+            cluster_exporting.export_on_ray(*given, **named)

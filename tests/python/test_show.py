@@ -34,8 +34,8 @@ def thumbnails(text):
         width, height = struct.unpack(">II", png[16:24])
         length = struct.unpack(">I", png[33:37])[0]
         pixels = np.frombuffer(zlib.decompress(png[41 : 41 + length]), np.uint8).reshape(height, 1 + 3 * width)
-        assert (pixels[:, 0] == 1).all()  # the filter "Sub"
-        pictures.append(np.cumsum(pixels[:, 1:].reshape(height, width, 3), axis=1, dtype=np.uint8))
+        assert pixels[0, 0] == 0 and (pixels[1:, 0] == 2).all()  # the filter "Up" below the first row
+        pictures.append(np.cumsum(pixels[:, 1:].reshape(height, width, 3), axis=0, dtype=np.uint8))
     return pictures
 
 

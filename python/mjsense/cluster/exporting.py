@@ -27,7 +27,7 @@ _CHUNK = 16  # episodes of one task
     "export_on_ray(format, root, out)",
     "export_on_ray(root, out, format=...)",
     ("format", "root", "out"),
-    lambda given: len(given) == 3,
+    lambda given, kwargs: "format" not in kwargs,
 )
 def export_on_ray(
     root: str | Path,

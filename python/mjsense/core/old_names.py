@@ -172,14 +172,16 @@ def old_argument(old: str, new: str) -> Callable[[T], T]:
     return decorate
 
 
-def old_order(old: str, new: str, names: tuple[str, ...], is_old: Callable[[tuple[Any, ...]], bool]) -> Callable[[T], T]:
+def old_order(
+    old: str, new: str, names: tuple[str, ...], is_old: Callable[[tuple[Any, ...], dict[str, Any]], bool]
+) -> Callable[[T], T]:
     """Decorates a function, or a class, whose positional arguments have another order now.
 
     Args:
         old: The call with the old order, ``"f(out, root)"``.
         new: The call with the new one.
         names: All positional arguments in the old order.
-        is_old: Whether given positional arguments, of which there is at least one, have the old order.
+        is_old: Whether given positional arguments, of which there is at least one, and keyword arguments have the old order.
     """
 
     def decorate(target: T) -> T:
@@ -193,7 +195,7 @@ def old_order(old: str, new: str, names: tuple[str, ...], is_old: Callable[[tupl
         @functools.wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:
             given = args[start:]
-            if given and is_old(given):
+            if 0 < len(given) <= len(names) and is_old(given, kwargs):
                 warnings.warn(f"{old} is now {new}", DeprecationWarning, stacklevel=2)
                 return function(*args[:start], **dict(zip(names, given)), **kwargs)
             return function(*args, **kwargs)

@@ -85,7 +85,9 @@ def _export_to(name: str) -> Callable[..., Path]:
         for option in format.options
     ]
     function.__name__ = function.__qualname__ = f"export_{name}"
-    function.__doc__ = f"Writes a recording as {format.about}. The arguments are those of :func:`mjsense.export`."
+    function.__doc__ = (
+        f"Writes a recording as {format.about}. The arguments are those of :func:`mjsense.export` and the format's options."
+    )
     function.__signature__ = inspect.Signature([*shared, *own], return_annotation="Path")  # pyright: ignore[reportFunctionMemberAccess]
     return checked(function)
 

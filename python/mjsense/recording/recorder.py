@@ -40,7 +40,7 @@ class WarpSimulation(Protocol):
     "Recorder(out, simulation, ...)",
     "Recorder(simulation, out, ...)",
     ("out", "simulation", "sensors"),
-    lambda given: isinstance(given[0], (str, Path)),
+    lambda given, _: isinstance(given[0], (str, Path)),
 )
 @checked
 class Recorder(KnownAttributes):
