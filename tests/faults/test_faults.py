@@ -81,5 +81,5 @@ def test_limits_on_the_size_of_files(lab):
 
 def test_generated_changes():
     # A process of its own, because the trials fork, which needs a process without threads.
-    done = subprocess.run([sys.executable, ROOT / "tests/faults/run.py", "--no-table", "generated=40"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, ROOT / "tests/faults/run.py", "--no-table", "generated=15"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
