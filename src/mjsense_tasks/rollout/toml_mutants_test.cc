@@ -131,8 +131,9 @@ TEST_P(RobotMutants, RemovedLinesNeitherCrashNorHang) {
   const DataFile file = kRobots.find(GetParam());
   const std::vector<std::string> lines = lines_of(file.text);
   ASSERT_EQ(used_robot(file.text, file.path, true), "");
+  const std::size_t stride = random_mutants() > 0 ? 1 : 3;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (!says_something(lines[i])) continue;
+    if (!says_something(lines[i]) || i % stride != 0) continue;
     EXPECT_EQ(used_robot(without(lines, i), file.path, random_mutants() > 0), "")
         << file.path << " without line " << i + 1 << ": " << lines[i];
   }
