@@ -301,6 +301,36 @@ def test_rays_hit_what_plain_mujoco_hits(call):
     assert 0 not in geoms
 
 
+@pytest.mark.parametrize("side", [9, 24])  # with one level of boxes, and with blocks of them
+def test_grids_of_rays_hit_what_plain_mujoco_hits(side):
+    """The rays of a grid have other origins each, as those of a height scanner."""
+    heights = np.random.default_rng(0).uniform(0.02, 0.2, (side, side))
+    boxes = "".join(
+        f'<geom type="box" size=".04 .04 {height}" pos="{0.1 * (x - side // 2)} {0.1 * (y - side // 2)} 0"/>'
+        for (x, y), height in np.ndenumerate(heights)
+    )
+    model = mujoco.MjModel.from_xml_string(f'<mujoco><worldbody>{boxes}<geom type="plane" size="0 0 1"/></worldbody></mujoco>')
+    worlds = _core.ForeignArrays(model._address, 1, 1)
+    worlds.run(FORWARD)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    grid = np.stack(np.meshgrid(np.linspace(-0.8, 0.8, 17), np.linspace(-0.5, 0.5, 11)), -1).reshape(-1, 2) + 0.013
+    origins = np.column_stack([grid, np.full(len(grid), 1.0)]).astype(np.float32)
+    directions = np.tile(np.float32([0, 0, -1]), (len(grid), 1))
+    exclude, geoms = np.full(len(grid), -1, np.int32), np.empty(len(grid), np.int32)
+    distances, normals = np.empty(len(grid), np.float32), np.empty((len(grid), 3), np.float32)
+    worlds.cast(
+        len(grid), [array.ctypes.data for array in (origins, directions, exclude, distances, geoms, normals)], 0x3F, bytes(model.ngeom)
+    )
+    found, expected = np.zeros(1, np.int32), []
+    for origin in origins:
+        distance = mujoco.mj_ray(model, data, origin, np.array([0, 0, -1.0]), None, 1, -1, found)
+        expected.append((int(found[0]), distance))
+    assert geoms.tolist() == [geom for geom, _ in expected]
+    np.testing.assert_allclose(distances, [distance for _, distance in expected], atol=2e-6)
+    assert len({*geoms.tolist()}) > 60
+
+
 def test_threads_take_turns_and_a_forked_process_is_refused():
     program, alone = Program(2), Program()
     for one in (program, alone):

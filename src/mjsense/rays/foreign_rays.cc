@@ -45,7 +45,9 @@ void ForeignRays::cast_packets(int world, int begin, int end, const ForeignRaysQ
   for (int p = begin; p < end; ++p) {
     RayPacket& packet = packets[p - begin];
     const std::size_t first = row + static_cast<std::size_t>(p) * kPacket;
-    std::copy_n(query.origins + 3 * first, 3, packet.origin);
+    // Packets that are culled together need the same origin.
+    std::copy_n(query.origins + 3 * (row + static_cast<std::size_t>(begin) * kPacket), 3,
+                packet.origin);
     for (int lane = 0; lane < kPacket; ++lane) {
       const bool there = p * kPacket + lane < query.count;
       const std::size_t ray = there ? first + lane : first;
