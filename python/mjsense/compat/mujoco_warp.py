@@ -174,7 +174,7 @@ class Worlds:
     def _link(self) -> None:
         """Tells the worlds where the arrays are."""
         data: Any = self._data()
-        self._arrays.clear()
+        self._arrays.clear(data.naconmax, data.njmax)
         self._others: list[tuple[str, np.ndarray, bytes]] = []
         self.shown, self.left = [], []
         parts = [("", "data", data), ("contact.", "contact", data.contact), ("efc.", "data", data.efc)]
