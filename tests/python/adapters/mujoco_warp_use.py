@@ -184,7 +184,7 @@ again[1].xpos = wp.zeros((WORLDS, 2 * MODEL.nbody), dtype=wp.vec3)[:, ::2]
 raises(ValueError, "xpos is not contiguous", lambda: mjw.step(*again))
 again[1].xpos = linked
 
-# What is changed between put_model() and the first step, in place, and with new arrays for each world, is used.
+# The worlds use what is changed between put_model() and the first step, in place, and with new arrays for each world.
 changed = copy.copy(MODEL)
 changed.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
 changed.opt.impratio, changed.opt.iterations = 4, 3
