@@ -473,6 +473,8 @@ def test_grids_of_rays_hit_what_plain_mujoco_hits(side):
     grid = np.stack(np.meshgrid(np.linspace(-0.8, 0.8, 17), np.linspace(-0.5, 0.5, 11)), -1).reshape(-1, 2) + 0.013
     origins = np.column_stack([grid, np.full(len(grid), 1.0)]).astype(np.float32)
     directions = np.tile(np.float32([0, 0, -1]), (len(grid), 1))
+    lost = [0, 40, 100]  # rays that are not finite hit nothing, and leave the others
+    origins[lost[:2], 1], directions[lost[2]] = np.nan, np.inf
     exclude, geoms = np.full(len(grid), -1, np.int32), np.empty(len(grid), np.int32)
     distances, normals = np.empty(len(grid), np.float32), np.empty((len(grid), 3), np.float32)
     worlds.cast(
@@ -482,6 +484,8 @@ def test_grids_of_rays_hit_what_plain_mujoco_hits(side):
     for origin in origins:
         distance = mujoco.mj_ray(model, data, origin, np.array([0, 0, -1.0]), None, 1, -1, found)
         expected.append((int(found[0]), distance))
+    for ray in lost:
+        expected[ray] = -1, -1
     assert geoms.tolist() == [geom for geom, _ in expected]
     np.testing.assert_allclose(distances, [distance for _, distance in expected], atol=2e-6)
     assert len({*geoms.tolist()}) > 60
