@@ -64,6 +64,7 @@ class PyForeignArrays {
     query.hidden = {static_cast<const std::uint8_t*>(hidden.data()), hidden.size()};
     work([&](worlds::ForeignArrays& own) {
       if (!rays_) rays_ = make_shared_guarded<rays::ForeignRays>(own.worlds());
+      own.take_poses();
       rays_->cast(own.worlds(), query);
     });
   }
@@ -84,10 +85,14 @@ void bind_foreign_arrays(nb::module_& m) {
            nb::arg("threads"), "The mjModel at this address is copied.")
       .def(
           "clear",
-          [](PyForeignArrays& self) {
-            self.work([](worlds::ForeignArrays& arrays) { arrays.clear(); });
+          [](PyForeignArrays& self, int max_contacts, int max_constraints) {
+            self.work([&](worlds::ForeignArrays& arrays) {
+              arrays.clear(max_contacts, max_constraints);
+            });
           },
-          "Forgets all arrays.")
+          nb::arg("max_contacts"), nb::arg("max_constraints"),
+          "Forgets all arrays. The data has room for this many contacts of all worlds, and rows of "
+          "constraints of each.")
       .def("add", &PyForeignArrays::add, nb::arg("kind"), nb::arg("field"), nb::arg("address"),
            nb::arg("dtype"), nb::arg("rows"), nb::arg("columns"), nb::arg("input") = false,
            "False if MuJoCo has no such field. kind: data, model or contact.")

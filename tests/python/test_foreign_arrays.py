@@ -29,6 +29,7 @@ class Program:
     def __init__(self, threads=1, contacts=20 * WORLDS, constraints=100):
         self.model = mujoco.MjModel.from_xml_string(XML)
         self.worlds = _core.ForeignArrays(self.model._address, WORLDS, threads)
+        self.worlds.clear(contacts, constraints)
         start = mujoco.MjData(self.model)
         for name in (*STATE, *DERIVED):
             array = np.tile(np.ravel(getattr(start, name)).astype(np.float32), (WORLDS, 1))
@@ -36,16 +37,16 @@ class Program:
             assert self.add("data", name, array, name in STATE)
         self.efc_force = np.zeros((WORLDS, constraints), np.float32)
         self.efc_id = np.zeros((WORLDS, constraints), np.int32)
-        assert self.add("data", "efc_id", self.efc_id)
         self.nefc = np.zeros((WORLDS, 1), np.int32)
-        assert self.add("data", "efc_force", self.efc_force)
+        for name in ("efc_id", "efc_force"):
+            assert not constraints or self.add("data", name, getattr(self, name))
         assert self.add("data", "nefc", self.nefc)
         floats, ints = {"dist": 1, "pos": 3, "frame": 9, "friction": 5}, {"geom": 2, "dim": 1, "worldid": 1, "geomcollisionid": 1}
         self.contact = {name: np.zeros((contacts, n), np.float32) for name, n in floats.items()}
         self.contact |= {name: np.zeros((contacts, n), np.int32) for name, n in {**ints, "efc_address": 10}.items()}
         self.count = np.zeros((1, 1), np.int32)
         for name, array in {**self.contact, "count": self.count}.items():
-            assert self.add("contact", name, array)
+            assert not array.size or self.add("contact", name, array)
 
     def add(self, kind, name, array, state=False):
         return self.worlds.add(kind, name, array.ctypes.data, array.dtype.name, *array.shape, state)
@@ -65,6 +66,16 @@ class Program:
         self.qpos[:, 2] += rng.uniform(-0.25, 0.1, WORLDS)
         self.qvel[:] = rng.normal(0, 0.5, self.qvel.shape)
         self.ctrl[:] = rng.normal(0, 0.1, self.ctrl.shape)
+
+    def worldids(self):
+        """The worlds of the contacts."""
+        return self.contact["worldid"][: self.count[0, 0], 0].tolist()
+
+    def expect_ids(self):
+        """The constraints name the rows of their contacts."""
+        for row, world in enumerate(self.worldids()):
+            rows = self.contact["efc_address"][row]
+            assert (self.efc_id[world, rows[rows >= 0]] == row).all()
 
     def expect(self, datas, message=""):
         """The arrays are exactly the float32 numbers of these data."""
@@ -128,6 +139,29 @@ def test_steps_after_forward_equal_those_without_and_stages_may_be_divided():
             mujoco.mj_step(program.model, data)
         program.expect(datas, f"step {step}")
         divided.expect(datas, f"divided step {step}")
+
+
+def test_stages_after_a_step_show_no_older_results():
+    program, plain = Program(), Program()
+    for one in (program, plain):
+        one.throw()
+        one.worlds.run(FORWARD)
+        one.qvel[:, 0] += 1
+        for _ in range(20):
+            one.worlds.run(STEP)
+    qacc, sensors = program.qacc.copy(), program.sensordata.copy()
+    program.worlds.run(STEP1)
+    np.testing.assert_array_equal(program.qacc, qacc)
+    np.testing.assert_array_equal(program.sensordata[:, :3], sensors[:, :3])  # of accelerations
+    np.testing.assert_array_equal(program.sensordata[:, 3], program.qpos[:, 7])
+    program.worlds.run(STEP2)
+    for _ in range(3):  # without step1()
+        program.worlds.run(STEP)
+        program.worlds.run(STEP2)
+    for _ in range(7):
+        plain.worlds.run(STEP)
+    np.testing.assert_array_equal(program.qpos, plain.qpos)
+    program.expect_ids()
 
 
 def test_contacts_are_in_the_order_of_the_worlds():
@@ -196,6 +230,51 @@ def test_models_differ_between_worlds_from_the_next_step_on():
             np.testing.assert_allclose(getattr(program, name), expected, atol=2e-6, err_msg=f"{name} step {step}")
 
 
+@pytest.mark.parametrize("rows", [2, 3, WORLDS + 2])
+def test_worlds_share_the_rows_of_the_model_in_turn(rows):
+    program = Program()
+    mass = np.tile(program.model.body_mass.astype(np.float32), (rows, 1))
+    gravity = np.tile(program.model.opt.gravity.astype(np.float32), (rows, 1))
+    assert program.add("model", "body_mass", mass)
+    assert program.add("model", "opt.gravity", gravity)
+    program.throw()
+    datas, models = program.plain(), [mujoco.MjModel.from_xml_string(XML) for _ in range(WORLDS)]
+    program.worlds.run(STEP)
+    mass[1:, 1] = 2.5
+    gravity[:, 0] = np.arange(rows)
+    program.worlds.run(STEP)
+    for world, (model, data) in enumerate(zip(models, datas, strict=True)):
+        mujoco.mj_step(model, data)
+        row = world % rows
+        model.body_mass[1], model.opt.gravity[0] = 2.5 if row else model.body_mass[1], row
+        if row:
+            mujoco.mj_setConst(model, mujoco.MjData(model))
+        mujoco.mj_step(model, data)
+    np.testing.assert_allclose(program.qvel, [data.qvel for data in datas], atol=2e-6)
+
+
+@pytest.mark.parametrize("name", ["geom_bodyid", "geom_type"])
+def test_values_that_were_refused_are_not_used(name):
+    program = Program()
+    mass = np.tile(program.model.body_mass.astype(np.float32), (WORLDS, 1))
+    array = np.array(getattr(program.model, name)[None])
+    assert program.add("model", "body_mass", mass)
+    assert program.add("model", name, array)
+    program.throw()
+    datas = program.plain()
+    old = mass[2, 1], array[0, 1]
+    mass[2, 1], array[0, 1] = 9, 99
+    for _ in range(2):
+        with pytest.raises(ValueError, match=name):
+            program.worlds.run(STEP)
+    mass[2, 1], array[0, 1] = old
+    for _ in range(30):
+        program.worlds.run(STEP)
+        for data in datas:
+            mujoco.mj_step(program.model, data)
+        program.expect(datas)
+
+
 def test_reset_is_of_the_worlds_of_the_mask():
     program = Program()
     first = program.qpos.copy()
@@ -211,9 +290,37 @@ def test_reset_is_of_the_worlds_of_the_mask():
     assert (program.time[mask] == 0).all()
     assert (program.time[~mask] > 0.1).all()
     assert not program.ctrl[mask].any()
-    assert program.count[0, 0] == (program.contact["worldid"][: program.count[0, 0]] % 3 != 0).sum()
     program.worlds.run(RESET)
     np.testing.assert_array_equal(program.qpos, first)
+
+
+@pytest.mark.parametrize("call", [FORWARD, STEP])
+def test_reset_leaves_the_worlds_outside_the_mask(call):
+    program = Program()
+    program.qpos[:, 2] = 0.099
+    program.worlds.run(FORWARD)
+    program.qvel[:, 0] += 1
+    program.worlds.run(STEP)
+    program.worlds.run(call)
+    assert program.worldids() == sorted([*range(WORLDS)] * 4)
+    program.expect_ids()
+    names = (*STATE, *DERIVED, "nefc", "efc_force")
+    before = {name: getattr(program, name).copy() for name in names}
+    program.ctrl[1, 0] = before["ctrl"][1, 0] = 7  # stays, and is taken by the next step
+    mask = np.array([True, False, False, True, False])
+    for _ in range(2):
+        program.worlds.run(RESET, mask.ctypes.data)
+        for name, array in before.items():
+            np.testing.assert_array_equal(getattr(program, name)[~mask], array[~mask], err_msg=name)
+        assert (program.nefc[mask] == 0).all()
+        assert program.worldids() == [1] * 4 + [2] * 4 + [4] * 4
+        program.expect_ids()
+    other = Program()
+    for name in STATE:
+        getattr(other, name)[:] = getattr(program, name)
+    for one in (program, other):
+        one.worlds.run(STEP)
+    np.testing.assert_allclose(program.qvel, other.qvel, atol=1e-4)
 
 
 def test_diverged_worlds_show_what_diverged_and_the_others_go_on():
@@ -246,6 +353,35 @@ def test_too_few_rows_are_an_error_that_says_how_many():
     program.qpos[:, 2] = 0.099
     with pytest.raises(ValueError, match=r"world 0 has 16 rows of constraints, and the data has room for 4: make it with njmax=32"):
         program.worlds.run(STEP)
+
+
+def test_no_rows_are_too_few_as_well():
+    """Arrays without rows are not linked."""
+    program = Program(contacts=0)
+    program.worlds.run(STEP)
+    program.qpos[:, 2] = 0.099
+    with pytest.raises(ValueError, match="5 worlds have 20 contacts, and the data has room for 0: make it with nconmax=8 or more"):
+        program.worlds.run(STEP)
+    assert program.count[0, 0] == 0
+    program = Program(constraints=0)
+    program.qpos[:, 2] = 0.099
+    with pytest.raises(ValueError, match="world 0 has 16 rows of constraints, and the data has room for 0: make it with njmax=32"):
+        program.worlds.run(STEP)
+
+
+def test_errors_of_a_world_leave_the_contacts_of_all_numbered():
+    program = Program()
+    program.qpos[:, 2] = 0.099
+    program.worlds.run(FORWARD)
+    program.qpos[2, 2] = 1
+    program.worlds.set_option("opt.integrator", [0, 0, 0, 0, 99])
+    with pytest.raises(RuntimeError, match=r"world 4: MuJoCo: .*integrator"):
+        program.worlds.run(STEP)
+    assert program.worldids() == [0] * 4 + [1] * 4 + [3] * 4 + [4] * 4
+    program.expect_ids()
+    program.worlds.set_option("opt.integrator", [0])
+    program.worlds.run(STEP)
+    assert program.worldids() == [0] * 4 + [1] * 4 + [3] * 4 + [4] * 4
 
 
 def test_other_fields_sizes_and_types_are_refused():
@@ -299,6 +435,60 @@ def test_rays_hit_what_plain_mujoco_hits(call):
     assert {-1, 0, 1, 2} <= {*geoms.ravel().tolist()}
     program.worlds.cast(count, arrays, 0x3F, bytes([1, 0, 0]))
     assert 0 not in geoms
+
+
+def test_rays_use_the_poses_of_the_arrays():
+    """The program may compute them itself, and a reset leaves them."""
+    program = Program()
+    poses, rotations = (np.zeros((WORLDS, n * program.model.ngeom), np.float32) for n in (3, 9))
+    assert program.add("data", "geom_xpos", poses)
+    assert program.add("data", "geom_xmat", rotations)
+    program.worlds.run(STEP)
+    origins, directions = np.tile(np.float32([0, 0, 3]), (WORLDS, 1)), np.tile(np.float32([0, 0, -1]), (WORLDS, 1))
+    exclude, geoms = np.full(1, -1, np.int32), np.zeros(WORLDS, np.int32)
+    distances, normals = np.zeros(WORLDS, np.float32), np.zeros((WORLDS, 3), np.float32)
+    arrays = [array.ctypes.data for array in (origins, directions, exclude, distances, geoms, normals)]
+    program.worlds.run(RESET)
+    program.worlds.cast(1, arrays, 0x3F, bytes(program.model.ngeom))
+    np.testing.assert_allclose(distances, 2.6, atol=1e-5)
+    poses[1, 3:6] = 0, 0, 1
+    poses[2, 3:6] = 5, 0, 0
+    program.worlds.cast(1, arrays, 0x3F, bytes(program.model.ngeom))
+    np.testing.assert_allclose(distances, [2.6, 1.9, 3, 2.6, 2.6], atol=1e-5)
+
+
+@pytest.mark.parametrize("side", [9, 24])  # with one level of boxes, and with blocks of them
+def test_grids_of_rays_hit_what_plain_mujoco_hits(side):
+    """The rays of a grid have other origins each, as those of a height scanner."""
+    heights = np.random.default_rng(0).uniform(0.02, 0.2, (side, side))
+    boxes = "".join(
+        f'<geom type="box" size=".04 .04 {height}" pos="{0.1 * (x - side // 2)} {0.1 * (y - side // 2)} 0"/>'
+        for (x, y), height in np.ndenumerate(heights)
+    )
+    model = mujoco.MjModel.from_xml_string(f'<mujoco><worldbody>{boxes}<geom type="plane" size="0 0 1"/></worldbody></mujoco>')
+    worlds = _core.ForeignArrays(model._address, 1, 1)
+    worlds.run(FORWARD)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    grid = np.stack(np.meshgrid(np.linspace(-0.8, 0.8, 17), np.linspace(-0.5, 0.5, 11)), -1).reshape(-1, 2) + 0.013
+    origins = np.column_stack([grid, np.full(len(grid), 1.0)]).astype(np.float32)
+    directions = np.tile(np.float32([0, 0, -1]), (len(grid), 1))
+    lost = [0, 40, 100]  # rays that are not finite hit nothing, and leave the others
+    origins[lost[:2], 1], directions[lost[2]] = np.nan, np.inf
+    exclude, geoms = np.full(len(grid), -1, np.int32), np.empty(len(grid), np.int32)
+    distances, normals = np.empty(len(grid), np.float32), np.empty((len(grid), 3), np.float32)
+    worlds.cast(
+        len(grid), [array.ctypes.data for array in (origins, directions, exclude, distances, geoms, normals)], 0x3F, bytes(model.ngeom)
+    )
+    found, expected = np.zeros(1, np.int32), []
+    for origin in origins:
+        distance = mujoco.mj_ray(model, data, origin, np.array([0, 0, -1.0]), None, 1, -1, found)
+        expected.append((int(found[0]), distance))
+    for ray in lost:
+        expected[ray] = -1, -1
+    assert geoms.tolist() == [geom for geom, _ in expected]
+    np.testing.assert_allclose(distances, [distance for _, distance in expected], atol=2e-6)
+    assert len({*geoms.tolist()}) > 60
 
 
 def test_threads_take_turns_and_a_forked_process_is_refused():

@@ -47,19 +47,22 @@ _OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "ra
 """mujoco_warp's own functions."""
 
 _OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
-"""Fields that have the names of fields of MuJoCo, but another content."""
+"""Fields that have the names of fields of MuJoCo, with different contents."""
 
-_FIXED_OPTIONS = (
+_OPTIONS = (
     "integrator",
     "cone",
     "solver",
     "iterations",
     "ls_iterations",
+    "noslip_iterations",
     "ccd_iterations",
     "sdf_initpoints",
     "sdf_iterations",
+    "disableflags",
+    "enableflags",
 )
-"""Options that are Python numbers in mujoco_warp, and equal in MuJoCo."""
+"""Options that are Python numbers in mujoco_warp, and equal in MuJoCo. Older series lack some."""
 
 _GEOMETRY = ("mesh_", "hfield_", "oct_", "tex_", "flex")
 """Beginnings of the names of the model's arrays that are large, and must not be changed."""
@@ -146,14 +149,17 @@ class Worlds:
         except ValueError as error:
             raise ValueError(str(error).replace("attach()", "mujoco_warp on the CPU").replace("attached", "simulated")) from None
         self._arrays = _core.ForeignArrays(ours._address, data.nworld, _threads)
-        self._flags = {name: int(getattr(ours.opt, name)) for name in ("disableflags", "enableflags")}
         self.shown: list[str] = []
         """Fields of the data that show the worlds."""
         self.left: list[str] = []
         """Fields of the data that stay as they are."""
         self._num_worlds = data.nworld
         self._fixed = np.array(source.body_weldid)[source.geom_bodyid] == 0
-        self._options = self._options_of(model)
+        self._source = source
+        self._options = {name: int(getattr(source.opt, name)) for name in _OPTIONS if hasattr(model.opt, name)}
+        self._others: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        """Arrays of the model that MuJoCo does not have in this form, and their values at the last step."""
+        self._set_options()
         self._link()
 
     @staticmethod
@@ -174,8 +180,9 @@ class Worlds:
     def _link(self) -> None:
         """Tells the worlds where the arrays are."""
         data: Any = self._data()
-        self._arrays.clear()
-        self._others: list[tuple[str, np.ndarray, bytes]] = []
+        self._parts: list[tuple[dict[str, Any], tuple[Any, ...]]] = [({}, (None,))]  # an error leaves what no program has
+        self._arrays.clear(data.naconmax, data.njmax)
+        others: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.shown, self.left = [], []
         parts = [("", "data", data), ("contact.", "contact", data.contact), ("efc.", "data", data.efc)]
         for prefix, kind, part in parts:
@@ -197,7 +204,10 @@ class Worlds:
                 rows = array.shape[0] if by_world else 1
                 if not self._add("model", part, name, prefix + name, rows, False) and by_world and array.size:
                     values = array.numpy()
-                    self._others.append((prefix + name, values, values.tobytes()))
+                    known = self._others.get(prefix + name)
+                    before = known[1] if known else self._first(prefix + name, values)
+                    others[prefix + name] = values, np.resize(before, values.shape).astype(values.dtype)
+        self._others = others
         # The attributes as they are now. They keep the arrays.
         self._parts = [
             (vars(part), (*vars(part).values(),)) for part in (data, data.contact, data.efc, self.model, self.model.opt)
@@ -223,10 +233,10 @@ class Worlds:
                 self._set_options()
                 self._link()
                 break
-        for index, (name, now, before) in enumerate(self._others):
-            if now.tobytes() != before:
+        for name, (now, before) in self._others.items():
+            if now.tobytes() != before.tobytes():
                 self._changed(name, now)
-                self._others[index] = (name, now, now.tobytes())
+                before[...] = now
         self._arrays.run(call, mask)
 
     def cast(self, query: dict[str, Any]) -> None:
@@ -242,9 +252,11 @@ class Worlds:
         }
         for name, kind in kinds.items():
             array, shape = query[name], (count,) if name == "bodyexclude" else (self._num_worlds, count)
-            if array.dtype is not kind or array.shape != shape or not array.is_contiguous:
+            if name in ("pnt", "vec") and array.shape == (1, count) != shape:  # the same rays in all worlds
+                array = query[name] = wp.array(np.repeat(array.numpy(), self._num_worlds, axis=0), dtype=kind, device="cpu")
+            if array.dtype is not kind or array.shape != shape or not array.is_contiguous or not array.device.is_cpu:
                 raise ValueError(
-                    f"rays(): {name} must be a contiguous array {shape} of {kind.__name__}, not {array.shape} of {array.dtype.__name__}"
+                    f"rays(): {name} must be a contiguous array {shape} of {kind.__name__} on the CPU, not {array.shape} of {array.dtype.__name__} on {array.device}"
                 )
         hidden = np.zeros(self.model.ngeom, np.uint8)
         if query["rc"] is not None:
@@ -257,22 +269,23 @@ class Worlds:
         if count:
             self._arrays.cast(count, [query[name].ptr for name in kinds], groups, hidden.tobytes())
 
-    @staticmethod
-    def _options_of(model: Any) -> dict[str, int]:
-        return {name: int(getattr(model.opt, name)) for name in (*_FIXED_OPTIONS, "disableflags", "enableflags")}
-
     def _set_options(self) -> None:
-        options = self._options_of(self.model)
-        for name, value in options.items():
-            if value != self._options[name]:
-                if name in self._flags:  # bits have other meanings in other series
-                    value = self._flags[name] = self._flags[name] ^ value ^ self._options[name]
+        for name, before in self._options.items():
+            value = int(getattr(self.model.opt, name))
+            if value != before:
                 self._arrays.set_option(f"opt.{name}", [value])
-        self._options = options
+                self._options[name] = value
+
+    def _first(self, name: str, now: np.ndarray) -> Any:
+        """The values of this array in the model that `put_model` was called with, if it has them."""
+        if name == "opt.impratio_invsqrt":
+            return 1 / np.sqrt(max(self._source.opt.impratio, 1e-15))
+        values = getattr(self._source, name, now)
+        return values if values.size == now[0].size else now
 
     def _changed(self, name: str, now: np.ndarray) -> None:
         if name != "opt.impratio_invsqrt":
-            raise ValueError(f"{name} of the model was changed, which must be the same as when the model was made")
+            raise ValueError(f"{name} cannot be changed after put_model()")
         self._arrays.set_option("opt.impratio", (now.astype(float) ** -2).tolist())
 
 
@@ -302,11 +315,20 @@ def _call(name: str) -> Callable[[Any, Any], None]:
 def _reset_data(m: Any, d: Any, reset: Any = None) -> None:
     if not _on_cpu(m, d):
         return _OWN["reset_data"](m, d, reset)
-    if reset is not None and (reset.dtype is not wp.bool or reset.shape != (d.nworld,) or not reset.is_contiguous):
+    if reset is None:
+        return worlds_of(m, d).run(_RESET)
+    if reset.shape != (d.nworld,) or not (reset.dtype is wp.bool or wp.types.type_is_int(reset.dtype)) or not reset.device.is_cpu:
         raise ValueError(
-            f"reset_data(): reset must be a contiguous array of {d.nworld} bools, not {reset.dtype.__name__} {reset.shape}"
+            f"reset_data(): reset must be an array of {d.nworld} bools or integers on the CPU, not {reset.dtype.__name__} {reset.shape} on {reset.device}"
         )
-    worlds_of(m, d).run(_RESET, 0 if reset is None else reset.ptr)
+    mask = np.ascontiguousarray(reset.numpy() != 0)
+    return worlds_of(m, d).run(_RESET, mask.ctypes.data)
+
+
+def _casts(model: Any, data: Any) -> bool:
+    """Whether the rays of this data are cast by its worlds, which need no hierarchy of bounding volumes."""
+    worlds = _worlds.get(id(data))
+    return worlds is not None and worlds.model is model and not model.nflex and _on_cpu(model, data)
 
 
 _rays_arguments = inspect.signature(_OWN["rays"])
@@ -317,27 +339,23 @@ def _rays(*args: Any, **kwargs: Any) -> None:
     query = _rays_arguments.bind(*args, **kwargs)
     query.apply_defaults()
     model, data = query.arguments["m"], query.arguments["d"]
-    worlds = _worlds.get(id(data))
-    if worlds is not None and worlds.model is model and _on_cpu(model, data):
-        worlds.cast(query.arguments)
+    if _casts(model, data):
+        _worlds[id(data)].cast(query.arguments)
     else:
-        if query.arguments["rc"] is not None:
-            _OWN["refit_bvh"](model, data, query.arguments["rc"])
         _OWN["rays"](*args, **kwargs)
 
 
 @functools.wraps(_OWN["ray"])
 def _ray(*args: Any, **kwargs: Any) -> Any:
     call = inspect.signature(_OWN["ray"]).bind(*args, **kwargs).arguments
-    if call.get("rc") is not None:
-        _OWN["refit_bvh"](call["m"], call["d"], call["rc"])
+    if call.get("rc") is not None and not call["rc"].nrender and _casts(call["m"], call["d"]):
+        _OWN["refit_bvh"](call["m"], call["d"], call["rc"])  # which _refit_bvh() has not done
     return _OWN["ray"](*args, **kwargs)
 
 
 @functools.wraps(_OWN["refit_bvh"])
 def _refit_bvh(m: Any, d: Any, rc: Any) -> None:
-    worlds = _worlds.get(id(d))
-    if rc.nrender or m.nflex or worlds is None or worlds.model is not m or not _on_cpu(m, d):
+    if rc.nrender or not _casts(m, d):
         _OWN["refit_bvh"](m, d, rc)
 
 

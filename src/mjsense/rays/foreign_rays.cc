@@ -11,6 +11,10 @@ namespace {
 
 constexpr int kChunk = 12;  // packets that are culled together
 
+bool finite(const float* v) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
 }  // namespace
 
 ForeignRays::ForeignRays(const worlds::Worlds& worlds)
@@ -42,22 +46,27 @@ void ForeignRays::cast_packets(int world, int begin, int end, const ForeignRaysQ
   RayPacket packets[kChunk];
   float lengths[kChunk][kPacket];
   const std::size_t row = static_cast<std::size_t>(world) * query.count;
+  // Packets that are culled together need the same origin.
+  const float* origin = query.origins + 3 * (row + static_cast<std::size_t>(begin) * kPacket);
+  const int rays = std::min(end * kPacket, query.count) - begin * kPacket;
+  for (int i = 1; i < rays && !finite(origin); ++i) origin += 3;
   for (int p = begin; p < end; ++p) {
     RayPacket& packet = packets[p - begin];
     const std::size_t first = row + static_cast<std::size_t>(p) * kPacket;
-    std::copy_n(query.origins + 3 * first, 3, packet.origin);
+    std::copy_n(origin, 3, packet.origin);
     for (int lane = 0; lane < kPacket; ++lane) {
       const bool there = p * kPacket + lane < query.count;
       const std::size_t ray = there ? first + lane : first;
       const float *o = query.origins + 3 * ray, *v = query.directions + 3 * ray;
       const double length =
           std::sqrt(double{v[0]} * v[0] + double{v[1]} * v[1] + double{v[2]} * v[2]);
+      const bool traced = there && length > 0 && finite(o) && finite(v);
       for (int k = 0; k < 3; ++k) {
-        packet.o[k][lane] = static_cast<float>(o[k] - packet.origin[k]);
-        packet.d[k][lane] = length > 0 ? static_cast<float>(v[k] / length) : (k == 0 ? 1.0f : 0.0f);
+        packet.o[k][lane] = traced ? static_cast<float>(o[k] - packet.origin[k]) : 0.0f;
+        packet.d[k][lane] = traced ? static_cast<float>(v[k] / length) : (k == 0 ? 1.0f : 0.0f);
       }
       lengths[p - begin][lane] = static_cast<float>(length);
-      packet.tmax[lane] = there && length > 0 && std::isfinite(length) ? 1e10f : -1.0f;
+      packet.tmax[lane] = traced ? 1e10f : -1.0f;
     }
   }
   // Rays of a chunk mostly exclude the same body: each body has a pass.

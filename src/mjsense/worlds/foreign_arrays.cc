@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
+#include <exception>
 #include <initializer_list>
 #include <limits>
 #include <optional>
@@ -168,6 +170,9 @@ constexpr std::string_view kControls[] = {"ctrl", "qfrc_applied", "xfrc_applied"
 // Fields that a reset shows in addition to the state.
 constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy",
                                        "ne",   "nf",      "nl",         "nefc"};
+// Fields of constraints that mj_step1 does not compute.
+constexpr std::string_view kSolved[] = {"efc_state", "efc_force"};
+constexpr std::string_view kPoses[] = {"geom_xpos", "geom_xmat"};
 
 struct ContactPlace {
   std::string_view name;
@@ -206,9 +211,11 @@ ForeignArrays::ForeignArrays(const mjModel* model, int num_worlds, int threads)
       num_constraints_(num_worlds),
       first_contact_row_(num_worlds),
       first_contact_(num_worlds),
+      written_first_contact_(num_worlds),
       scratch_(worlds_.model()),
       borrowed_(num_worlds),
-      current_(num_worlds) {
+      current_(num_worlds),
+      scratched_(num_worlds) {
   fill_scratch();
   set_option("opt.disableflags", {static_cast<double>(model->opt.disableflags)});
 }
@@ -229,11 +236,12 @@ void ForeignArrays::set_option(const std::string& name, const std::vector<double
   }
 }
 
-void ForeignArrays::clear() {
+void ForeignArrays::clear(int max_contacts, int max_constraints) {
   fields_.clear();
   model_fields_.clear();
   contact_fields_.clear();
-  max_contacts_ = max_constraints_ = -1;
+  max_contacts_ = max_contacts;
+  max_constraints_ = max_constraints;
 }
 
 // Makes an mjData for each thread, so that none is made while the worlds run.
@@ -271,15 +279,16 @@ bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool
                      input || std::ranges::count(kReset, field) > 0,
                      std::ranges::count(kControls, field) > 0,
                      field == "efc_id",
+                     std::ranges::count(kSolved, field) > 0,
+                     std::ranges::count(kPoses, field) > 0,
                      found->pointer,
                      rows.data,
                      static_cast<std::size_t>(rows.strides[0]),
                      {}});
-  if (found->constraints)
-    max_constraints_ = max_constraints_ < 0 ? count : std::min(max_constraints_, count);
+  if (found->constraints) max_constraints_ = std::min(max_constraints_, count);
   Field& added = fields_.back();
   if (!input) return true;
-  // The worlds have their first state, of which the program's differs perhaps.
+  // The worlds have the model's initial state; the arrays may differ.
   const std::size_t bytes = count * dtype_size(rows.dtype);
   added.seen.resize(bytes * worlds_.size());
   apply([](const mjModel*, mjData* d, int w, void* argument) {
@@ -293,7 +302,8 @@ bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool
 bool ForeignArrays::add_model(const std::string& field, const ArrayView& rows) {
   const mjModel* m = worlds_.model();
   const std::optional<ModelFieldType> found = model_field(m, field);
-  const auto count = static_cast<int>(rows.shape[1]), num_rows = static_cast<int>(rows.shape[0]);
+  const auto count = static_cast<int>(rows.shape[1]),
+             num_rows = std::min(static_cast<int>(rows.shape[0]), worlds_.size());
   if (!found || found->count != count || !converts(found->type, rows.dtype)) return false;
   ModelField added{field,      found->type,
                    rows.dtype, count,
@@ -325,8 +335,7 @@ bool ForeignArrays::add_contacts(std::string_view field, const ArrayView& rows) 
   const auto count = static_cast<int>(rows.shape[1]), capacity = static_cast<int>(rows.shape[0]);
   const auto add = [&](int made, std::size_t offset, DType dtype, int expected) {
     if (rows.dtype != dtype || (expected > 0 && count != expected)) return false;
-    if (made != kCount)
-      max_contacts_ = max_contacts_ < 0 ? capacity : std::min(max_contacts_, capacity);
+    if (made != kCount) max_contacts_ = std::min(max_contacts_, capacity);
     contact_fields_.push_back(
         {made, offset, dtype, count, rows.data, static_cast<std::size_t>(rows.strides[0])});
     return true;
@@ -354,27 +363,49 @@ bool ForeignArrays::take(mjData* d, int w) {
   return moved;
 }
 
+// Takes results that differ from what `d` would show: those of a step in another mjData, or the
+// program's. Not those of diverged worlds.
+void ForeignArrays::take_shown(mjData* d, int w, bool poses_only) const {
+  for (const Field& f : fields_) {
+    if (f.input || f.constraints || f.type != DType::kFloat64 || (poses_only && !f.poses)) continue;
+    const auto* row = reinterpret_cast<const float*>(f.rows + w * f.row_bytes);
+    auto* to = static_cast<mjtNum*>(const_cast<void*>(f.pointer(d)));
+    for (int i = 0; i < f.count; ++i) {
+      if (std::isfinite(row[i]) && static_cast<float>(to[i]) != row[i]) to[i] = row[i];
+    }
+  }
+}
+
+void ForeignArrays::take_poses() {
+  apply([](const mjModel*, mjData* d, int w, void* argument) {
+    static_cast<const ForeignArrays*>(argument)->take_shown(d, w, true);
+  });
+}
+
 void ForeignArrays::show(const mjData* d, int w) {
   for (Field& f : fields_) {
     if (call_ == RawCall::kReset && !f.reset) continue;
+    if (call_ == RawCall::kStep1 && f.solved) continue;
     const std::int64_t n = f.constraints ? std::min(f.count, d->nefc) : f.count;
     std::byte* row = f.rows + w * f.row_bytes;
     show_elements(f.pointer(d), f.type, row, f.dtype, n);
     if (f.input)
       std::memcpy(f.seen.data() + w * n * dtype_size(f.dtype), row, n * dtype_size(f.dtype));
   }
-  if (max_contacts_ >= 0) contacts_[w].assign(d->contact, d->contact + d->ncon);
+  contacts_[w].assign(d->contact, d->contact + d->ncon);
+  written_first_contact_[w] = 0;
   num_constraints_[w] = d->nefc;
   first_contact_row_[w] = d->ne + d->nf + d->nl;
 }
 
-void ForeignArrays::show_contacts(const mjModel* m, int w) const {
+void ForeignArrays::show_contacts(const mjModel* m, int w) {
   for (const Field& f : fields_) {
     if (!f.contact_ids) continue;
     auto* ids = reinterpret_cast<int*>(f.rows + w * f.row_bytes);
     for (int i = first_contact_row_[w]; i < std::min(f.count, num_constraints_[w]); ++i)
-      ids[i] += first_contact_[w];
+      ids[i] += first_contact_[w] - written_first_contact_[w];
   }
+  written_first_contact_[w] = first_contact_[w];
   const std::vector<mjContact>& contacts = contacts_[w];
   const int room =
       std::clamp(max_contacts_ - first_contact_[w], 0, static_cast<int>(contacts.size()));
@@ -415,6 +446,7 @@ void ForeignArrays::step_in_scratch(const mjModel* m, mjData* d, int w) {
   mju_copy(d->geom_xpos, s->geom_xpos, 3 * static_cast<int>(m->ngeom));
   mju_copy(d->geom_xmat, s->geom_xmat, 9 * static_cast<int>(m->ngeom));
   show(s, w);
+  scratched_[w] = 1;
   borrowed_[w] = nullptr;
   const ScratchData::Loan returned(s, ScratchData::Release{&scratch_});
   scene::drop_warnings(false);
@@ -437,6 +469,7 @@ void ForeignArrays::show_diverged(const mjModel* m, mjData* d, int w) {
 void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument) {
   ordered_after(argument);
   auto& self = *static_cast<ForeignArrays*>(argument);
+  if (self.call_ == RawCall::kReset && self.mask_ && !self.mask_[w]) return;
   scene::drop_warnings(true);
   const bool current = !self.take(d, w) && self.current_[w];
   self.current_[w] = 0;  // also if a MuJoCo error jumps out of this function
@@ -461,26 +494,29 @@ void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument
       mj_forward(m, d);
       break;
     case RawCall::kStep1:
+      self.take_shown(d, w, false);
       mj_step1(m, d);
       break;
     case RawCall::kStep2:
+      if (self.scratched_[w]) mj_step1(m, d);
       mj_step2(m, d);
       break;
     case RawCall::kReset:
-      if (!self.mask_ || self.mask_[w]) mj_resetData(m, d);
+      mj_resetData(m, d);
       break;
   }
+  self.scratched_[w] = 0;
   self.current_[w] = self.call_ == RawCall::kForward || self.call_ == RawCall::kStep1;
   self.show(d, w);
   scene::drop_warnings(false);
   orders_before(argument);
 }
 
-// Writes the values of the model that the program has changed into the worlds' models.
-void ForeignArrays::take_model() {
+// Writes the values of the model that the program has changed into the worlds' models, and checks
+// them. Returns whether there are any. `derive`: the worlds in which MuJoCo derives others from them.
+bool ForeignArrays::write_model(std::vector<Written>& written, std::vector<int>& derive) {
   const int num_worlds = worlds_.size();
-  std::vector<bool> changed(num_worlds, false), derive(num_worlds, false);
-  bool any = false;
+  std::vector<bool> changed(num_worlds, false), derives(num_worlds, false);
   for (const ModelField& f : model_fields_) {
     const std::size_t bytes = f.count * dtype_size(f.dtype);
     for (int row = 0; row < f.num_rows; ++row) {
@@ -489,29 +525,38 @@ void ForeignArrays::take_model() {
       int size = 0, element = 0;
       auto* target =
           static_cast<std::byte*>(mjb_expand(worlds_.batch(), f.name.c_str(), &size, &element));
-      if (!target)
-        throw ValueError(fmt::format(
-            "{} of the model was changed, which must be the same as when the model was made",
-            f.name));
-      const bool all = f.num_rows == 1;
-      for (int w = all ? 0 : row; w < (all ? num_worlds : row + 1); ++w) {
-        take_elements(now, seen, f.dtype, target + std::size_t{1} * w * size * element, f.type,
-                      f.count);
+      if (!target) throw ValueError(fmt::format("{} cannot be changed after put_model()", f.name));
+      const std::size_t world_bytes = static_cast<std::size_t>(size) * element;
+      for (int w = row; w < num_worlds; w += f.num_rows) {
+        std::byte* place = target + w * world_bytes;
+        written.push_back({place, {place, place + world_bytes}});
+        take_elements(now, seen, f.dtype, place, f.type, f.count);
         changed[w] = true;
-        if (f.constants) derive[w] = true;
+        if (f.constants) derives[w] = true;
       }
-      any = true;
     }
   }
-  if (!any) return;
-  current_.assign(num_worlds, 0);
-  std::vector<int> ids;
   for (int w = 0; w < num_worlds; ++w) {
     if (changed[w]) check_element_indices(worlds_.model_of(w));
-    if (derive[w]) ids.push_back(w);
+    if (derives[w]) derive.push_back(w);
   }
-  worlds_.model_changed();
-  if (!ids.empty()) set_constants(ids);
+  return !written.empty();
+}
+
+// Takes the program's model. The worlds keep theirs if it has a value that they cannot have.
+void ForeignArrays::take_model() {
+  std::vector<Written> written;
+  std::vector<int> derive;
+  try {
+    if (!write_model(written, derive)) return;
+    current_.assign(worlds_.size(), 0);
+    worlds_.model_changed();
+    if (!derive.empty()) set_constants(derive);
+  } catch (...) {
+    for (const Written& one : written) std::ranges::copy(one.before, one.place);
+    if (!derive.empty()) set_constants(derive);
+    throw;
+  }
   for (ModelField& f : model_fields_) {
     const std::size_t bytes = f.count * dtype_size(f.dtype);
     for (int row = 0; row < f.num_rows; ++row)
@@ -540,7 +585,6 @@ void ForeignArrays::set_constants(const std::vector<int>& ids) {
       std::memcpy(one.values.data() + i * bytes, rows + ids[i] * bytes, bytes);
   }
   const int failed = mjb_setConst(batch, ids.data(), static_cast<int>(ids.size()));
-  scene::drop_warnings(false);  // an error leaves the flag set
   for (const Kept& one : kept) {
     for (std::size_t i = 0; i < ids.size(); ++i)
       std::memcpy(one.rows + ids[i] * one.bytes, one.values.data() + i * one.bytes, one.bytes);
@@ -554,14 +598,14 @@ void ForeignArrays::set_constants(const std::vector<int>& ids) {
 
 void ForeignArrays::check_capacity() const {
   const int contacts = first_contact_.back() + static_cast<int>(contacts_.back().size());
-  if (max_contacts_ >= 0 && contacts > max_contacts_)
+  if (contacts > max_contacts_)
     throw ValueError(
         fmt::format("the {} worlds have {} contacts, and the data has room for {}: make it with "
                     "nconmax={} or more",
                     worlds_.size(), contacts, max_contacts_,
                     (2 * contacts + worlds_.size() - 1) / worlds_.size()));
   const auto most = std::ranges::max_element(num_constraints_);
-  if (max_constraints_ >= 0 && *most > max_constraints_)
+  if (*most > max_constraints_)
     throw ValueError(
         fmt::format("world {} has {} rows of constraints, and the data has room for {}: make it "
                     "with njmax={} or "
@@ -573,7 +617,19 @@ void ForeignArrays::run(RawCall call, const bool* mask) {
   take_model();
   call_ = call;
   mask_ = mask;
-  apply(run_world);
+  std::exception_ptr error;
+  try {
+    apply(run_world);
+  } catch (const RuntimeError&) {
+    error = std::current_exception();
+  }
+  number_contacts();
+  if (error) std::rethrow_exception(error);
+  check_capacity();
+}
+
+// Writes the contacts of all worlds, which leave no rows between them.
+void ForeignArrays::number_contacts() {
   int contacts = 0;
   for (int w = 0; w < worlds_.size(); ++w) {
     first_contact_[w] = contacts;
@@ -584,10 +640,9 @@ void ForeignArrays::run(RawCall call, const bool* mask) {
   }
   if (contacts > 0 && !contact_fields_.empty()) {
     apply([](const mjModel* m, mjData*, int w, void* argument) {
-      static_cast<const ForeignArrays*>(argument)->show_contacts(m, w);
+      static_cast<ForeignArrays*>(argument)->show_contacts(m, w);
     });
   }
-  check_capacity();
 }
 
 }  // namespace mjsense::worlds

@@ -11,6 +11,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,18 +31,20 @@ class ForeignArrays {
   ForeignArrays(const mjModel* model, int num_worlds, int threads);
 
   Worlds& worlds() { return worlds_; }
-  void clear();  // forgets all arrays
-  // World w gets values[w % size] of an option with one number, opt.impratio. Flags keep that MuJoCo
-  // does not reset diverged worlds.
+  // Forgets all arrays. The program's data has room for this many contacts of all worlds, and rows of
+  // constraints of each.
+  void clear(int max_contacts, int max_constraints);
+  // World w gets values[w % size] of an option with one number, opt.impratio. opt.disableflags always
+  // includes mjDSBL_AUTORESET.
   void set_option(const std::string& name, const std::vector<double>& values);
 
   // `rows` [B, n] shows this field of mjData; `input`: the program may also write it. Of the fields
   // efc_... a world fills as many elements as it has constraints, and efc_id has the row of a contact
-  // among those of all worlds. Returns false if MuJoCo has no such
-  // field, or one of another size or type.
+  // among those of all worlds. Returns false if MuJoCo has no such field, or one of another size or
+  // type.
   bool add_data(std::string_view field, const ArrayView& rows, bool input);
-  // `rows` [1 or B, n] has the values of this field of the model, or option (opt.gravity), for all
-  // worlds or for each. Returns false as above.
+  // Row w % R of `rows` [R, n] has the values of this field of the model, or option (opt.gravity), for
+  // world w. Returns false as above.
   bool add_model(const std::string& field, const ArrayView& rows);
   // `rows` [capacity, n] shows this field of mjContact, a row for each contact of all worlds in their
   // order. Also worldid; type (1: a contact of the physics); geomcollisionid (number of the contact
@@ -51,10 +54,13 @@ class ForeignArrays {
 
   // Takes what the program has written, calls MuJoCo's function, and writes the results. A reset is
   // for the worlds of `mask` [B], by default all, and shows only the state, accelerations and MuJoCo's
-  // sensors, as mujoco_warp's does. Throws ValueError if the worlds cannot have the model's values, or
+  // sensors, as mujoco_warp's does. mj_step2 after a step without mj_step1 calls that first. Throws ValueError if the worlds cannot have the model's values, or
   // if there are more contacts or constraints than rows for them; the arrays then show the state after
   // the call all the same. Throws RuntimeError if MuJoCo raises an error in a world.
   void run(RawCall call, const bool* mask = nullptr);
+
+  // Takes the poses of geoms that the program has written or that a reset has left, for rays.
+  void take_poses();
 
  private:
   struct Field {
@@ -64,6 +70,8 @@ class ForeignArrays {
     bool input, reset;  // written by the program; shown by a reset
     bool control;       // positions and velocities do not depend on it
     bool contact_ids;   // of contacts among those of all worlds
+    bool solved;        // of constraints: a result of the solver
+    bool poses;         // of geoms
     const void* (*pointer)(const mjData*);
     std::byte* rows;
     std::size_t row_bytes;        // distance of two rows
@@ -72,8 +80,8 @@ class ForeignArrays {
   struct ModelField {
     std::string name;
     DType type, dtype;
-    int count, num_rows;
-    bool constants;  // MuJoCo derives others from it
+    int count, num_rows;  // at most one for each world
+    bool constants;       // MuJoCo derives others from it
     const std::byte* rows;
     std::size_t row_bytes;
     std::vector<std::byte> seen;  // [num_rows, count]
@@ -89,12 +97,19 @@ class ForeignArrays {
 
   static void run_world(const mjModel* m, mjData* d, int w, void* argument);
   bool take(mjData* d, int w);
+  void take_shown(mjData* d, int w, bool poses_only) const;
   void step_in_scratch(const mjModel* m, mjData* d, int w);
   void show(const mjData* d, int w);
   void show_diverged(const mjModel* m, mjData* d, int w);
-  void show_contacts(const mjModel* m, int w) const;
+  void show_contacts(const mjModel* m, int w);
+  void number_contacts();
   void fill_scratch();
+  struct Written {
+    std::byte* place;
+    std::vector<std::byte> before;
+  };
   void take_model();
+  bool write_model(std::vector<Written>& written, std::vector<int>& derive);
   void set_constants(const std::vector<int>& ids);
   void apply(mjfBatchFunc function);
   void check_capacity() const;
@@ -103,15 +118,18 @@ class ForeignArrays {
   std::vector<Field> fields_;
   std::vector<ModelField> model_fields_;
   std::vector<ContactField> contact_fields_;
-  int max_contacts_ = -1, max_constraints_ = -1;  // rows of the arrays; -1: there are no arrays
-  // By world: its contacts, the number of its constraints, the first of them of a contact, and the row
-  // of its first contact in the arrays.
+  // Of the program's data, and rows of the arrays.
+  int max_contacts_ = std::numeric_limits<int>::max();
+  int max_constraints_ = std::numeric_limits<int>::max();
+  // By world: its contacts, the number of its constraints, the first of them of a contact, the row of
+  // its first contact in the arrays, and that row when efc_id was written.
   std::vector<std::vector<mjContact>> contacts_;
-  std::vector<int> num_constraints_, first_contact_row_, first_contact_;
+  std::vector<int> num_constraints_, first_contact_row_, first_contact_, written_first_contact_;
   ScratchData scratch_;
   std::vector<mjData*> borrowed_;  // by world; not null after a MuJoCo error
   // By world: positions and velocities are those of the state, so that a step need not compute them.
   std::vector<std::uint8_t> current_;
+  std::vector<std::uint8_t> scratched_;  // by world: its mjData has only the state of the last step
   RawCall call_ = RawCall::kStep;
   const bool* mask_ = nullptr;
 };
