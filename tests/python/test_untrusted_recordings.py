@@ -441,6 +441,13 @@ def test_a_text_of_numbers_is_named(root, tmp_path):
         mjs.Dataset(root).episodes[0].obs_scene
 
 
+def test_an_attribute_of_many_numbers_is_named_in_one_line(root):
+    with changed(file_of(root)) as file:
+        file["traj_0/success"].attrs["unit"] = np.full((20, 20), math.nan)
+    with pytest.raises(ValueError, match=r"traj_0/success: the attribute 'unit' is [^\n]*, not a text$"):
+        mjs.Dataset(root).episodes[0].streams
+
+
 def test_a_description_leaves_room_for_that_of_a_rendering(root):
     deep = "x"
     for _ in range(62):

@@ -89,7 +89,7 @@ class Attributes:
         if value is None:
             return default
         if not isinstance(value, (str, bytes)):
-            raise ValueError(f"{self._place}: the attribute '{name}' is {value!r:.50}, not a text")
+            raise ValueError(f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}, not a text")
         if len(value) > most:
             raise ValueError(f"{self._place}: the attribute '{name}' has {len(value)} bytes, more than {most}")
         return text_of(value)
