@@ -339,7 +339,7 @@ def test_every_episode_is_checked(root):
         file["traj_1/obs/extra/tcp_pose"].attrs["unit"] = np.arange(3)
     with pytest.raises(ValueError, match=r"traj_1/obs/extra/tcp_pose: the attribute 'unit' is .* not a text"):
         _ = mjs.Dataset(root).episodes[1].streams
-    assert any("traj_1/obs/extra/tcp_pose: the attribute 'unit'" in text for text in errors_of(root)), errors_of(root)
+    assert any("traj_1/obs/extra/tcp_pose 'unit' has 3 values, expected 1" in text for text in errors_of(root)), errors_of(root)
 
 
 def with_shape(place, shape, dtype):
@@ -439,6 +439,12 @@ def test_a_text_of_numbers_is_named(root, tmp_path):
         file["traj_0"].create_dataset("obs_scene", data=np.array(-1))
     with pytest.raises(ValueError, match=r"\.h5 traj_0/obs_scene is of the type int64; it must be a text$"):
         mjs.Dataset(root).episodes[0].obs_scene
+
+
+def test_a_unit_of_the_model_that_is_no_text_is_reported(root):
+    with changed(file_of(root)) as file:
+        file["traj_0/replay/model/geom_dataid"].attrs["unit"] = [-1.0]
+    assert any("replay/model/geom_dataid" in error and "'unit' is not a text" in error for error in errors_of(root)), errors_of(root)
 
 
 def test_an_attribute_of_many_numbers_is_named_in_one_line(root):

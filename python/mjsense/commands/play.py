@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.commands._page import add_page
 from mjsense.commands.parser import Parser, field_values
 
 EXAMPLES = [
@@ -29,17 +30,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--arm", default="arm", help="Move group that is driven; by default arm.")
     parser.add_argument("--gripper", default="gripper", help="Move group that is opened and closed; by default gripper.")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="Random seed of the starts.")
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every person on the network who has the printed address can watch and drive.",
-    )
-    parser.add_argument(
-        "--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one."
-    )
+    add_page(parser)
     parser.add_fields("FilesCfg")
     parser.add_fields("ImageCfg")
-    parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
 
 
 def run(arguments: argparse.Namespace) -> int:

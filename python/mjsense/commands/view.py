@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.commands._page import add_page
+
 EXAMPLES = [
     ("mjsense view pick", "Watch the planner play a task."),
     ("mjsense view pick --robot rby1 --scene kitchen --seed 3", "Another robot in another scene."),
@@ -24,15 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--world", type=int, default=0, metavar="K", help="World to show first.")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="Seed of the first episode.")
     parser.add_argument("--episode", type=int, default=0, metavar="I", help="Position of the recording's episode to show first.")
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every person on the network who has the printed address can watch and drive.",
-    )
-    parser.add_argument(
-        "--port", type=int, default=8080, help="Port of the page; if it is taken, the next free one; 0: any free one."
-    )
-    parser.add_argument("--no-open", action="store_true", help="Do not open a browser.")
+    add_page(parser)
     parser.add_argument("--export", metavar="FILE", help="Write a .viser or .rrd file instead of showing a page.")
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="Length of an export of live worlds, s.")

@@ -6,9 +6,10 @@
     data = mujoco_warp.put_data(mj_model, mj_data, nworld=1024)
     mujoco_warp.step(model, data)
 
-``step``, ``forward``, ``step1``, ``step2``, ``reset_data`` and ``rays`` then compute all worlds with MuJoCo and mjsense, on all cores, if the
-arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models with callbacks or with
-``opt.run_collision_detection=False``, they are mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
+``step``, ``forward``, ``step1``, ``step2``, ``reset_data`` and ``rays`` then compute all worlds with MuJoCo and mjsense, on all
+cores, if the arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models
+with callbacks or with ``opt.run_collision_detection=False``, they are mujoco_warp's own. All other functions are mujoco_warp's own
+everywhere, and read these arrays.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ except ImportError as error:
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-FIRST, LAST = (3, 11), (4, 0)
+_TESTED = ("3.11", "4.0")
 """The first and last series of mujoco_warp that this is tested with."""
 
 _CALLS = {"step": 0, "forward": 1, "step1": 2, "step2": 3}
@@ -75,7 +76,7 @@ _threads = 0
 
 
 def use(threads: int = 0) -> None:
-    """From now on, mujoco_warp steps worlds on the CPU with mjsense. Call it before the model is made (``mujoco_warp.put_model``).
+    """From now on, mujoco_warp steps worlds on the CPU with mjsense. Call it before ``mujoco_warp.put_model``.
 
     Modules that have imported the functions themselves use the new ones, too.
 
@@ -87,10 +88,10 @@ def use(threads: int = 0) -> None:
     """
     global _threads
     version = importlib.metadata.version("mujoco-warp")
-    series = tuple(int(part) for part in version.split(".")[:2])
-    if not FIRST <= series <= LAST:
+    first, series, last = (tuple(map(int, text.split(".")[:2])) for text in (_TESTED[0], version, _TESTED[1]))
+    if not first <= series <= last:
         raise ImportError(
-            f"mjsense.compat.mujoco_warp is tested with mujoco-warp {FIRST[0]}.{FIRST[1]} to {LAST[0]}.{LAST[1]}, and {version} is installed"
+            f"mjsense.compat.mujoco_warp is tested with mujoco-warp {' to '.join(_TESTED)}, and {version} is installed"
         )
     _threads = threads
     _replace({_OWN[name]: new for name, new in _NEW.items()})
@@ -174,7 +175,8 @@ class Worlds:
             found = getattr(data, name).shape
             if found[:2] != (data.nworld, size):
                 raise ValueError(
-                    f"this Data belongs to another model: its {name} has the shape {found[:2]}, and the model needs {(data.nworld, size)}"
+                    f"this Data belongs to another model: its {name} has the shape {found[:2]}, "
+                    f"and the model needs {(data.nworld, size)}"
                 )
 
     def _link(self) -> None:
@@ -256,7 +258,8 @@ class Worlds:
                 array = query[name] = wp.array(np.repeat(array.numpy(), self._num_worlds, axis=0), dtype=kind, device="cpu")
             if array.dtype is not kind or array.shape != shape or not array.is_contiguous or not array.device.is_cpu:
                 raise ValueError(
-                    f"rays(): {name} must be a contiguous array {shape} of {kind.__name__} on the CPU, not {array.shape} of {array.dtype.__name__} on {array.device}"
+                    f"rays(): {name} must be a contiguous array {shape} of {kind.__name__} on the CPU, "
+                    f"not {array.shape} of {array.dtype.__name__} on {array.device}"
                 )
         hidden = np.zeros(self.model.ngeom, np.uint8)
         if query["rc"] is not None:
@@ -319,7 +322,8 @@ def _reset_data(m: Any, d: Any, reset: Any = None) -> None:
         return worlds_of(m, d).run(_RESET)
     if reset.shape != (d.nworld,) or not (reset.dtype is wp.bool or wp.types.type_is_int(reset.dtype)) or not reset.device.is_cpu:
         raise ValueError(
-            f"reset_data(): reset must be an array of {d.nworld} bools or integers on the CPU, not {reset.dtype.__name__} {reset.shape} on {reset.device}"
+            f"reset_data(): reset must be an array of {d.nworld} bools or integers on the CPU, "
+            f"not {reset.dtype.__name__} {reset.shape} on {reset.device}"
         )
     mask = np.ascontiguousarray(reset.numpy() != 0)
     return worlds_of(m, d).run(_RESET, mask.ctypes.data)

@@ -155,6 +155,9 @@ class FileVerifier {
     unpacked_ += dataset.bytes();
     if (hdf5::is_bomb(unpacked_, bytes_))
       return error(context, "is not read: the file declares far more data than it contains");
+    for (const char* attribute :
+         {"unit", "frame", "description"})  // throws for one that is not a text
+      static_cast<void>(hdf5::text_attribute(dataset.id(), attribute));
     record::Checksum sum;
     if (name == "obs_scene") {
       const std::string text = hdf5::read_text(trajectory, name);

@@ -271,20 +271,20 @@ bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool
   if (!found || !converts(found->type, rows.dtype) ||
       (!found->constraints && found->count != count))
     return false;
-  fields_.push_back({found->type,
-                     rows.dtype,
-                     count,
-                     found->constraints,
-                     input,
-                     input || std::ranges::count(kReset, field) > 0,
-                     std::ranges::count(kControls, field) > 0,
-                     field == "efc_id",
-                     std::ranges::count(kSolved, field) > 0,
-                     std::ranges::count(kPoses, field) > 0,
-                     found->pointer,
-                     rows.data,
-                     static_cast<std::size_t>(rows.strides[0]),
-                     {}});
+  fields_.push_back({.type = found->type,
+                     .dtype = rows.dtype,
+                     .count = count,
+                     .constraints = found->constraints,
+                     .input = input,
+                     .reset = input || std::ranges::count(kReset, field) > 0,
+                     .control = std::ranges::count(kControls, field) > 0,
+                     .contact_ids = field == "efc_id",
+                     .solved = std::ranges::count(kSolved, field) > 0,
+                     .poses = std::ranges::count(kPoses, field) > 0,
+                     .pointer = found->pointer,
+                     .rows = rows.data,
+                     .row_bytes = static_cast<std::size_t>(rows.strides[0]),
+                     .seen = {}});
   if (found->constraints) max_constraints_ = std::min(max_constraints_, count);
   Field& added = fields_.back();
   if (!input) return true;
@@ -305,11 +305,15 @@ bool ForeignArrays::add_model(const std::string& field, const ArrayView& rows) {
   const auto count = static_cast<int>(rows.shape[1]),
              num_rows = std::min(static_cast<int>(rows.shape[0]), worlds_.size());
   if (!found || found->count != count || !converts(found->type, rows.dtype)) return false;
-  ModelField added{field,      found->type,
-                   rows.dtype, count,
-                   num_rows,   set_const_use(field).in,
-                   rows.data,  static_cast<std::size_t>(rows.strides[0]),
-                   {}};
+  ModelField added{.name = field,
+                   .type = found->type,
+                   .dtype = rows.dtype,
+                   .count = count,
+                   .num_rows = num_rows,
+                   .constants = set_const_use(field).in,
+                   .rows = rows.data,
+                   .row_bytes = static_cast<std::size_t>(rows.strides[0]),
+                   .seen = {}};
   const std::size_t bytes = count * dtype_size(rows.dtype);
   added.seen.resize(bytes * num_rows);
   for (int row = 0; row < num_rows; ++row) {
@@ -608,8 +612,7 @@ void ForeignArrays::check_capacity() const {
   if (*most > max_constraints_)
     throw ValueError(
         fmt::format("world {} has {} rows of constraints, and the data has room for {}: make it "
-                    "with njmax={} or "
-                    "more",
+                    "with njmax={} or more",
                     most - num_constraints_.begin(), *most, max_constraints_, 2 * *most));
 }
 

@@ -54,9 +54,10 @@ class ForeignArrays {
 
   // Takes what the program has written, calls MuJoCo's function, and writes the results. A reset is
   // for the worlds of `mask` [B], by default all, and shows only the state, accelerations and MuJoCo's
-  // sensors, as mujoco_warp's does. mj_step2 after a step without mj_step1 calls that first. Throws ValueError if the worlds cannot have the model's values, or
-  // if there are more contacts or constraints than rows for them; the arrays then show the state after
-  // the call all the same. Throws RuntimeError if MuJoCo raises an error in a world.
+  // sensors, as mujoco_warp's does. mj_step2 after a step without mj_step1 calls mj_step1 first. Throws
+  // ValueError if the worlds cannot have the model's values, or if there are more contacts or
+  // constraints than rows for them; the arrays then show the state after the call all the same. Throws
+  // RuntimeError if MuJoCo raises an error in a world.
   void run(RawCall call, const bool* mask = nullptr);
 
   // Takes the poses of geoms that the program has written or that a reset has left, for rays.

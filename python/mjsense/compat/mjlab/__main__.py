@@ -18,15 +18,15 @@ SCRIPTS = ("train", "play", "demo", "list_envs", "nan_viz", "export_scene")
 
 
 def main() -> int:
-    name = sys.argv[1].replace("-", "_") if len(sys.argv) > 1 else ""
+    given = sys.argv[1] if len(sys.argv) > 1 else ""
+    name = given.replace("-", "_")
     if name not in SCRIPTS:
-        wrong = (
-            f"no script '{sys.argv[1]}'{did_you_mean(name, SCRIPTS, 'there are')}\n" if name not in ("", "_h", "__help") else ""
-        )
-        print(
-            f"{wrong}usage: python -m mjsense.compat.mjlab {{{','.join(SCRIPTS)}}} [options of mjlab's script]", file=sys.stderr
-        )
-        return 2 if wrong or not name else 0
+        asks = given in ("-h", "--help")
+        if given and not asks:
+            print(f"no script '{given}'{did_you_mean(name, SCRIPTS, 'there are')}", file=sys.stderr)
+        usage = f"usage: python -m mjsense.compat.mjlab {{{','.join(SCRIPTS)}}} [options of mjlab's script]"
+        print(usage, file=sys.stdout if asks else sys.stderr)
+        return 0 if asks else 2
     os.environ["CUDA_VISIBLE_DEVICES"] = ""  # mjlab's scripts then use the CPU
     use()
     sys.argv = [f"{sys.argv[0]} {name}", *sys.argv[2:]]
