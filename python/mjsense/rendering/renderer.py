@@ -30,6 +30,7 @@ _MODEL_ARRAYS = (
     "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
     "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
     "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
+    "mat_metallic", "mat_roughness",
 )
 """The model's arrays that an image depends on and that are not in the abstract scene."""
 
