@@ -41,16 +41,17 @@ inline void find_occluders(const View& view, Part part, const float* low, const 
   }
 }
 
-// angle / sin(angle) / (2 pi) for the cosine of an angle; the error is below 1e-4.
+// angle / sin(angle) / (2 pi) of the angle between unit vectors with this cross product; the error is
+// below 1e-4.
 // E. Heitz et al., Real-Time Polygonal-Light Shading with Linearly Transformed Cosines, 2016.
-inline Float relative_arc(Float cosine) {
+inline Float relative_arc(Float cosine, Vec3f cross) {
   const Float y = abs(cosine);
   const Float a = fma(fma(splat(0.0145206f), y, splat(0.4965155f)), y, splat(0.8543985f));
   const Float b = fma(splat(4.1616724f) + y, y, splat(3.4175940f));
   const Float ratio = a / b;
   const Mask acute = splat(0.0f) < cosine;
   if (!any(~acute)) return ratio;
-  const Float sine = sqrt(max(splat(1.0f) - cosine * cosine, splat(1e-7f)));
+  const Float sine = sqrt(max(dot(cross, cross), splat(1e-14f)));
   return select(acute, ratio, splat(0.5f) / sine - ratio);
 }
 
@@ -78,7 +79,8 @@ inline Float hidden_by_box(const float* half, Vec3f p, Vec3f n) {
     Float face = zero;
     for (int c = 0; c < 4; ++c) {
       const Vec3f a = corner[c], b = corner[(c + 1) % 4];
-      face = fma(dot(cross(a, b), n), relative_arc(dot(a, b)), face);
+      const Vec3f across = cross(a, b);
+      face = fma(dot(across, n), relative_arc(dot(a, b), across), face);
     }
     // The corners turn the other way round where the point is on the negative side.
     face = select(at[axis] < zero, face, -face);

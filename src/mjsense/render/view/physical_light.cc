@@ -12,13 +12,15 @@ namespace mjsense::render {
 namespace {
 
 // Radiance of the environment, whose mean is 1, in classic units.
-constexpr double kEnvironmentLevel = 0.5;
+constexpr double kEnvironmentLevel = 0.3;
 
 double srgb_of_linear(double x) {
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
 }
 
+// K. Narkowicz, ACES Filmic Tone Mapping Curve, 2016, with the exposure of the original curve.
 double filmic(double x) {
+  x *= 0.6;
   return std::min(1.0, x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
 }
 
@@ -76,7 +78,7 @@ std::vector<std::uint32_t> make_specular_table() {
   return out;
 }
 
-// R_CE^T M R_CE for a symmetric M.
+// R^T M R.
 void turn(const double m[3][3], const float r[9], double out[3][3]) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
@@ -95,12 +97,12 @@ void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& o
                                     {k(7) / 2, k(5) / 2, 3 * k(6)}};
     const double linear[3] = {k(3), k(1), k(2)};
     double q[3][3];
-    turn(quadratic, out.r_ec, q);
+    turn(quadratic, out.r_wc, q);
     const auto set = [&](int i, double x) { out.irradiance[i][c] = static_cast<float>(x); };
     set(0, k(0) - k(6));
     for (int i = 0; i < 3; ++i) {
       double along = 0;
-      for (int a = 0; a < 3; ++a) along += linear[a] * out.r_ec[3 * a + i];
+      for (int a = 0; a < 3; ++a) along += linear[a] * out.r_wc[3 * a + i];
       set(1 + i, along);
       set(4 + i, q[i][i]);
     }
@@ -127,16 +129,9 @@ void set_physical(const PhysicalOptions& options, const double rotation[9], Phys
   out.specular_table = specular_table.data();
   out.unit = static_cast<float>(kClassicRadiance / maximum_radiance(options.exposure));
   out.occlusion_reach = options.occlusion_reach;
-  const double angle = options.environment_rotation * std::numbers::pi / 180;
-  const double c = std::cos(angle), s = std::sin(angle);
-  for (int i = 0; i < 3; ++i) {
-    out.r_ec[i] = static_cast<float>(c * rotation[i] + s * rotation[3 + i]);
-    out.r_ec[3 + i] = static_cast<float>(c * rotation[3 + i] - s * rotation[i]);
-    out.r_ec[6 + i] = static_cast<float>(rotation[6 + i]);
-  }
+  for (int i = 0; i < 9; ++i) out.r_wc[i] = static_cast<float>(rotation[i]);
   const EnvironmentLight& light = options.environment->light;
   out.radiance = &light.radiance;
-  out.shows_environment = options.shows_environment;
   const double scale = kEnvironmentLevel * options.environment_intensity * out.unit;
   out.radiance_scale = static_cast<float>(scale);
   set_irradiance(light, scale, out);
@@ -144,7 +139,7 @@ void set_physical(const PhysicalOptions& options, const double rotation[9], Phys
 
 void set_physical(const PhysicalOptions& options, float intensity, float range, ViewLight& light) {
   const double maximum = maximum_radiance(options.exposure);
-  double scale = kClassicRadiance / maximum;
+  double scale = kClassicLight * kClassicRadiance / maximum;
   if (intensity > 0) {
     scale = intensity / (std::numbers::pi * maximum);
     if (light.kind != LightKind::kDirectional) {

@@ -2,9 +2,10 @@
 #pragma once
 // Prepares views for physically based shading: tables, the environment, exposure and lights.
 //
-// The unit of MuJoCo's classic colours. A light of diffuse colour 1 gives a white matte surface that faces
-// it the radiance kClassicRadiance; emission 1 and a white skybox have that radiance too. So they are
-// white in an image with the default exposure.
+// The unit of MuJoCo's classic colours: emission 1 and a white skybox have the radiance kClassicRadiance,
+// and are white in an image with the default exposure. A light of diffuse colour 1 gives a white matte
+// surface that faces it kClassicLight of that, as if it had an intensity of 579 lux, because several
+// lights and the environment add up.
 
 #include <memory>
 
@@ -18,14 +19,14 @@ inline constexpr double kDefaultExposure = 8;  // EV at ISO 100
 // Frostbite to PBR, 2014).
 double maximum_radiance(double exposure);
 inline constexpr double kClassicRadiance = 1.2 * 256;  // cd/m^2
+inline constexpr double kClassicLight = 0.6;
 
 struct PhysicalOptions {
   bool on = false;
   double exposure = kDefaultExposure;
-  ToneMapping tone_mapping = ToneMapping::kFilmic;
+  ToneMapping tone_mapping = ToneMapping::kNeutral;
   std::shared_ptr<const Environment> environment;
-  bool shows_environment = false;  // as the background, instead of the skybox
-  double environment_intensity = 1, environment_rotation = 0;  // rotation: degrees about z
+  double environment_intensity = 1;
   float occlusion_reach = 0.5f;                                // m; 0: no ambient occlusion
 };
 

@@ -11,7 +11,7 @@
 
 namespace mjsense::render {
 
-enum class ToneMapping : std::uint8_t { kFilmic, kNeutral, kLinear };
+enum class ToneMapping : std::uint8_t { kNeutral, kFilmic, kLinear };
 
 // The tone curve is a table: value i belongs to the number x for which the bits of x + kOffset as a
 // float, shifted right by kShift, are kFirst + i. Between them it is linear. x is in [0, kEnd].
@@ -31,17 +31,17 @@ struct SpecularTable {
 
 struct PhysicalView {
   bool on = false;  // otherwise the light model is MuJoCo's classic one
-  ToneMapping tone_mapping = ToneMapping::kFilmic;
+  ToneMapping tone_mapping = ToneMapping::kNeutral;
   const float* tone_curve = nullptr;                // [ToneCurve::kValues]
   const std::uint32_t* specular_table = nullptr;    // [kRows, kStride]
   // Radiance of a white matte surface of normal n in the light of the environment: the sum of these
   // coefficients times 1, x, y, z, x^2, y^2, z^2, xy, xz, yz.
   float irradiance[10][3] = {};
-  // The environment's radiance by perceptual roughness / (levels - 1), see EnvironmentLight.
+  // The environment's radiance by perceptual roughness / (levels - 1), see EnvironmentLight
   const Texture* radiance = nullptr;
   float radiance_scale = 0;
-  float r_ec[9] = {};        // R_EC, row-major; E: the environment's frame
-  bool shows_environment = false;  // as the background; otherwise the skybox, if there is one
+  float r_wc[9] = {};        // R_WC, row-major
+  bool shows_environment = false;  // as the background, because there is no skybox
   float unit = 1;            // radiance of a colour of 1 of the skybox, haze, fog and emission
   float reflectance = 0;     // of the mirror
   // Distance up to which geoms hide the environment from each other, m; 0: they do not.

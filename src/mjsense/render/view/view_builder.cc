@@ -148,7 +148,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   view_.grid = grid;
   if (options_.physical.on) {
     set_physical(options_.physical, rotation, view_.physical);
-    view_.physical.shows_environment |= !view_.skybox;
+    view_.physical.shows_environment = !view_.skybox;
   }
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
@@ -261,7 +261,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   view_.far = scene.far;
   view_.shadows = scene.shadows;
   view_.skybox = scene.skybox;
-  view_.physical.shows_environment |= !view_.skybox;
+  view_.physical.shows_environment = !view_.skybox;
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
   int id = 0;

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <optional>
-#include <string>
 #include <string_view>
 
 #include "mjsense/core/fields/named_enum.h"
@@ -16,9 +15,9 @@ enum class Shading { kClassic, kPbr };
 constexpr std::array<std::string_view, 2> enum_names(Shading) { return {"classic", "pbr"}; }
 
 // As render::ToneMapping.
-enum class ToneMap { kFilmic, kNeutral, kLinear };
+enum class ToneMap { kNeutral, kFilmic, kLinear };
 constexpr std::array<std::string_view, 3> enum_names(ToneMap) {
-  return {"filmic", "neutral", "linear"};
+  return {"neutral", "filmic", "linear"};
 }
 
 // Options of colour images that each camera sensor has. A new one is an option of recordings and
@@ -29,9 +28,7 @@ struct RgbCfg {
   NamedEnum<Shading> shading;
   double exposure = 8;
   NamedEnum<ToneMap> tone_mapping;
-  std::string environment = "studio";
   double environment_intensity = 1;
-  double environment_rotation = 0;
   bool ambient_occlusion = true;
 };
 template <class V>
@@ -55,19 +52,11 @@ void visit_fields(V& v, RgbCfg& c) {
       .within(-10, 30)
       .decides_data();
   v("tone_mapping", c.tone_mapping,
-    "From radiance to colours. filmic: soft contrast; neutral: keeps the colours of materials; linear: "
+    "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: "
     "clips.")
       .decides_data();
-  v("environment", c.environment,
-    "Light from the surroundings: ``studio``, a neutral room; ``skybox``, the model's; or the path of "
-    "an image in latitude and longitude, ``.hdr`` or ``.exr``.")
-      .decides_data();
-  v("environment_intensity", c.environment_intensity, "Factor of the light from the surroundings.")
+  v("environment_intensity", c.environment_intensity, "Factor of the light from the surroundings, a neutral bright room.")
       .within(0, 1e6)
-      .decides_data();
-  v("environment_rotation", c.environment_rotation, "Rotation of the surroundings about z.")
-      .unit("degrees")
-      .within(-360, 360)
       .decides_data();
   v("ambient_occlusion", c.ambient_occlusion,
     "Darken the light from the surroundings where other geoms are near.")

@@ -3,16 +3,14 @@
 
 namespace mjsense::sensors {
 
-render::PhysicalOptions physical_options(const RgbCfg& cfg, const mjModel* model) {
+render::PhysicalOptions physical_options(const RgbCfg& cfg) {
   render::PhysicalOptions out;
   out.on = cfg.shading == Shading::kPbr;
   if (!out.on) return out;
   out.exposure = cfg.exposure;
   out.tone_mapping = static_cast<render::ToneMapping>(static_cast<ToneMap>(cfg.tone_mapping));
-  out.environment = render::environment(model, cfg.environment);
-  out.shows_environment = cfg.environment != "studio" && cfg.environment != "skybox";
+  out.environment = render::studio();
   out.environment_intensity = cfg.environment_intensity;
-  out.environment_rotation = cfg.environment_rotation;
   if (!cfg.ambient_occlusion) out.occlusion_reach = 0;
   return out;
 }

@@ -7,7 +7,6 @@
 
 namespace mjsense::sensors {
 
-// Loads the environment. Throws ValueError if that is not possible.
-render::PhysicalOptions physical_options(const RgbCfg& cfg, const mjModel* model);
+render::PhysicalOptions physical_options(const RgbCfg& cfg);
 
 }  // namespace mjsense::sensors
