@@ -275,10 +275,8 @@ def render(
     shadow_samples: int | None = None,
     shading: Literal["classic", "pbr"] | None = None,
     exposure: float | None = None,
-    tone_mapping: Literal["filmic", "neutral", "linear"] | None = None,
-    environment: str | None = None,
+    tone_mapping: Literal["neutral", "filmic", "linear"] | None = None,
     environment_intensity: float | None = None,
-    environment_rotation: float | None = None,
     ambient_occlusion: bool | None = None,
     brightness: float | None = None,
     num_worlds: int = 4,
@@ -330,12 +328,9 @@ def render(
         shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
             segmentation and the other images are the same. The options below belong to pbr. By default as recorded.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness. By default as recorded.
-        tone_mapping: From radiance to colours. filmic: soft contrast; neutral: keeps the colours of materials; linear:
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips. By default as recorded.
-        environment: Light from the surroundings: ``studio``, a neutral room; ``skybox``, the model's; or the path of an
-            image in latitude and longitude, ``.hdr`` or ``.exr``. By default as recorded.
-        environment_intensity: Factor of the light from the surroundings. By default as recorded.
-        environment_rotation: Rotation of the surroundings about z. By default as recorded. [degrees]
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room. By default as recorded.
         ambient_occlusion: Darken the light from the surroundings where other geoms are near. By default as recorded.
         brightness: Factor of all lights. By default as recorded.
         num_worlds: Number of episodes that are rendered in parallel.

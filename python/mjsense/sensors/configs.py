@@ -343,15 +343,10 @@ class CameraSensorCfg(SensorCfg):
     the other images are the same. The options below belong to pbr."""
     exposure: float = 8.0
     """Exposure in EV at ISO 100; 1 more halves the brightness."""
-    tone_mapping: Literal["filmic", "neutral", "linear"] = "filmic"
-    """From radiance to colours. filmic: soft contrast; neutral: keeps the colours of materials; linear: clips."""
-    environment: str = "studio"
-    """Light from the surroundings: ``studio``, a neutral room; ``skybox``, the model's; or the path of an image in
-    latitude and longitude, ``.hdr`` or ``.exr``."""
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral"
+    """From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: clips."""
     environment_intensity: float = 1.0
-    """Factor of the light from the surroundings."""
-    environment_rotation: float = 0.0
-    """Rotation of the surroundings about z. [degrees]"""
+    """Factor of the light from the surroundings, a neutral bright room."""
     ambient_occlusion: bool = True
     """Darken the light from the surroundings where other geoms are near."""
     depth_kind: Literal["planar", "ray"] = "planar"

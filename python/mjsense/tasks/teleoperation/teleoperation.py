@@ -167,10 +167,8 @@ def play(
     shadow_samples: int = 1,
     shading: Literal["classic", "pbr"] = "classic",
     exposure: float = 8.0,
-    tone_mapping: Literal["filmic", "neutral", "linear"] = "filmic",
-    environment: str = "studio",
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
     environment_intensity: float = 1.0,
-    environment_rotation: float = 0.0,
     ambient_occlusion: bool = True,
     # end of options
     seed: Seed = 0,
@@ -218,12 +216,9 @@ def play(
         shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
             segmentation and the other images are the same. The options below belong to pbr.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
-        tone_mapping: From radiance to colours. filmic: soft contrast; neutral: keeps the colours of materials; linear:
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips.
-        environment: Light from the surroundings: ``studio``, a neutral room; ``skybox``, the model's; or the path of an
-            image in latitude and longitude, ``.hdr`` or ``.exr``.
-        environment_intensity: Factor of the light from the surroundings.
-        environment_rotation: Rotation of the surroundings about z. [degrees]
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room.
         ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         Others:
         seed: Random seed of the starts.
