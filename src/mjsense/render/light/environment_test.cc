@@ -138,6 +138,19 @@ TEST(Environment, PackedColours) {
   EXPECT_EQ(unpack_rgb9e5(pack_rgb9e5(huge))[0], 65408);
 }
 
+TEST(Environment, EveryTruncatedFileIsAnError) {
+  const testing::TempDir folder;
+  const std::string path = folder.file("x.hdr");
+  std::string whole = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
+  for (int y = 0; y < 4; ++y)
+    whole += std::string("\x02\x02\x00\x08", 4) + "\x88\x40\x88\x41\x88\x42\x88\x82";
+  for (std::size_t n = 0; n <= whole.size(); ++n) {
+    std::ofstream(path, std::ios::binary) << whole.substr(0, n);
+    const std::string text = error_of<ValueError>([&] { return read_radiance_file(path); });
+    EXPECT_EQ(text.empty(), n == whole.size()) << n << " bytes: " << text;
+  }
+}
+
 constexpr char kHeader[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n";
 
 std::string error_of_file(const std::string& bytes) {
