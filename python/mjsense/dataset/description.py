@@ -23,6 +23,7 @@ _RATE = re.compile(rf"[0-9]{{1,{RATE_DIGITS}}}(/[0-9]{{1,{RATE_DIGITS}}})?")
 _PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow", "placebo")
 _TUNES = ("", "fastdecode", "zerolatency", "film", "animation", "grain", "stillimage", "psnr", "ssim")
 _PROVENANCE = (
+    "attempts",
     "batches",
     "episodes",
     "first_attempt",
