@@ -102,7 +102,7 @@ class TaskEnv(gymnasium.Env):
 def _about(infos: dict[str, Any]) -> dict[str, Any]:
     """Which episode the world plays: seed, number, house, instruction and object."""
     values = {name: rows[0] for name, rows in infos["episode_info"].items() if not name.startswith("_")}
-    return {name: value if isinstance(value, str) else int(value) for name, value in values.items()}
+    return {name: value if name in ("instruction", "object", "seed") else int(value) for name, value in values.items()}
 
 
 @checked

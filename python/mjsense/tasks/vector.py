@@ -104,7 +104,7 @@ class TaskVectorEnv(VectorEnv):
         kinds = {"seed": np.uint64, "number": np.int64, "house": np.int64, "instruction": object, "object": object}
         self._playing = {name: np.zeros(self.num_envs, kind) for name, kind in kinds.items()}
         self._ended = np.zeros(self.num_envs, bool)
-        self._ends = (self._ended, self._ended)  # terminated, truncated
+        self._ends = np.zeros(self.num_envs, bool), np.zeros(self.num_envs, bool)  # terminated, truncated
         self._started = False
         layout = self._rollout.action_layout()
         self.action_groups: dict[str, slice] = group_slices(layout)
