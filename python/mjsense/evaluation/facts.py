@@ -65,7 +65,9 @@ def warnings_of(dataset: Dataset, rows: list[Row]) -> list[str]:
     """Reasons why the success rate may not be that of the policy."""
     found = []
     if any(settings.get("keep_failures") is False for settings in settings_of(dataset)):
-        found.append("Failed episodes were not kept (keep_failures is false): the success rate is that of the kept episodes only.")
+        found.append(
+            "Failed episodes were not kept (keep_failures is false): the success rate is that of the kept episodes only."
+        )
     if len({key_of(row) for row in rows}) < len(rows):
         found.append("Some episodes are in the recording more than once.")
     return found

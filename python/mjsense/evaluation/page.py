@@ -46,7 +46,7 @@ def page_of(dataset: Dataset, rows: Sequence[Row], facts: Sequence[tuple[str, st
         (
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
             # Nothing is fetched or executed, even if a text were not escaped.
-            '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; style-src \'unsafe-inline\'; img-src data:">',
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">",
             '<meta name="viewport" content="width=device-width">',
             f"<title>{escaped(title)}</title><style>{_STYLE}</style></head><body>",
             f"<h1>{escaped(title)}</h1>",
@@ -196,7 +196,7 @@ def _episodes(rows: Sequence[Row]) -> str:
     used = {name: word for name, word in _COLUMNS.items() if any(_cell(row, name) for row in rows)}
 
     def tag(kind: str, name: str, text: str) -> str:
-        return f'<{kind}{" class=number" if name in numbers else ""}>{text}</{kind}>'
+        return f"<{kind}{' class=number' if name in numbers else ''}>{text}</{kind}>"
 
     head = "".join(tag("th", name, word) for name, word in used.items())
     lines = "".join("<tr>" + "".join(tag("td", name, _cell(row, name)) for name in used) + "</tr>" for row in rows[:_LISTED])

@@ -12,7 +12,14 @@ import numpy as np
 from mjsense.core.errors import printable
 from mjsense.evaluation.rows import Group, Row, group_of, groups_by
 
-GROUPED = {"object": "object", "scene": "scene", "split": "split", "light": "light", "house": "house", "instruction": "instruction"}
+GROUPED = {
+    "object": "object",
+    "scene": "scene",
+    "split": "split",
+    "light": "light",
+    "house": "house",
+    "instruction": "instruction",
+}
 """Columns by which successes are counted, and their words."""
 _GROUPS = 20
 """Maximum number of groups in a text."""
@@ -41,7 +48,10 @@ def figures_of(rows: Sequence[Row]) -> list[tuple[str, str]]:
     latency, jerk = _finite([row.latency_s for row in rows]), _finite([row.jerk for row in rows])
     once = sum(row.success_once for row in rows)
     shown = [
-        ("time to success, median (5 %, 95 %)", times and "{1:.1f} s ({0:.1f}, {2:.1f})".format(*np.quantile(times, (0.05, 0.5, 0.95)))),
+        (
+            "time to success, median (5 %, 95 %)",
+            times and "{1:.1f} s ({0:.1f}, {2:.1f})".format(*np.quantile(times, (0.05, 0.5, 0.95))),
+        ),
         ("success at some observation", once and f"{once} of {len(rows)}"),
         ("episodes with retries", retries and f"{sum(map(bool, retries))} of {len(retries)}"),
         ("failed by a deep contact", f"{sum(row.collision for row in rows)} of {len(rows)}"),
