@@ -7,9 +7,14 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-_PLACES: dict[str, str] = {}
+_PLACES: dict[str, str] = {
+    "Comparison": "comparison",
+    "Results": "report",
+    "compare": "comparison",
+    "results": "report",
+}
 """Module of each public name."""
-__all__: list[str] = []
+__all__ = ["Comparison", "Results", "compare", "results"]
 
 
 def __getattr__(name: str) -> Any:
