@@ -8,13 +8,30 @@ import importlib
 from typing import Any
 
 _PLACES: dict[str, str] = {
+    "Benchmark": "benchmarks",
+    "BatchedPolicy": "protocol",
     "Comparison": "comparison",
     "Results": "report",
+    "Timed": "timing",
     "compare": "comparison",
+    "create_benchmark": "benchmarks",
+    "evaluate": "playing",
+    "policy_from": "policies",
     "results": "report",
 }
 """Module of each public name."""
-__all__ = ["Comparison", "Results", "compare", "results"]
+__all__ = [
+    "BatchedPolicy",
+    "Benchmark",
+    "Comparison",
+    "Results",
+    "Timed",
+    "compare",
+    "create_benchmark",
+    "evaluate",
+    "policy_from",
+    "results",
+]
 
 
 def __getattr__(name: str) -> Any:

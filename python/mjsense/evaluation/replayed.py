@@ -33,7 +33,8 @@ class ReplayedPolicy(Policy):
     """Repeats the actions of a recording in the episodes with the same seed and number.
 
     Files contain commands as float32. If the commands of a move group are joint positions, the targets of its controller are used, which
-    are recorded as float64, and the episode repeats bit for bit. ``action_noise`` is that of the recording: the noise depends on the seed
+    are recorded as float64 except in the last step of an episode that ended before its horizon. Until then the episode repeats bit for bit.
+    ``action_noise`` is that of the recording: the noise depends on the seed
     and the episode only.
     """
 
@@ -105,9 +106,9 @@ def _recorded(episode: Episode, groups: dict[str, slice]) -> _Recorded:
                 f"replay: {commands.shape[1]} commands of move group '{name}' are recorded, but it takes {at.stop - at.start} now"
             )
         if f"{_TARGET}/{name}" in episode:
-            targets = episode[f"{_TARGET}/{name}"][1:]
-            if targets.shape == commands.shape and np.array_equal(targets[given].astype(commands.dtype), commands[given]):
-                commands = targets
+            targets, known = episode[f"{_TARGET}/{name}"][1:], episode[f"{_TARGET}/given/{name}"][1:].astype(bool)
+            if targets.shape == commands.shape and np.array_equal(targets[known].astype(commands.dtype), commands[known]):
+                commands = np.where(known[:, None], targets, commands)
         actions[given, at], hold[:, i] = commands[given], ~given
     verdicts = f"{_COMMAND}/given/success"
     success = np.full(steps, np.nan)

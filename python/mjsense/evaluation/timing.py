@@ -28,6 +28,8 @@ class _Answer:
     """Step at which the first of them can be executed."""
     actions: np.ndarray
     """``[H, n]``"""
+    hold: np.ndarray
+    """Move groups that hold their position, bool ``[G]``."""
     done: bool
     success: float
     """The policy's own verdict; NaN: none."""
@@ -101,16 +103,17 @@ class Timed(Policy):
         if due.any():
             self._ask(due)
         actions = np.zeros((self.num_worlds, len(self.action_low)))
-        hold, done = (np.zeros(self.num_worlds, bool) for _ in range(2))
+        hold, done = np.zeros((self.num_worlds, len(self.action_groups)), bool), np.zeros(self.num_worlds, bool)
         success = np.full(self.num_worlds, np.nan)
         for world in np.flatnonzero(self.wanted).tolist():
             found = self._action(world)
             if found is None:
                 hold[world] = True
                 continue
-            actions[world], last = found
-            if last is not None:
-                done[world], success[world] = last.done, last.success
+            actions[world], newest, ends = found
+            hold[world] = newest.hold
+            if ends:
+                done[world], success[world] = newest.done, newest.success
         self._mjs_step[self.wanted] += 1
         return {"action": actions, "hold": hold, "done": done, "success": success}
 
@@ -121,7 +124,7 @@ class Timed(Policy):
         given = self.policy.act(self._mjs_seen)
         seconds = time.perf_counter() - begun if self.latency == "measured" else float(self.latency)
         self.phase, self.num_retries = self.policy.phase, self.policy.num_retries
-        chunk, done, success = self._read(given)
+        chunk, hold, done, success = self._read(given)
         executed = self.execution_horizon or chunk.shape[1]
         if executed > chunk.shape[1]:
             raise ValueError(
@@ -130,12 +133,13 @@ class Timed(Policy):
         late = math.ceil(seconds / self.sim.step_dt - 1e-9)
         self._mjs_delays[due] = seconds
         for world in np.flatnonzero(due).tolist():
-            answer = _Answer(int(self._mjs_step[world]) + late, chunk[world], bool(done[world]), float(success[world]))
-            self._mjs_answers[world].append(answer)
+            self._mjs_answers[world].append(
+                _Answer(int(self._mjs_step[world]) + late, chunk[world], hold[world], bool(done[world]), float(success[world]))
+            )
         self._mjs_next[due] = self._mjs_step[due] + executed
 
-    def _action(self, world: int) -> tuple[np.ndarray, _Answer | None] | None:
-        """The action of this step ``[n]``, and the answer that ends with it; None: there is none."""
+    def _action(self, world: int) -> tuple[np.ndarray, _Answer, bool] | None:
+        """The action of this step ``[n]``, the newest answer, and whether its last executed action is this one; None: there is no action."""
         step, answers = int(self._mjs_step[world]), self._mjs_answers[world]
         arrived = [answer for answer in answers if answer.arrival <= step < answer.arrival + len(answer.actions)]
         while answers and answers[0].arrival + len(answers[0].actions) <= step + 1:
@@ -149,13 +153,15 @@ class Timed(Policy):
         else:
             weights = np.exp(-self.ensemble * np.arange(len(arrived)))
             action = (weights / weights.sum()) @ np.stack([answer.actions[step - answer.arrival] for answer in arrived])
-        return action, newest if ends else None
+        return action, newest, ends
 
-    def _read(self, given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Actions ``[B, H, n]``, done ``[B]`` and success ``[B]``, of what ``act`` returned."""
+    def _read(self, given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Actions ``[B, H, n]``, hold ``[B, G]``, done ``[B]`` and success ``[B]``, of what ``act`` returned."""
         groups = dict(given) if isinstance(given, Mapping) else {"action": given}
         done = np.array(groups.pop("done", np.zeros(self.num_worlds)), bool)
         success = np.array(groups.pop("success", np.full(self.num_worlds, np.nan)), float)
+        hold = np.zeros((self.num_worlds, len(self.action_groups)), bool)
+        hold |= np.array(groups.pop("hold", False), bool).reshape(-1, 1) if np.ndim(groups.get("hold", 0)) < 2 else groups.pop("hold")
         if "action" in groups:
             chunk = self._chunk("", groups.pop("action"), len(self.action_low))
         elif missing := self.action_groups.keys() - groups.keys():
@@ -168,7 +174,7 @@ class Timed(Policy):
             chunk = np.concatenate(list(parts.values()), -1)
         if groups:
             raise ValueError(f"policy '{self.name}': act() returned '{min(groups)}', which is not a move group")
-        return chunk, done, success
+        return chunk, hold, done, success
 
     def _chunk(self, group: str, values: Any, width: int) -> np.ndarray:
         array = np.array(values, np.float64)
