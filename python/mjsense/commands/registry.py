@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "record": "Record episodes of a task.",
+    "evaluate": "Evaluate a policy: play episodes, record them, count successes.",
+    "benchmark": "Fix the episodes of an evaluation in a folder, or check them.",
     "sensors": "List the sensors of a scene or task: shapes, units, frames and cost.",
     "scan": "Write the point cloud that a lidar measures in a scene.",
     "inspect": "Show the contents and statistics of a recording.",

@@ -38,9 +38,9 @@ RECIPE = (*_PARTS, *_IMAGES, *_PLAY)
 _NAME = re.compile(r"[A-Za-z0-9_-]{0,100}(/[A-Za-z0-9_-]{1,100})*(@[a-z]{1,20})?(:[0-9]{1,9})?")
 
 
-def is_benchmark(task: Any) -> bool:
-    """Whether this is the folder of a benchmark, not a task."""
-    return isinstance(task, (str, Path)) and (Path(task) / FILE).is_file()
+def is_folder(task: Any) -> bool:
+    """Whether this is a folder, and not the name of a task."""
+    return isinstance(task, Path) or (isinstance(task, str) and (os.sep in task or os.path.isdir(task)))
 
 
 class Benchmark:
@@ -49,6 +49,8 @@ class Benchmark:
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
         path = self.folder / FILE
+        if not path.is_file():
+            raise FileNotFoundError(f"benchmark: '{self.folder}' has no {FILE}")
         with open(path, "rb") as file:
             text = file.read(_FILE_BYTES + 1)
         table = bounded_json.parse_object(text, str(path), _FILE_BYTES)

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from mjsense import _core
 from mjsense.core.arguments import Seed, checked
-from mjsense.evaluation.benchmarks import Benchmark, is_benchmark
+from mjsense.evaluation.benchmarks import Benchmark, is_folder
 from mjsense.evaluation.facts import FILE
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.replayed import ReplayedPolicy
@@ -183,14 +183,14 @@ def play(
     """
     require_parquet()
     out, spec = Path(options["out"]), policy if isinstance(policy, str) else None
-    benchmark = Benchmark(options["task"]) if is_benchmark(options["task"]) else None
+    benchmark = Benchmark(options["task"]) if is_folder(options["task"]) else None
     numbers: int | Sequence[int] = options.pop("episodes", 50)
     if benchmark is not None:
         options, numbers = benchmark.options(options), benchmark.episodes
     made = policy_from(policy, **(policy_options or {}))
     noise = False
     if isinstance(made, ReplayedPolicy):
-        made.check(_settings(options))
+        made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
         noise = bool(made.settings.get("action_noise", False))
     timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
     if any(value is not None for value in timing.values()):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,12 +54,15 @@ class ReplayedPolicy(Policy):
     def fingerprint(self) -> str:
         return str([(e.seed, e.number, e.length, e.outcome) for e in self.data.episodes])
 
-    def check(self, settings: dict[str, Any]) -> None:
-        """Raises ValueError if the recording was made with other settings, which are given by their names."""
+    def check(self, settings: dict[str, Any], numbers: Iterable[int]) -> None:
+        """Raises ValueError if the recording was made with other settings, which are given by their names, or lacks one of these
+        episodes."""
         for name, value in settings.items():
             recorded = self.settings.get(name, value)
             if recorded != value:
                 raise ValueError(f"replay: '{self.path}' was recorded with {name} = {recorded!r}, but it would be {value!r} now")
+        if missing := set(numbers) - {number for _, number in self.episodes}:
+            raise ValueError(f"replay: '{self.path}' has no episode {min(missing)}; {self._contents()}")
 
     def initialize(self) -> None:
         self._step = np.zeros(self.num_worlds, np.int64)
