@@ -192,6 +192,7 @@ def play(
     if isinstance(made, ReplayedPolicy):
         made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
         noise = bool(made.settings.get("action_noise", False))
+    execution_horizon = execution_horizon or getattr(made, "execution_horizon", None)
     timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
     if any(value is not None for value in timing.values()):
         if not isinstance(made, Policy):
