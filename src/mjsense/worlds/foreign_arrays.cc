@@ -96,6 +96,21 @@ std::optional<ModelFieldType> model_field(const mjModel* m, std::string_view fie
   return std::nullopt;
 }
 
+// Of model_field().
+const void* model_values(const mjModel& m, std::string_view field) {
+#define X(T, name, nr, nc) \
+  if (field == #name) return m.name;
+  MJMODEL_POINTERS
+#undef X
+#define X(T, name, n) \
+  if (field == "opt." #name) return &m.opt.name;
+#define XVEC X
+  MJOPTION_FIELDS
+#undef XVEC
+#undef X
+  return nullptr;
+}
+
 // How mj_setConst() uses a field of the model.
 struct SetConst {
   bool in = false, out = false;
@@ -314,22 +329,25 @@ bool ForeignArrays::add_model(const std::string& field, const ArrayView& rows) {
                    .rows = rows.data,
                    .row_bytes = static_cast<std::size_t>(rows.strides[0]),
                    .seen = {}};
-  const std::size_t bytes = count * dtype_size(rows.dtype);
+  const std::size_t element = dtype_size(rows.dtype), bytes = count * element;
   added.seen.resize(bytes * num_rows);
-  for (int row = 0; row < num_rows; ++row) {
-    const mjModel mine = worlds_.model_of(row);
-    const void* values = nullptr;
-#define X(T, name, nr, nc) \
-  if (field == #name) values = mine.name;
-    MJMODEL_POINTERS
-#undef X
-#define X(T, name, n) \
-  if (field == "opt." #name) values = &mine.opt.name;
-#define XVEC X
-    MJOPTION_FIELDS
-#undef XVEC
-#undef X
-    show_elements(values, found->type, added.seen.data() + row * bytes, rows.dtype, count);
+  std::vector<std::byte> shown(bytes);
+  for (int w = 0; w < worlds_.size(); ++w) {
+    const mjModel mine = worlds_.model_of(w);
+    const void* values = model_values(mine, field);
+    std::byte* seen = added.seen.data() + w % num_rows * bytes;
+    if (w < num_rows) {
+      show_elements(values, found->type, seen, rows.dtype, count);
+      continue;
+    }
+    if (values == model_values(*m, field)) continue;
+    // Elements that differ between the worlds of a row are the program's from now on.
+    const std::byte* now = added.rows + w % num_rows * added.row_bytes;
+    show_elements(values, found->type, shown.data(), rows.dtype, count);
+    for (std::size_t i = 0; i < bytes; i += element) {
+      if (std::memcmp(&shown[i], seen + i, element) != 0)
+        std::transform(now + i, now + i + element, seen + i, [](std::byte b) { return ~b; });
+    }
   }
   model_fields_.push_back(std::move(added));
   return true;
