@@ -129,7 +129,6 @@ class Renderer:
     ) -> None:
         import mujoco
 
-        self._checked_size(height, width)
         self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
 
     @classmethod
@@ -152,7 +151,7 @@ class Renderer:
         self._mujoco = mujoco
         self._version = tuple(int(x) for x in mujoco.mj_versionString().split(".")[:2])
         self._model = model
-        self._height, self._width = int(height), int(width)
+        self._height, self._width = self._checked_size(height, width)
         self._scene = scene
         self._scene_option = mujoco.MjvOption()
         self._fixed_camera = -1
@@ -319,13 +318,17 @@ class Renderer:
         if not _has_poses(data):
             self._warn(f"{_NO_POSES} before update_scene()")
 
-    def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
+    def check_data(self, data: mujoco.MjData) -> None:
+        """Raises the errors of ``update_scene`` for `data` and the model, for callers that update the scene themselves."""
         self._opened()
         self._check_sizes(self._model, "the model has changed")
         owner = getattr(data, "model", self._model)
         if owner is not self._model:
             self._check_sizes(owner, "`data` belongs to another model")
         self._native.check_indices()
+
+    def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
+        self.check_data(data)
         mujoco, view = self._mujoco, self._camera(camera)
         self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
         # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.
