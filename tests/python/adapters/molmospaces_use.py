@@ -12,6 +12,7 @@ os.environ["MUJOCO_GL"] = "disable"
 
 import importlib.metadata
 import re
+import subprocess
 import sys
 import tempfile
 import threading
@@ -19,13 +20,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import gymnasium
-import h5py
 import mujoco
 import numpy as np
 from molmo_spaces.env.abstract_sensors import Sensor, SensorSuite
 from molmo_spaces.env.camera_manager import Camera
 from molmo_spaces.env.env import CPUMujocoEnv
-from molmo_spaces.env.sensors_cameras import CameraSensor, DepthSensor
+from molmo_spaces.env.sensors_cameras import CameraParameterSensor, CameraSensor, DepthSensor
 from molmo_spaces.renderer.opengl_rendering import MjOpenGLRenderer
 from molmo_spaces.utils.save_utils import prepare_episode_for_saving, save_trajectories
 
@@ -138,26 +138,23 @@ assert not env._renderer._textures_need_upload
 sensors = suite(type("Qpos", (Sensor,), {"get_observation": lambda *a, **k: np.arange(3.0)})("qpos", SPACE))
 for name in ("qvel", "actions/joint_pos"):
     sensors.sensors[name] = type("Zero", (Sensor,), {"get_observation": lambda *a, **k: np.zeros(3)})(name, SPACE)
+sensors.add(CameraParameterSensor("left_camera", (64, 48), "sensor_param_left_camera"))
 history = {
     "observations": [[sensors.get_observations(env=env, task=None)] for _ in range(5)],
     "rewards": [[0.5]] * 5,
     "truncateds": [[False]] * 5,
     "successes": [[False]] * 4 + [[True]],
-    "obs_scene": {"text": "push the ball"},
+    "obs_scene": {"text": "push the ball", "policy_dt_ms": 100.0},
 }
 with tempfile.TemporaryDirectory() as folder:
     house = Path(folder, "house_0")
     episode = prepare_episode_for_saving(history, sensors, 10.0, str(house), 0, "_batch_1_of_1")
     save_trajectories([episode], str(house), 10.0, "_batch_1_of_1")
-    print(sorted(path.name for path in house.iterdir()))
-    with h5py.File(house / "trajectories_batch_1_of_1.h5") as file:
-        names = []
-        file.visit(names.append)
-        print(names)
-    read = mjsense.Dataset(folder)
-    print(read)
-    episode = read[0]
-    print(sorted(episode.streams))
+    assert subprocess.run([sys.executable, "-m", "mjsense", "repair", folder], check=False).returncode == 0
+    episode = mjsense.Dataset(folder)[0]
+    assert episode.success and episode.fps == 10
+    np.testing.assert_array_equal(episode["obs/agent/qpos"], np.tile(np.arange(3.0), (5, 1)))
+    np.testing.assert_array_equal(episode["rewards"], np.full(5, 0.5, np.float32))
 
 env.close()
 with open("/proc/self/maps") as maps:
