@@ -51,6 +51,16 @@ def expect(error, message, function, *args, **kwargs):
         raise AssertionError(f"no error with {message!r}")
 
 
+sites = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><camera pos="0 0 3"/><geom type="box" size=".3 .3 .1"/>
+    <body pos=".6 0 0"><geom size=".2"/><site name="mark" pos="0 .5 0" size=".2"/></body></worldbody></mujoco>""")
+with_sites = mujoco.MjData(sites)
+mujoco.mj_forward(sites, with_sites)
+shown = MjOpenGLRenderer(model=sites, width=64, height=48)
+shown.update(with_sites, 0, mujoco.MjvOption())
+shown.enable_segmentation_rendering()
+found = {tuple(each) for each in shown.render().reshape(-1, 3).tolist()}
+assert found == {(-1, -1, -1), (0, 5, 0), (1, 5, 1), (0, 6, 1)}, found
+
 # Errors.
 other = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body><geom size='1'/></body></worldbody></mujoco>")
 other_data = mujoco.MjData(other)
@@ -151,7 +161,7 @@ with tempfile.TemporaryDirectory() as folder:
     episode = prepare_episode_for_saving(history, sensors, 10.0, str(house), 0, "_batch_1_of_1")
     save_trajectories([episode], str(house), 10.0, "_batch_1_of_1")
     assert subprocess.run([sys.executable, "-m", "mjsense", "repair", folder], check=False).returncode == 0
-    episode = mjsense.Dataset(folder)[0]
+    episode = mjsense.Dataset(folder).episodes[0]
     assert episode.success and episode.fps == 10
     np.testing.assert_array_equal(episode["obs/agent/qpos"], np.tile(np.arange(3.0), (5, 1)))
     np.testing.assert_array_equal(episode["rewards"], np.full(5, 0.5, np.float32))

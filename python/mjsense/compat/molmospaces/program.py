@@ -111,7 +111,7 @@ def _own_method(instance: Any, name: str) -> Any:
 # -------------------------------------------------------------------------------------------- methods of the renderers
 
 
-def __init__(  # noqa: N807  # replaces the constructor
+def __init__(
     self: Any,
     model_bindings: Any = None,
     device_id: int | None = None,
@@ -223,13 +223,19 @@ def _with_bodies(model: Any, found: np.ndarray) -> np.ndarray:
     """int32 [H, W, 3], object id, type and id of the body, -1 for objects that belong to no body, of [H, W, 2]."""
     import mujoco
 
-    image = np.empty((*found.shape[:2], 3), np.int32)
-    image[..., :2] = found
-    ids, types = found[..., 0], found[..., 1]
-    image[..., 2] = np.append(model.geom_bodyid, -1)[np.where(types == int(mujoco.mjtObj.mjOBJ_GEOM), ids, -1)]
-    site = types == int(mujoco.mjtObj.mjOBJ_SITE)
-    if site.any():
-        image[..., 2][site] = model.site_bodyid[ids[site]]
+    geom, site = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_SITE)
+    # A row for each geom, after one for pixels that show nothing; several times as fast as the three channels one by one.
+    rows = np.full((model.ngeom + 1, 3), -1, np.int32)
+    rows[1:, 0], rows[1:, 1], rows[1:, 2] = np.arange(model.ngeom), geom, model.geom_bodyid
+    both = found.view("<i8")[..., 0]  # the type in the upper half
+    at = both - ((geom << 32) - 1)
+    image = rows.take(at, axis=0, mode="clip")
+    others = ((at < 1) | (at > model.ngeom)) & (both != -1)
+    if others.any():
+        ids, types = found[others].T
+        bodies = np.full_like(ids, -1)
+        bodies[types == site] = model.site_bodyid[ids[types == site]]
+        image[others] = np.stack([ids, types, bodies], axis=1)
     return image
 
 
