@@ -27,6 +27,7 @@ class Shot:
     size: tuple[int, int]
     kinds: tuple[Any, ...] = ("rgb",)
     shadows: bool = True
+    shading: str = "classic"
 
 
 class Ours:
@@ -42,6 +43,7 @@ class Ours:
                 height=shot.size[1],
                 data_types=shot.kinds,
                 use_shadows=shot.shadows,
+                shading=shot.shading,
             )
             for i, shot in enumerate(shots)
         ]

@@ -28,7 +28,8 @@ struct Environment {
 };
 
 // An environment without colour whose radiance depends only on z of the direction.
-std::shared_ptr<const Environment> upright_environment(const std::function<double(double)>& radiance);
+std::shared_ptr<const Environment> upright_environment(
+    const std::function<double(double)>& radiance);
 
 // A bright room: a floor, walls, and a wide lamp above. A white matte surface has a mean radiance of 1.
 std::shared_ptr<const Environment> studio();
