@@ -29,6 +29,8 @@ COMMANDS = {
     "replay": "Replay recorded episodes and report every difference.",
     "render": "Render recorded episodes with other cameras and sensors.",
     "quality": "Show how recorded episodes were performed: idle share, jerk, approach, visibility.",
+    "results": "Show the success rates of an evaluation or recording, and write a table and a report.",
+    "compare": "Compare two policies on the same episodes.",
     "dataset": "Delete episodes of recordings, split them, merge them.",
     "export": "Write a recording in the format of another program.",
     "import": "Write a data set of another program as a recording.",
