@@ -9,7 +9,7 @@ import os
 import statistics
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import camera_scenes
 import harness  # noqa: F401  adds the measured build to sys.path
@@ -27,7 +27,7 @@ class Shot:
     size: tuple[int, int]
     kinds: tuple[Any, ...] = ("rgb",)
     shadows: bool = True
-    shading: str = "classic"
+    shading: Literal["classic", "pbr"] = "classic"
 
 
 class Ours:

@@ -33,8 +33,12 @@ def main() -> None:
     for name in views:
         view = VIEWS[name]
         print(f"{name}: {camera_scenes.describe(camera_scenes.compiled(view.scene))}", file=sys.stderr)
-        kinds = (("rgb",), True), (("rgb",), False), (("depth",), False), (("rgb",), True, "pbr")
-        ours = Ours(view, [Shot(size, *kind) for size in sizes for kind in kinds], WORLDS, threads=1)
+        shots = [
+            shot
+            for size in sizes
+            for shot in (Shot(size), Shot(size, shadows=False), Shot(size, ("depth",), False), Shot(size, shading="pbr"))
+        ]
+        ours = Ours(view, shots, WORLDS, threads=1)
         for index, size in enumerate(sizes):
             case = f"{view.label}, {size[0]}x{size[1]}"
             shadows, plain, depth, physical = (ours.rate(4 * index + kind) for kind in range(4))
