@@ -30,6 +30,7 @@ _MODEL_ARRAYS = (
     "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
     "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
     "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
+    "mat_metallic", "mat_roughness",
 )
 """The model's arrays that an image depends on and that are not in the abstract scene."""
 
@@ -157,6 +158,7 @@ class Renderer:
         self._fixed_camera = -1
         """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
         self._depth = self._segmentation = self._point_lights = False
+        self._shading = "classic"
         self._sizes = self._sizes_of(model)
         flag = mujoco.mjtRndFlag
         self._flags = {
@@ -225,6 +227,17 @@ class Renderer:
     @point_lights.setter
     def point_lights(self, value: bool) -> None:
         self._point_lights = bool(value)
+
+    @property
+    def shading(self) -> str:
+        """``"classic"``, the default: MuJoCo's light model; or ``"pbr"``: physically based colours, as those of cameras with ``shading="pbr"``. Depth and
+        segmentation are the same."""
+        return self._shading
+
+    @shading.setter
+    def shading(self, value: str) -> None:
+        self._opened().set_shading(value)
+        self._shading = value
 
     @property
     def height(self) -> int:
@@ -431,6 +444,8 @@ class Renderer:
             renderer = pool.take()
             try:
                 renderer._point_lights = self._point_lights
+                if renderer._shading != self._shading:
+                    renderer.shading = self._shading
                 renderer._update(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
             except ValueError as error:
