@@ -283,7 +283,7 @@ def test_help_describes_flags(mjsense):
 
 
 @pytest.mark.parametrize("words, expected", (
-    (["re"], ["record", "repair", "replay", "render"]),
+    (["re"], ["record", "repair", "replay", "render", "results"]),
     (["record", "door"], ["door_opening"]),
     (["record", "--robot", "fra"], ["franka", "franka_hand"]),
     (["record", "--meshes", ""], ["auto", "shapes", "real"]),

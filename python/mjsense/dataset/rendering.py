@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -273,6 +273,11 @@ def render(
     shadows: bool | None = None,
     samples: int | None = None,
     shadow_samples: int | None = None,
+    shading: Literal["classic", "pbr"] | None = None,
+    exposure: float | None = None,
+    tone_mapping: Literal["neutral", "filmic", "linear"] | None = None,
+    environment_intensity: float | None = None,
+    ambient_occlusion: bool | None = None,
     brightness: float | None = None,
     num_worlds: int = 4,
     threads: int = 0,
@@ -320,6 +325,13 @@ def render(
         shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points. By default as
             recorded.
+        shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
+            segmentation and the other images are the same. The options below belong to pbr. By default as recorded.
+        exposure: Exposure in EV at ISO 100; 1 more halves the brightness. By default as recorded.
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
+            clips. By default as recorded.
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room. By default as recorded.
+        ambient_occlusion: Darken the light from the surroundings where other geoms are near. By default as recorded.
         brightness: Factor of all lights. By default as recorded.
         num_worlds: Number of episodes that are rendered in parallel.
         threads: Number of threads; 0: one per available CPU.

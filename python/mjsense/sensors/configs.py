@@ -338,6 +338,17 @@ class CameraSensorCfg(SensorCfg):
     shadow_samples: int = 1
     """Points of each light at which its shadows are computed, within the ball of its ``bulbradius``; more than 1 gives
     soft shadows and takes longer. A view has at most 32 lights and points."""
+    shading: Literal["classic", "pbr"] = "classic"
+    """classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth, segmentation and
+    the other images are the same. The options below belong to pbr."""
+    exposure: float = 8.0
+    """Exposure in EV at ISO 100; 1 more halves the brightness."""
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral"
+    """From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: clips."""
+    environment_intensity: float = 1.0
+    """Factor of the light from the surroundings, a neutral bright room."""
+    ambient_occlusion: bool = True
+    """Darken the light from the surroundings where other geoms are near."""
     depth_kind: Literal["planar", "ray"] = "planar"
     """planar: distance to the camera plane; ray: distance along the pixel's ray."""
     intrinsics: CameraIntrinsics | None = None

@@ -467,6 +467,11 @@ def make_vec(
     shadows: bool = True,
     samples: int = 1,
     shadow_samples: int = 1,
+    shading: Literal["classic", "pbr"] = "classic",
+    exposure: float = 8.0,
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
+    environment_intensity: float = 1.0,
+    ambient_occlusion: bool = True,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
     policy_dt_ms: int | None = None,
@@ -518,6 +523,13 @@ def make_vec(
         samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
         shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
+        shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
+            segmentation and the other images are the same. The options below belong to pbr.
+        exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
+            clips.
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room.
+        ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.

@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -165,6 +165,11 @@ def play(
     shadows: bool = True,
     samples: int = 1,
     shadow_samples: int = 1,
+    shading: Literal["classic", "pbr"] = "classic",
+    exposure: float = 8.0,
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
+    environment_intensity: float = 1.0,
+    ambient_occlusion: bool = True,
     # end of options
     seed: Seed = 0,
     host: str = "127.0.0.1",
@@ -208,6 +213,13 @@ def play(
         samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
         shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
+        shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
+            segmentation and the other images are the same. The options below belong to pbr.
+        exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
+            clips.
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room.
+        ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         Others:
         seed: Random seed of the starts.
         host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with the printed

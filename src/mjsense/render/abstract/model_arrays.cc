@@ -155,6 +155,8 @@ std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays) {
   m.nmat = MJSENSE_READ(mat_texid, mjNTEXROLE);
   MJSENSE_READ(mat_texuniform, 0, m.nmat);
   MJSENSE_READ(mat_texrepeat, 2, m.nmat);
+  if (fields.has("mat_metallic")) MJSENSE_READ(mat_metallic, 0, m.nmat);
+  if (fields.has("mat_roughness")) MJSENSE_READ(mat_roughness, 0, m.nmat);
   return model;
 }
 

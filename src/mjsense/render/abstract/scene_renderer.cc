@@ -114,7 +114,10 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                     .haze = scene.haze,
                     .fog = scene.fog ? settings_.fog : Fog{},
                     .projected_textures = settings_.projected_textures,
-                    .sized_soft_textures = settings_.sized_soft_textures};
+                    .sized_soft_textures = settings_.sized_soft_textures,
+                    .physical = images.rgb && physical_.on ? &physical_ : nullptr,
+                    .intensities = intensities_,
+                    .ranges = ranges_};
     const View& built = builder_->build(view, position_, rotation_, grid_);
     kept_.render(built, images, tiles_, memory_->scratch());
   };
@@ -195,6 +198,8 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       out.material.uniform = model_->mat_texuniform[geom.matid] != 0;
     }
     if (colored) out.texture = assets_.texture(texture);
+    if (model_->mat_metallic) out.material.metallic = model_->mat_metallic[geom.matid];
+    if (model_->mat_roughness) out.material.roughness = model_->mat_roughness[geom.matid];
   }
   rays::RayGeom& shape = out.shape;
   shape.type = geom.type;
@@ -483,6 +488,8 @@ static void limit_shadows(const SceneSettings& settings, float cutoff, ViewLight
 // other types than spot and directional, so that it is OpenGL's default: the camera's direction.
 void SceneRenderer::read_lights(const SceneMemory& scene) {
   lights_.clear();
+  intensities_.clear();
+  ranges_.clear();
   for (int i = 0; i < std::min(scene.num_lights, kClassicLights); ++i) {
     AbstractLight light;
     light_reader_.read(scene.lights + i * scene.light_stride, light);
@@ -500,6 +507,8 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
           fmt::format("light {} of the scene has a pose or colour that is not finite", i));
     ViewLight& out = lights_.emplace_back();
     out = {};
+    intensities_.push_back(light.intensity);
+    ranges_.push_back(light.range);
     out.kind = directional ? LightKind::kDirectional : LightKind::kSpot;
     out.casts_shadows = light.castshadow != 0;
     std::copy_n(light.pos, 3, out.pos);

@@ -79,6 +79,9 @@ class SceneRenderer {
     kept_.clear();
   }
   PreparedAssets prepared() const { return assets_.prepared(); }
+  // The arrays that an image depends on.
+  const mjModel* model() const { return model_.get(); }
+  void set_physical(const PhysicalOptions& options) { physical_ = options; }
 
  private:
   struct Soft;
@@ -96,6 +99,7 @@ class SceneRenderer {
   std::unique_ptr<mjModel> model_;
   std::unique_ptr<mjModel> indices_;  // model_ with what only MuJoCo reads
   SceneSettings settings_;
+  PhysicalOptions physical_;
   StructReader geom_reader_, light_reader_, camera_reader_;
   SoftArrays soft_;
   SceneAssets assets_;
@@ -104,6 +108,7 @@ class SceneRenderer {
   std::vector<DrawnGeom> drawn_;
   std::vector<std::pair<int, int>> segments_;  // object id and type by segmentation id
   std::vector<ViewLight> lights_;
+  std::vector<float> intensities_, ranges_;  // by light
   double position_[3], rotation_[9];
   PixelGrid grid_;
   float near_ = 0, far_ = 0;

@@ -7,6 +7,7 @@
 //   light   attenuation * spot * (ambient + diffuse + specular)
 //   colour  clamp(texture * (base + sum over lights with shadows, where lit, of clamp(light)))
 
+#include "mjsense/render/kernels/ambient_occlusion.h"
 #include "mjsense/render/kernels/shadow_rays.h"
 #include "mjsense/render/kernels/surfaces.h"
 
@@ -67,6 +68,10 @@ inline LightTerm light_term(const ViewLight& light, const Surfaces& s, int k) {
   const Float inverse = one / distance;
   const Vec3f l{offset.x * inverse, offset.y * inverse, offset.z * inverse};
   Float scale = attenuation(light, distance);
+  if (light.range > 0) {  // glTF 2.0, KHR_lights_punctual
+    const Float part = distance * splat(1 / light.range), part2 = part * part;
+    scale = scale * max(one - part2 * part2, zero);
+  }
   if (light.kind == LightKind::kSpot) {
     const Float cosine = -dot(l, splat(light.dir));
     const Mask outside = cosine < splat(light.cos_cutoff);
@@ -136,18 +141,24 @@ inline void add_light(const ViewLight& light, const LightTerm& term, const Surfa
   }
 }
 
-// Shadow casters of a tile, per light. In a layered view, the fixed lanes of a packet already store
+// Shadow casters of a tile, per light, and what hides the environment from it. In a layered view, the fixed lanes of a packet already store
 // which of them are shadowed by fixed geoms.
 struct Shadows {
   // If the view is not layered, all casters are in `moving`.
   Casters fixed[kMaxLights], moving[kMaxLights];
   const FixedTile* known = nullptr;
+  Occluders near;
   // State of the current packet:
   int packet = 0;
   std::uint32_t fixed_lanes = 0;
   bool settled = false;                    // all lanes show fixed geoms and settled_dark is valid
   std::uint32_t settled_dark[kMaxLights];  // dark lanes, per light
 };
+
+// Whether the colour of a surface depends on other geoms.
+inline bool needs_others(const View& view) {
+  return view.shadows || view.physical.occlusion_reach > 0;
+}
 
 // Lanes that light `index` does not reach: in shadow, or facing away.
 inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, const Surfaces& s,
@@ -192,8 +203,8 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
 }
 
 // Computes the colours (0..1) of `lanes`. `shadows`: null to ignore shadows.
-inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
-                  Shadows* shadows, Colors& out) {
+inline void shade_classic(const View& view, const Surfaces& s, const Hits& hits,
+                          std::uint32_t lanes, Shadows* shadows, Colors& out) {
   Colors separate;
   if (shadows) separate = {};
   for (int c = 0; c < 3; ++c)

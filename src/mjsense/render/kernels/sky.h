@@ -2,7 +2,7 @@
 #pragma once
 // Background of a packet: the skybox, and the haze in front of it. Part of the tile kernels.
 
-#include "mjsense/render/kernels/shading.h"
+#include "mjsense/render/kernels/physical_shading.h"
 
 namespace mjsense::render {
 namespace {
@@ -10,6 +10,17 @@ namespace {
 // How far the sky's cylinder is in the direction `w` (world frame), as a divisor of its radius.
 inline Float cylinder_reach(const Vec3f& w) {
   return max(sqrt(fma(w.x, w.x, w.y * w.y)), abs(w.z));
+}
+
+// Replaces the colours of the skybox in the direction d (camera frame) by radiance.
+inline void find_sky_radiance(const View& view, Vec3f d, Float* parts) {
+  const PhysicalView& p = view.physical;
+  for (int c = 0; c < 3; ++c) parts[c] = srgb_to_linear(parts[c]) * splat(p.unit);
+  if (!p.shows_environment) return;
+  const Radiance seen = environment_radiance(*p.radiance, from_geom(p.r_wc, d), splat(0.0f));
+  parts[0] = seen.r * splat(p.radiance_scale);
+  parts[1] = seen.g * splat(p.radiance_scale);
+  parts[2] = seen.b * splat(p.radiance_scale);
 }
 
 inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
@@ -30,7 +41,8 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
       color = sample_cube(*view.skybox, m, CubeFace({w.x, w.z, -w.y}),
                           splat(0.5f * step * view.skybox->width[0]));
     const Float scale = splat(1.0f / 255);
-    const Float parts[3] = {color.r * scale, color.g * scale, color.b * scale};
+    Float parts[3] = {color.r * scale, color.g * scale, color.b * scale};
+    if (view.physical.on) find_sky_radiance(view, d, parts);
     for (int c = 0; c < 3; ++c) {
       Float part = parts[c];
       if (view.skybox && view.fog.slope != 0)

@@ -15,6 +15,8 @@ struct alignas(64) Surfaces {
   float rgb[3][kLanes], alpha[kLanes];
   float texture[3][kLanes];  // 0..1
   float specular[kLanes], exponent[kLanes], highlight_threshold[kLanes], emission[kLanes];
+  // For physically based views, where `rgb` is linear, and `specular` is the F0 of dielectrics.
+  float roughness[kLanes], metallic[kLanes];
 };
 
 // Normal of a primitive at the surface point p, geom frame, any length.
@@ -293,9 +295,14 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     }
     put(out.alpha, splat(s.rgba[3]));
     put(out.specular, splat(s.specular));
-    put(out.exponent, splat(s.exponent));
-    put(out.highlight_threshold, splat(s.highlight_threshold));
     put(out.emission, splat(s.emission));
+    if (view.physical.on) {
+      put(out.roughness, splat(s.roughness));
+      put(out.metallic, splat(s.metallic));
+    } else {
+      put(out.exponent, splat(s.exponent));
+      put(out.highlight_threshold, splat(s.highlight_threshold));
+    }
     if (!s.texture) continue;
     store(local[0] + k, q.x);
     store(local[1] + k, q.y);

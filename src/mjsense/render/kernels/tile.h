@@ -104,7 +104,7 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Reflect
     if (fixed) load_rest(*fixed, q, shadows.fixed_lanes, hits);
     Surfaces surfaces;
     gather_surfaces(view, pixels, hits, lanes, true, surfaces);
-    shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
+    shade(view, surfaces, hits, lanes, needs_others(view) ? &shadows : nullptr, colors);
   }
   if (lanes != 0xffffu) shade_background(view, pixels, ~lanes & 0xffffu, colors);
   if (view.reflection) add_reflection(view, reflection, q, colors);
@@ -158,6 +158,7 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
   if (lists.transparent)
     shade_transparent(view, scratch.transparent_geoms, lists.transparent, tile.pixels[q],
                       tile.hits[q], colors);
+  if (view.physical.on) map_tones(view, colors);
 }
 
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see
@@ -175,7 +176,8 @@ inline void shade_samples(const View& view, const TileLists& lists, const std::u
   const int packets = pixels.packets(), samples = pixels.samples;
   const float part = 1.0f / samples;
   Shadows shadows;
-  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, receivers);
+  if (needs_others(view))
+    find_all_casters(view, nullptr, tile, packets, scratch, shadows, receivers);
   if (view.reflection) trace_reflection(view, packets, tile, reflection);
   for (int q = 0; q < packets; ++q) {
     Colors sampled;
@@ -243,7 +245,8 @@ inline void render_multisampled(const View& view, const ImageTargets& targets, i
   Shadows shadows;
   TileBox* const receivers =
       targets.receivers ? targets.receivers + tile_index(grid, x0, y0) : nullptr;
-  if (view.shadows) find_all_casters(view, nullptr, tile, packets, scratch, shadows, receivers);
+  if (needs_others(view))
+    find_all_casters(view, nullptr, tile, packets, scratch, shadows, receivers);
   std::uint32_t edges[kTilePackets] = {};
   find_edges(grid, tile.hits, across, down, edges);
   for (int i = 0; i < lists.opaque; ++i)
@@ -318,7 +321,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     }
     if (targets.rgb && sample < samples) {
       Shadows shadows;
-      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows, receivers);
+      if (needs_others(view))
+        find_all_casters(view, fixed, tile, packets, scratch, shadows, receivers);
       if (view.reflection) trace_reflection(view, packets, tile, reflection);
       for (int q = 0; q < packets; ++q) {
         Colors colors;

@@ -2,8 +2,8 @@
 #pragma once
 // Cached layer of a tile's fixed geoms, and the shadow casters of a tile. Part of the tile kernels.
 
+#include "mjsense/render/kernels/physical_shading.h"
 #include "mjsense/render/kernels/pixel_visibility.h"
-#include "mjsense/render/kernels/shading.h"
 
 namespace mjsense::render {
 namespace {
@@ -99,6 +99,9 @@ inline void find_all_casters(const View& view, const FixedTile* fixed, const Til
   for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
   const TileBounds all = bounds_of_tile(view, nullptr, tile, packets);
   if (receivers) include(all, *receivers);
+  if (view.physical.occlusion_reach > 0)
+    find_occluders(view, Part::kAll, all.low, all.high, scratch.occluders, out.near);
+  if (!view.shadows) return;
   if (fixed) {
     find_casters(view, Part::kFixed, bounds_of_tile(view, fixed, tile, packets), scratch, used,
                  spare, out.fixed);
@@ -128,10 +131,12 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
                        FixedTile& out) {
   trace_tile(view, Part::kFixed, scratch.opaque_geoms, count, tile);
   Shadows shadows;
+  const TileBounds bounds = bounds_of_tile(view, nullptr, tile, packets);
+  if (view.physical.occlusion_reach > 0)
+    find_occluders(view, Part::kFixed, bounds.low, bounds.high, scratch.occluders, shadows.near);
   if (view.shadows) {
     int used = 0, spare = scratch.max_caster_parts;
-    find_casters(view, Part::kFixed, bounds_of_tile(view, nullptr, tile, packets), scratch, used,
-                 spare, shadows.fixed);
+    find_casters(view, Part::kFixed, bounds, scratch, used, spare, shadows.fixed);
     for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
   }
   for (int q = 0; q < packets; ++q) {
@@ -154,7 +159,7 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
     known.fixed_lanes = lanes;
     known.packet = q;
     Colors shaded;
-    shade(view, surfaces, hits, lanes, view.shadows ? &known : nullptr, shaded);
+    shade(view, surfaces, hits, lanes, needs_others(view) ? &known : nullptr, shaded);
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < kLanes; k += kWidth)
         store(out.rgb[c] + q * kLanes + k, load(shaded.rgb[c] + k));
@@ -199,7 +204,7 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
 // Loads the colours of packet `packet` from the layer. Returns false if they no longer apply.
 inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& pixels,
                         const Hits& hits, std::uint32_t lanes, Shadows& shadows, Colors& out) {
-  if (lanes != shadows.fixed_lanes) return false;
+  if (lanes != shadows.fixed_lanes || shadows.near.moving) return false;
   if (view.shadows && settle(view, pixels, hits, lanes, shadows)) return false;
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth)

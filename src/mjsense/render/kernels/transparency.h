@@ -3,8 +3,8 @@
 // Transparent geoms and planar reflections over the opaque surfaces of a packet. Part of the tile
 // kernels.
 
+#include "mjsense/render/kernels/physical_shading.h"
 #include "mjsense/render/kernels/pixel_visibility.h"
-#include "mjsense/render/kernels/shading.h"
 #include "mjsense/render/kernels/tile_fixed_layer.h"
 
 namespace mjsense::render {
@@ -29,7 +29,7 @@ inline void blend(const Layer& layer, Colors& out) {
 }
 
 // MuJoCo blends transparent geoms twice over the image: from near to far, and then from far to
-// near.
+// near. Physically based shading blends them from far to near only.
 inline void shade_transparent(const View& view, const int* list, int count, const Pixels& pixels,
                               const Hits& opaque, Colors& out) {
   Layer layers[kMaxLayers];
@@ -47,7 +47,7 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
     Layer& layer = layers[used++];
     shade(view, surfaces, hits, lanes, nullptr, layer.color);
     for (int k = 0; k < kLanes; ++k) layer.alpha[k] = lanes >> k & 1u ? surfaces.alpha[k] : 0;
-    blend(layer, out);
+    if (!view.physical.on) blend(layer, out);
   }
   for (int i = used - 1; i >= 0; --i) blend(layers[i], out);
 }
@@ -139,10 +139,13 @@ inline void add_reflection(const View& view, const Reflection& reflection, int q
   }
   if (count) shade_transparent(beyond, list, count, through, found, color);
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Mask m = mask_of(lanes >> k & kAllLanes);
+    const Mask m = mask_of((view.physical.on ? lanes & seen : lanes) >> k & kAllLanes);
     for (int c = 0; c < 3; ++c) {
-      const Float own = load(out.rgb[c] + k);
-      store(out.rgb[c] + k, select(m, min(own + load(color.rgb[c] + k), splat(1.0f)), own));
+      const Float own = load(out.rgb[c] + k), seen_there = load(color.rgb[c] + k);
+      const Float both = view.physical.on
+                             ? fma(splat(view.physical.reflectance), seen_there - own, own)
+                             : min(own + seen_there, splat(1.0f));
+      store(out.rgb[c] + k, select(m, both, own));
     }
   }
 }

@@ -30,7 +30,9 @@ Appearance::Appearance(const mjModel* m, int max_lights)
       materials_(m->nmat),
       lights_(max_lights),
       light_ids_(max_lights),
-      light_radii_(max_lights) {
+      light_radii_(max_lights),
+      light_intensities_(max_lights),
+      light_ranges_(max_lights) {
   copy(m);
 }
 
@@ -49,6 +51,8 @@ void Appearance::copy(const mjModel* m) {
                      .shininess = m->mat_shininess[i],
                      .emission = m->mat_emission[i],
                      .reflectance = m->mat_reflectance[i],
+                     .metallic = m->mat_metallic[i],
+                     .roughness = m->mat_roughness[i],
                      .texture = m->mat_texid[mjNTEXROLE * i + mjTEXROLE_RGB],
                      .repeat = {m->mat_texrepeat[2 * i], m->mat_texrepeat[2 * i + 1]},
                      .uniform = m->mat_texuniform[i] != 0};
@@ -67,6 +71,8 @@ void Appearance::copy_lights(const mjModel* m) {
                        const float* specular) -> ViewLight& {
     light_ids_[num_lights_] = id;
     light_radii_[num_lights_] = id < 0 ? 0 : m->light_bulbradius[id];
+    light_intensities_[num_lights_] = id < 0 ? 0 : m->light_intensity[id];
+    light_ranges_[num_lights_] = id < 0 ? 0 : m->light_range[id];
     ViewLight& light = lights_[num_lights_++];
     light = {};
     std::copy_n(ambient, 3, light.ambient);

@@ -14,9 +14,10 @@ namespace mjsense::render {
 
 struct Material {
   float specular, shininess, emission, reflectance;
-  int texture;      // id; -1: none
-  float repeat[2];  // of a 2D texture
-  bool uniform;     // `repeat` is per metre instead of per geom
+  float metallic = 0, roughness = -1;  // 0..1; roughness -1: 1 - shininess
+  int texture;                         // id; -1: none
+  float repeat[2];                     // of a 2D texture
+  bool uniform;                        // `repeat` is per metre instead of per geom
 };
 
 // The fields of mjModel's vis.map and vis.rgba that affect the sky.
@@ -44,6 +45,9 @@ class Appearance {
   std::span<const ViewLight> lights() const { return {lights_.data(), num_lights_}; }
   std::span<const int> light_ids() const { return light_ids_; }        // -1: the headlight
   std::span<const float> light_radii() const { return light_radii_; }  // m
+  // For physically based shading: candela, or lux for directional lights, 0: not set; m.
+  std::span<const float> light_intensities() const { return light_intensities_; }
+  std::span<const float> light_ranges() const { return light_ranges_; }
 
  private:
   void copy_lights(const mjModel* model);
@@ -55,7 +59,7 @@ class Appearance {
   Sky sky_;
   std::vector<ViewLight> lights_;
   std::vector<int> light_ids_;
-  std::vector<float> light_radii_;
+  std::vector<float> light_radii_, light_intensities_, light_ranges_;
   std::size_t num_lights_ = 0;
 };
 

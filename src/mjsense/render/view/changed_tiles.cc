@@ -18,7 +18,7 @@ int tiles_along(int pixels) { return (pixels + kTileSize - 1) / kTileSize; }
 // Whether everything is equal but the geoms and what is computed from geoms and lights.
 bool same_surroundings(const View& a, const View& b) {
   const auto values = [](const View& v) {
-    return std::tie(v.grid, v.near, v.far, v.num_lights, v.shadows, v.shows_plane_backs,
+    return std::tie(v.grid, v.near, v.far, v.num_lights, v.shadows, v.physical, v.shows_plane_backs,
                     v.global_ambient, v.skybox, v.sky_distance, v.haze, v.sky_min_depth, v.fog,
                     v.sky_fog_radius, v.mirror_id);
   };
@@ -146,6 +146,7 @@ void ChangedTiles::compare(const View& view) {
     if (view.reflection) mark_changes(reflected_, *view.reflection);
     mark_changes(shown_, view);
     if (view.shadows) mark_shadows(view);
+    if (view.physical.occlusion_reach > 0) mark_occlusion(view);
   }
   for (std::size_t i = 0; i < receivers_.size(); ++i)
     if (changed_[i]) receivers_[i] = {};
@@ -198,6 +199,28 @@ void ChangedTiles::mark_geom(const View& view, std::ptrdiff_t index, const ViewG
       const float window[4] = {left, right, bottom, top};
       changed = !parts || may_show(geom, window);
     }
+}
+
+// Marks the tiles with points so near to a geom that differs that it may hide the environment from them.
+void ChangedTiles::mark_occlusion(const View& view) {
+  const auto near = [&](const TileBox& box, const ViewGeom* g) {
+    if (!g || !hides_environment(*g)) return false;
+    if (g->type == mjGEOM_PLANE) return true;
+    float square = 0;
+    for (int i = 0; i < 3; ++i) {
+      const float away = std::max({box.low[i] - g->center[i], g->center[i] - box.high[i], 0.0f});
+      square += away * away;
+    }
+    const float reach = 1.001f * (g->radius + view.physical.occlusion_reach);
+    return square < reach * reach;
+  };
+  for (std::size_t tile = 0; tile < changed_.size(); ++tile) {
+    const TileBox& box = receivers_[tile];
+    if (changed_[tile] || box.low[0] > box.high[0]) continue;
+    changed_[tile] = std::ranges::any_of(changes_, [&](const Change& change) {
+      return near(box, change.before) || near(box, change.now);
+    });
+  }
 }
 
 // Windows of the geoms that differ, as they were and as they are.

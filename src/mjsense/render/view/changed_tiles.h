@@ -46,6 +46,7 @@ class ChangedTiles {
   void mark_changes(const Kept& kept, const View& view);
   void mark_geom(const View& view, std::ptrdiff_t index, const ViewGeom& geom);
   void mark_shadows(const View& view);
+  void mark_occlusion(const View& view);
   std::span<const LightWindow> shadow_windows(const View& view, const LightFrame& frame);
 
   bool complete_ = false;

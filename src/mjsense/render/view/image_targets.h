@@ -27,7 +27,7 @@ struct alignas(64) FixedTile {
   float n[3][kPixels];           // normal of the triangle, geom frame, any length
   int id[kPixels];               // ViewGeom::id, or -1
   int prim[kPixels];             // triangle of a mesh; -1 for the walls of a height field
-  float rgb[3][kPixels];         // colour where no other geom casts a shadow, 0..1
+  float rgb[3][kPixels];         // colour (or radiance) where no other geom casts a shadow
   // By light and packet: a bit for each pixel that the light does not reach, because a fixed geom
   // shadows it or it faces away.
   std::uint16_t unlit[kMaxLights][kPixels / 16];
@@ -50,7 +50,7 @@ struct ImageTargets {
   // By tile: tiles with 0 are not written. Null: all are.
   const std::uint8_t* changed_tiles = nullptr;
   // By tile, null if not requested: grows to contain the points that the tile shows, which may
-  // receive shadows. Used only if the view has shadows.
+  // receive shadows. Used only if the view has shadows or ambient occlusion.
   TileBox* receivers = nullptr;
 };
 

@@ -11,6 +11,7 @@
 
 #include "mjsense/render/view/image_targets.h"
 #include "mjsense/render/view/light_frame.h"
+#include "mjsense/render/view/physical_view.h"
 #include "mjsense/render/view/pixel_grid.h"
 #include "mjsense/render/view/view_geom.h"
 #include "mjsense/render/view/view_light.h"
@@ -50,6 +51,8 @@ struct View {
   FacingSides facing_sides[kMaxLights];  // [num_lights], for lights with frames
   int num_lights = 0;
   bool shadows = false;
+  PhysicalView physical;
+  OccluderSpheres occluders;
   bool layered = false;                    // fixed geoms are drawn first
   const FixedTile* fixed_tiles = nullptr;  // by tile: their cached image; null: not cached
   // By ViewGeom::id: index in `geoms`, for visible geoms. Null if the view is not layered.

@@ -59,6 +59,10 @@ std::array<float, 3> drawn_extent(const ViewGeom& g) {
 
 }  // namespace
 
+bool hides_environment(const ViewGeom& g) {
+  return g.casts_shadows && !g.transparent && !g.deforms && !g.height_field;
+}
+
 float highlight_threshold_of(float exponent) {
   if (!(exponent >= 4)) return -1;
   const float x = 0.9999f * std::max(0.3f, std::exp(-33 / exponent));
@@ -88,6 +92,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;
     flat.reflections = flat.shadows = flat.layered = false;
+    flat.physical.occlusion_reach = 0;
     mirrored_ = std::make_unique<ViewBuilder>(model, assets, flat);
   }
 }
@@ -103,7 +108,7 @@ void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rg
   place(source, position, rotation, g);
   const Texture* texture = shape(g);
   const bool sight = find_window(view_, g) && rgba[3] > 0;
-  if (!sight && !view_.shadows) return;
+  if (!sight && !view_.shadows && !(view_.physical.occlusion_reach > 0)) return;
   set_surface(source, rgba, material, texture, g);
   Order order{sight ? g.transparent : 2, g.min_depth, index};
   if (order.rank == 1) {
@@ -141,6 +146,10 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
                                const double position[3], const double rotation[9],
                                const PixelGrid& grid) {
   view_.grid = grid;
+  if (options_.physical.on) {
+    set_physical(options_.physical, rotation, view_.physical);
+    view_.physical.shows_environment = !view_.skybox;
+  }
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
   const auto texture_of = [&](const Material& material) {
@@ -168,6 +177,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   } else {
     Frustum frustum(grid, position, rotation);
     if (options_.shadows) reach_lights(world, appearance, options_.shadow_samples, frustum);
+    if (view_.physical.occlusion_reach > 0) frustum.widen(view_.physical.occlusion_reach);
     find_candidates(world.boxes(), frustum, candidates_);
     for (std::size_t word = 0; word < candidates_.size(); ++word) {
       for (std::uint64_t bits = candidates_[word]; bits != 0; bits &= bits - 1) {
@@ -199,6 +209,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   sort_geoms(rotation);
   set_lights(world, appearance, position, rotation);
   if (options_.shadows) light_space_.fill(view_);
+  if (view_.physical.occlusion_reach > 0) set_occluders();
   if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
   if (mirrored_) set_mirror(world, shapes, appearance, markers, position, rotation);
   return view_;
@@ -226,7 +237,8 @@ bool ViewBuilder::ends_mirror_search(const rays::RayGeom& g, int id, float alpha
   mirrored_->excluded_geom_ = id;
   mirrored_->own_headlight_ = false;
   for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
-  mirrored_->tint_ = reflectance;
+  mirrored_->tint_ = view_.physical.on ? 1 : reflectance;
+  view_.physical.reflectance = std::min(reflectance, 1.0f);
   view_.reflection = &build(p, r);
   view_.mirror_id = id;
   return true;
@@ -241,12 +253,15 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   view_.shows_plane_backs = true;
+  view_.physical = {};
+  if (scene.physical) set_physical(*scene.physical, rotation, view_.physical);
   projected_ = scene.projected_textures;
   sized_soft_ = scene.sized_soft_textures;
   view_.near = scene.near;
   view_.far = scene.far;
   view_.shadows = scene.shadows;
   view_.skybox = scene.skybox;
+  view_.physical.shows_environment = !view_.skybox;
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
   int id = 0;
@@ -277,6 +292,8 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     const double from[3] = {light.pos[0], light.pos[1], light.pos[2]};
     const double to[3] = {light.dir[0], light.dir[1], light.dir[2]};
     place_light(from, to, position, rotation, view_.lights[i]);
+    if (scene.physical)
+      set_physical(*scene.physical, scene.intensities[i], scene.ranges[i], view_.lights[i]);
     for (int axis = 0; axis < 2; ++axis) {
       double in_camera[3];
       const double in_world[3] = {scene.lights[i].shadow_map_axes[axis][0],
@@ -287,9 +304,11 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     }
   }
   if (view_.shadows) light_space_.fill(view_);
+  if (view_.physical.occlusion_reach > 0) set_occluders();
   view_.sky_distance = 0;
   view_.sky_fog_radius = scene.sky.distance;
   view_.fog = scene.fog;
+  for (float& x : view_.fog.rgb) x = shown(x);
   if (view_.skybox) set_sky(scene.haze ? endless : nullptr, scene.sky, position, rotation);
   view_.mirror_id = -1;
   view_.reflection = nullptr;
@@ -297,6 +316,12 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   if (!mirrored_) mirrored_ = std::make_unique<ViewBuilder>(unsorted_.size(), 0);
   DrawnScene flat = scene;
   flat.reflections = flat.shadows = false;
+  PhysicalOptions open;
+  if (scene.physical) {
+    open = *scene.physical;
+    open.occlusion_reach = 0;
+    flat.physical = &open;
+  }
   id = 0;
   for (const DrawnGeom& geom : scene.geoms)
     if (ends_mirror_search(geom.shape, id++, geom.rgba[3], geom.material.reflectance, position,
@@ -403,14 +428,22 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   Surface& s = g.surface;
   s = {};
   std::copy_n(rgba, 4, s.rgba);
-  for (int i = 0; i < 3; ++i) s.rgba[i] *= tint_;
+  const bool physical = view_.physical.on;
+  for (int i = 0; i < 3; ++i) s.rgba[i] = physical ? linear_of_srgb(rgba[i]) : rgba[i] * tint_;
   if (g.shows_back) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.shows_back;
   s.specular = 0.5f;
   s.exponent = 128.0f * (material ? material->shininess : 0.5f);
   s.highlight_threshold = highlight_threshold_of(s.exponent);
+  if (material) s.specular = material->specular;
+  if (physical) {
+    s.specular = std::min(0.16f * s.specular * s.specular, 1.0f);  // Filament 4.8.3.2
+    s.metallic = material ? std::clamp(material->metallic, 0.0f, 1.0f) : 0;
+    s.roughness = material ? material->roughness : -1;
+    if (s.roughness < 0) s.roughness = 1 - (material ? material->shininess : 0.5f);
+    s.roughness = std::clamp(s.roughness, 0.0f, 1.0f);
+  }
   if (!material) return;
-  s.specular = material->specular;
   s.emission = material->emission;
   if (!options_.textures) return;
   s.texture = texture && texture->levels > 0 ? texture : nullptr;
@@ -455,6 +488,11 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   }
 }
 
+// A colour of the sky as the kernels need it: radiance, if the view is physically based.
+float ViewBuilder::shown(float color) const {
+  return view_.physical.on ? linear_of_srgb(color) * view_.physical.unit : color;
+}
+
 // The sky's cylinder and the haze are at least (1 - width) times the cylinder's radius away; the
 // longest rays go through the image's corners.
 float ViewBuilder::sky_min_depth(const Sky& sky) const {
@@ -480,10 +518,22 @@ void ViewBuilder::set_sky(const rays::RayGeom* plane, const Sky& sky, const doub
   for (int k = 0; k < 3; ++k) {
     height += (position[k] - plane->pos[k]) * normal[k];
     haze.up[k] = static_cast<float>(up[k]);
-    haze.rgb[k] = sky.haze_rgb[k];
+    haze.rgb[k] = shown(sky.haze_rgb[k]);
   }
   haze.height = static_cast<float>(height);
   haze.width = sky.haze_width;
+}
+
+void ViewBuilder::set_occluders() {
+  const std::size_t stride = sorted_.size() + kWindowPadding;
+  occluder_spheres_.resize(4 * stride);
+  float* p = occluder_spheres_.data();
+  view_.occluders = {p, p + stride, p + 2 * stride, p + 3 * stride};
+  for (int i = 0; i < view_.num_geoms; ++i) {
+    const ViewGeom& g = sorted_[i];
+    for (int k = 0; k < 3; ++k) p[k * stride + i] = g.type == mjGEOM_PLANE ? 0 : g.center[k];
+    p[3 * stride + i] = hides_environment(g) ? g.radius + view_.physical.occlusion_reach : -1;
+  }
 }
 
 void ViewBuilder::set_lights(const rays::RayWorld& world, const Appearance& appearance,
@@ -498,10 +548,14 @@ void ViewBuilder::set_lights(const rays::RayWorld& world, const Appearance& appe
       double d[3] = {0, 0, -1};
       if (!own_headlight_) rotate_back(rotation, headlight_, d);
       for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(d[k]);
+      if (view_.physical.on) set_physical(options_.physical, 0, 0, light);
       view_.lights[view_.num_lights++] = light;
       continue;
     }
     const rays::RayLight& source = world.lights()[id];
+    if (view_.physical.on)
+      set_physical(options_.physical, appearance.light_intensities()[i],
+                   appearance.light_ranges()[i], light);
     const int count = light_samples(appearance, i, options_.shadow_samples);
     for (float* rgb : {light.ambient, light.diffuse, light.specular}) {
       for (int k = 0; k < 3 && count > 1; ++k) rgb[k] /= static_cast<float>(count);

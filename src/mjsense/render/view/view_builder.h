@@ -12,6 +12,7 @@
 #include "mjsense/render/view/appearance.h"
 #include "mjsense/render/view/light_space.h"
 #include "mjsense/render/view/markers.h"
+#include "mjsense/render/view/physical_light.h"
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view.h"
 
@@ -33,6 +34,7 @@ struct ViewOptions {
   float near = 0, far = 0;
   std::size_t markers = 0;       // maximum number of markers
   bool disable_culling = false;  // disables culling, for tests
+  PhysicalOptions physical;
 };
 
 // A geom with everything that its image depends on; used where the geoms do not come from a RayWorld.
@@ -67,6 +69,9 @@ struct DrawnScene {
   // geom's size; the texture of a skin without coordinates is projected along z of the world, instead
   // of showing one point of it.
   bool sized_soft_textures;
+  const PhysicalOptions* physical;  // null: classic
+  // By light, for physically based shading: candela or lux (0: not set), m.
+  std::span<const float> intensities, ranges;
 };
 
 // Computes Surface::highlight_threshold: the value below which the kernels' power() returns 0, with a margin for
@@ -119,6 +124,7 @@ class ViewBuilder {
   void add_shape(const rays::RayGeom& source, int id, const float* rgba, const Material* material,
                  const double position[3], const double rotation[9], SetShape shape);
   void sort_geoms(const double rotation[9]);
+  void set_occluders();
   // Whether the geom ends the search for the mirror. If it reflects, build(p, r) must return the
   // view from the mirrored camera pose.
   template <class Build>
@@ -128,6 +134,7 @@ class ViewBuilder {
                   const Appearance& appearance, std::span<const Marker> markers,
                   const double position[3], const double rotation[9]);
   float sky_min_depth(const Sky& sky) const;
+  float shown(float color) const;
   void set_sky(const rays::RayGeom* plane, const Sky& sky, const double position[3],
                const double rotation[9]);
   void set_lights(const rays::RayWorld& world, const Appearance& appearance,
@@ -142,6 +149,7 @@ class ViewBuilder {
   std::vector<Order> order_;
   std::vector<std::uint64_t> candidates_;  // bit per object that may be visible
   LightSpace light_space_;
+  std::vector<float> occluder_spheres_;
   std::vector<std::uint8_t> fixed_;  // per geom; empty if not layered
   std::vector<int> geom_index_;
   // By flex part, then by skin, with the world's normals.

@@ -12,12 +12,14 @@ struct HeightField;
 
 namespace mjsense::render {
 
-// MuJoCo's classic material of a geom. Colours are in [0, 1].
+// The material of a geom. Colours are in [0, 1]; in a physically based view, rgb is linear.
 struct Surface {
   float rgba[4];
-  float specular, exponent, emission;  // exponent: 128 * shininess
-  float highlight_threshold;           // (N . H)^2 below which the specular highlight is 0, or -1
-  const Texture* texture;              // null: no texture
+  float specular, emission;   // physically based: F0 of dielectrics, instead of `specular`
+  float roughness, metallic;  // 0..1, for physically based views
+  float exponent;             // 128 * shininess
+  float highlight_threshold;  // (N . H)^2 below which the specular highlight is 0, or -1
+  const Texture* texture;     // null: no texture
   // For 2D textures: coordinates are multiplied by uv_scale, then uv_offset is added.
   float uv_scale[2], uv_offset[2];
   float cube_scale[3];     // for cube maps: multiplies the direction in which the texture is read
@@ -75,5 +77,9 @@ struct alignas(64) ViewGeom {
 
   bool operator==(const ViewGeom&) const = default;
 };
+
+// Whether other geoms get less light from the environment because of this one: not if it is transparent, or
+// if its bounding box says little about its shape.
+bool hides_environment(const ViewGeom& geom);
 
 }  // namespace mjsense::render

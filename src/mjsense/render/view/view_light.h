@@ -10,7 +10,9 @@ inline constexpr int kMaxLights = 32;  // in a view
 
 enum class LightKind : std::uint8_t { kDirectional, kSpot, kPoint };
 
-// Vectors are in the camera's frame, and colours in [0, 1].
+// Vectors are in the camera's frame. Colours are in [0, 1]; in a physically based view, `diffuse` is
+// the radiance of a white matte surface that faces the light, in the units of PhysicalView, and the
+// other colours are not used.
 struct ViewLight {
   LightKind kind;
   bool casts_shadows;
@@ -18,6 +20,7 @@ struct ViewLight {
   float ambient[3], diffuse[3], specular[3];
   float attenuation[3];        // 1 / (a[0] + a[1] d + a[2] d^2) at the distance d in m
   float cos_cutoff, exponent;  // for spot lights
+  float range;                 // m, distance at which it fades to 0; 0: unlimited
   // MuJoCo renders a shadow map: a square around the light's axis, outside of which there are no
   // shadows. Its axes are unit vectors. Its half size is in m or, for spot lights, relative to the
   // distance along the light's axis. Not positive: shadows are not limited.

@@ -78,6 +78,7 @@ void validate(const CameraSensorCfg& cfg) {
       fail(
           "renderer 'opengl' takes clip range and intrinsics from the model, has no lens "
           "distortion, and measures planar depth");
+    if (cfg.shading != Shading::kClassic) fail("renderer 'opengl' has classic shading only");
     if (cfg.max_lights > render::kClassicLights)
       fail(fmt::format("renderer 'opengl' supports at most {} lights; max_lights is {}",
                        render::kClassicLights, cfg.max_lights));

@@ -3,15 +3,33 @@
 // Options of images, declared once for all that make images: camera sensors, recordings and
 // renderings of recorded episodes.
 
+#include <array>
 #include <optional>
+#include <string_view>
+
+#include "mjsense/core/fields/named_enum.h"
 
 namespace mjsense::sensors {
+
+enum class Shading { kClassic, kPbr };
+constexpr std::array<std::string_view, 2> enum_names(Shading) { return {"classic", "pbr"}; }
+
+// As render::ToneMapping.
+enum class ToneMap { kNeutral, kFilmic, kLinear };
+constexpr std::array<std::string_view, 3> enum_names(ToneMap) {
+  return {"neutral", "filmic", "linear"};
+}
 
 // Options of colour images that each camera sensor has. A new one is an option of recordings and
 // renderings too, and is stored with the settings of a recording.
 struct RgbCfg {
   int samples = 1;
   int shadow_samples = 1;
+  NamedEnum<Shading> shading;
+  double exposure = 8;
+  NamedEnum<ToneMap> tone_mapping;
+  double environment_intensity = 1;
+  bool ambient_occlusion = true;
 };
 template <class V>
 void visit_fields(V& v, RgbCfg& c) {
@@ -25,6 +43,26 @@ void visit_fields(V& v, RgbCfg& c) {
     "``bulbradius``; more than 1 gives soft shadows and takes longer. A view has at most 32 lights "
     "and points.")
       .within(1, 16)
+      .decides_data();
+  v("shading", c.shading,
+    "classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; "
+    "depth, "
+    "segmentation and the other images are the same. The options below belong to pbr.")
+      .decides_data();
+  v("exposure", c.exposure, "Exposure in EV at ISO 100; 1 more halves the brightness.")
+      .within(-10, 30)
+      .decides_data();
+  v("tone_mapping", c.tone_mapping,
+    "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; "
+    "linear: "
+    "clips.")
+      .decides_data();
+  v("environment_intensity", c.environment_intensity,
+    "Factor of the light from the surroundings, a neutral bright room.")
+      .within(0, 1e6)
+      .decides_data();
+  v("ambient_occlusion", c.ambient_occlusion,
+    "Darken the light from the surroundings where other geoms are near.")
       .decides_data();
 }
 

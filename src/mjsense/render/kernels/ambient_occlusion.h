@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// How much of the environment's light geoms hide from each other, by formula: boxes and planes exactly
+// where they are above the surface's horizon, other geoms as spheres. There is no noise, and no ray is
+// cast. Part of the tile kernels.
+
+#include "mjsense/render/kernels/surfaces.h"
+
+namespace mjsense::render {
+namespace {
+
+// The geoms that may hide the environment from the points of a tile.
+struct Occluders {
+  const int* list = nullptr;
+  int count = 0;
+  bool moving = false;  // some are not fixed
+};
+
+// Finds those of `part` for points in a box. `list` has room for all geoms of the view.
+inline void find_occluders(const View& view, Part part, const float* low, const float* high,
+                           int* list, Occluders& out) {
+  out = {list, 0, false};
+  if (low[0] > high[0]) return;
+  const OccluderSpheres& s = view.occluders;
+  const auto beyond = [](Float x, float from, float to) {
+    return max(max(splat(from) - x, x - splat(to)), splat(0.0f));
+  };
+  for (int i = 0; i < view.num_geoms; i += kWidth) {
+    const Float dx = beyond(loadu(s.x + i), low[0], high[0]),
+                dy = beyond(loadu(s.y + i), low[1], high[1]),
+                dz = beyond(loadu(s.z + i), low[2], high[2]), radius = loadu(s.radius + i);
+    std::uint32_t near =
+        bits((splat(0.0f) < radius) & (fma(dx, dx, fma(dy, dy, dz * dz)) < radius * radius));
+    for (; near; near &= near - 1) {
+      const int g = i + __builtin_ctz(near);
+      if (g >= view.num_geoms) return;
+      if (!belongs(view.geoms[g], part)) continue;
+      list[out.count++] = g;
+      out.moving |= !view.geoms[g].fixed;
+    }
+  }
+}
+
+// angle / sin(angle) / (2 pi) of the angle between unit vectors with this cross product; the error is
+// below 1e-4.
+// E. Heitz et al., Real-Time Polygonal-Light Shading with Linearly Transformed Cosines, 2016.
+inline Float relative_arc(Float cosine, Vec3f cross) {
+  const Float y = abs(cosine);
+  const Float a = fma(fma(splat(0.0145206f), y, splat(0.4965155f)), y, splat(0.8543985f));
+  const Float b = fma(splat(4.1616724f) + y, y, splat(3.4175940f));
+  const Float ratio = a / b;
+  const Mask acute = splat(0.0f) < cosine;
+  if (!any(~acute)) return ratio;
+  const Float sine = sqrt(max(dot(cross, cross), splat(1e-14f)));
+  return select(acute, ratio, splat(0.5f) / sine - ratio);
+}
+
+// Part of the cosine-weighted hemisphere around n that a box hides from the point p; all in the box's
+// frame. Lambert's formula for polygons, summed over the sides that face the point.
+inline Float hidden_by_box(const float* half, Vec3f p, Vec3f n) {
+  const Float zero = splat(0.0f);
+  const Float at[3] = {p.x, p.y, p.z};
+  Float sum = zero;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Mask faces = splat(half[axis]) < abs(at[axis]);
+    if (!any(faces)) continue;
+    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+    const Float side = select(at[axis] < zero, splat(-half[axis]), splat(half[axis]));
+    Vec3f corner[4];
+    for (int c = 0; c < 4; ++c) {
+      Float v[3];
+      v[axis] = side - at[axis];
+      v[i] = splat(c == 0 || c == 3 ? -half[i] : half[i]) - at[i];
+      v[j] = splat(c < 2 ? -half[j] : half[j]) - at[j];
+      const Float scale =
+          splat(1.0f) / sqrt(max(fma(v[0], v[0], fma(v[1], v[1], v[2] * v[2])), splat(1e-12f)));
+      corner[c] = {v[0] * scale, v[1] * scale, v[2] * scale};
+    }
+    Float face = zero;
+    for (int c = 0; c < 4; ++c) {
+      const Vec3f a = corner[c], b = corner[(c + 1) % 4];
+      const Vec3f across = cross(a, b);
+      face = fma(dot(across, n), relative_arc(dot(a, b), across), face);
+    }
+    // The corners turn the other way round where the point is on the negative side.
+    face = select(at[axis] < zero, face, -face);
+    sum = sum + select(faces, max(face, zero), zero);
+  }
+  return sum;
+}
+
+// Part of the hemisphere that a sphere at `to` (from the point) hides.
+inline Float hidden_by_sphere(Vec3f to, Float radius, Vec3f n) {
+  const Float square = max(dot(to, to), splat(1e-12f));
+  const Float cosine = dot(to, n) / sqrt(square);
+  return max(cosine, splat(0.0f)) * min(radius * radius / square, splat(1.0f));
+}
+
+// 1 at the geom and 0 at the distance `reach` (m) or more, of which `square` is the square.
+inline Float fade(Float square, float reach) {
+  const Float left = max(splat(1.0f) - square * splat(1 / (reach * reach)), splat(0.0f));
+  return left * left;
+}
+
+// A geom in its own frame, as a sphere swept along its longer axes.
+inline Float hidden_by_rounded(const float* half, Vec3f p, Vec3f n, float reach) {
+  const float thin = half[0] < half[1] ? (half[0] < half[2] ? half[0] : half[2])
+                                       : (half[1] < half[2] ? half[1] : half[2]);
+  const auto nearest = [&](Float x, float h) {
+    return min(max(x, splat(thin - h)), splat(h - thin));
+  };
+  const Vec3f to{nearest(p.x, half[0]) - p.x, nearest(p.y, half[1]) - p.y,
+                 nearest(p.z, half[2]) - p.z};
+  const Float away = max(sqrt(dot(to, to)) - splat(thin), splat(0.0f));
+  return hidden_by_sphere(to, splat(thin), n) * fade(away * away, reach);
+}
+
+inline Float hidden_by(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
+  const Float zero = splat(0.0f);
+  const Vec3f local = to_geom(g.rot, p - splat(g.pos));
+  const Vec3f normal = to_geom(g.rot, n);
+  if (g.type == mjGEOM_PLANE) {
+    Mask over = zero < local.z;
+    if (g.size[0] > 0) over = over & (abs(local.x) < splat(g.size[0]));
+    if (g.size[1] > 0) over = over & (abs(local.y) < splat(g.size[1]));
+    const Float below = fma(normal.z, splat(-0.5f), splat(0.5f));
+    return select(over, below * fade(local.z * local.z, reach), zero);
+  }
+  if (g.type == mjGEOM_SPHERE) {
+    const Vec3f to{-local.x, -local.y, -local.z};
+    const Float away = max(sqrt(dot(to, to)) - splat(g.size[0]), zero);
+    return hidden_by_sphere(to, splat(g.size[0]), normal) * fade(away * away, reach);
+  }
+  const Vec3f q = local - splat(g.aabb);
+  const float* half = g.aabb + 3;
+  if (g.type != mjGEOM_BOX) return hidden_by_rounded(half, q, normal, reach);
+  const auto beyond = [&](Float x, float h) { return max(abs(x) - splat(h), zero); };
+  const Vec3f away{beyond(q.x, half[0]), beyond(q.y, half[1]), beyond(q.z, half[2])};
+  const Float near = fade(dot(away, away), reach);
+  // The corner that is highest above the surface's horizon.
+  const Float top = fma(abs(normal.x), splat(half[0]),
+                        fma(abs(normal.y), splat(half[1]), abs(normal.z) * splat(half[2]))) -
+                    dot(normal, q);
+  const Mask some = (zero < near) & (splat(1e-5f) < top);
+  if (!any(some)) return zero;
+  return select(some, hidden_by_box(half, q, normal) * near, zero);
+}
+
+// Part of the environment's light that reaches the points of `lanes`, 0..1.
+inline void open_sky(const View& view, const Occluders& near, const Surfaces& s, const Hits& hits,
+                     std::uint32_t lanes, float* out) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    Float open = splat(1.0f);
+    if (any(m)) {
+      const Vec3f p = load3(s.p, k), n = load3(s.n, k);
+      const Int own = load(hits.geom + k);
+      for (int i = 0; i < near.count; ++i) {
+        const Mask other = m & ~(own == int_of(near.list[i]));
+        if (!any(other)) continue;
+        const ViewGeom& g = view.geoms[near.list[i]];
+        const float reach = view.physical.occlusion_reach, own_reach = 4 * g.radius;
+        const Float hidden = hidden_by(g, p, n, own_reach < reach ? own_reach : reach);
+        open = open * (splat(1.0f) - select(other, min(hidden, splat(1.0f)), splat(0.0f)));
+      }
+    }
+    store(out + k, open);
+  }
+}
+
+}  // namespace
+}  // namespace mjsense::render

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Input of the render kernels for physically based shading, in the camera's frame.
+//
+// Radiance is in units of the image's maximum: a surface of radiance 1 is white without tone
+// mapping. The exposure is included in all values.
+
+#include <cstdint>
+
+#include "mjsense/render/view/stored_texture.h"
+
+namespace mjsense::render {
+
+enum class ToneMapping : std::uint8_t { kNeutral, kFilmic, kLinear };
+
+// The tone curve is a table: value i belongs to the number x for which the bits of x + kOffset as a
+// float, shifted right by kShift, are kFirst + i. Between them it is linear. x is in [0, kEnd].
+struct ToneCurve {
+  static constexpr int kShift = 17;  // 64 values per octave
+  static constexpr float kOffset = 1.0f / 1024, kEnd = 31.0f;
+  static constexpr int kFirst = (127 - 10) << (23 - kShift);
+  static constexpr int kValues = 15 << (23 - kShift);
+};
+
+// Albedo of the specular lobe, F0 A + F90 B: A in the low and B in the high 16 bits, as fractions of
+// 65535. Rows by perceptual roughness, columns by N . V, both from 0 to 1.
+struct SpecularTable {
+  static constexpr int kRows = 64, kColumns = 64;
+  static constexpr int kStride = kColumns + 1;  // kernels read pairs
+};
+
+struct PhysicalView {
+  bool on = false;  // otherwise the light model is MuJoCo's classic one
+  ToneMapping tone_mapping = ToneMapping::kNeutral;
+  const float* tone_curve = nullptr;              // [ToneCurve::kValues]
+  const std::uint32_t* specular_table = nullptr;  // [kRows, kStride]
+  // Radiance of a white matte surface of normal n in the light of the environment: the sum of these
+  // coefficients times 1, x, y, z, x^2, y^2, z^2, xy, xz, yz.
+  float irradiance[10][3] = {};
+  // The environment's radiance by perceptual roughness / (levels - 1), see EnvironmentLight
+  const Texture* radiance = nullptr;
+  float radiance_scale = 0;
+  float r_wc[9] = {};              // R_WC, row-major
+  bool shows_environment = false;  // as the background, because there is no skybox
+  float unit = 1;         // radiance of a colour of 1 of the skybox, haze, fog and emission
+  float reflectance = 0;  // of the mirror
+  // Distance up to which geoms hide the environment from each other, m; 0: they do not.
+  float occlusion_reach = 0;
+
+  bool operator==(const PhysicalView&) const = default;
+};
+
+// Spheres around the geoms that hide the environment, by geom, with kWindowPadding more entries that
+// kernels may read. A geom changes nothing outside its sphere. Camera frame, m; a negative radius: the
+// geom hides nothing.
+struct OccluderSpheres {
+  float *x = nullptr, *y = nullptr, *z = nullptr, *radius = nullptr;
+};
+
+}  // namespace mjsense::render

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/sensors/camera/physical_options.h"
+
+namespace mjsense::sensors {
+
+render::PhysicalOptions physical_options(const RgbCfg& cfg) {
+  render::PhysicalOptions out;
+  out.on = cfg.shading == Shading::kPbr;
+  if (!out.on) return out;
+  out.exposure = cfg.exposure;
+  out.tone_mapping = static_cast<render::ToneMapping>(static_cast<ToneMap>(cfg.tone_mapping));
+  out.environment = render::studio();
+  out.environment_intensity = cfg.environment_intensity;
+  if (!cfg.ambient_occlusion) out.occlusion_reach = 0;
+  return out;
+}
+
+}  // namespace mjsense::sensors
