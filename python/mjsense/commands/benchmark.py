@@ -10,7 +10,7 @@ from mjsense.commands.parser import Parser, add_name, field_values
 EXAMPLES = [
     (
         "mjsense benchmark create pick --episodes 200 --split test --out bench",
-        "Fix 200 episodes of the task pick, so that everybody can play the same.",
+        "Fix 200 episodes of the task pick, so that other users can play the same.",
     ),
     ("mjsense benchmark check bench", "Check that the episodes of a benchmark start as when it was made."),
 ]
@@ -43,7 +43,9 @@ _NOT_FIXED = (
 
 
 def add_arguments(parser: Parser) -> None:
-    parser.add_argument("action", choices=("create", "check"), help="create: write a benchmark. check: compare its starts with the stored ones.")
+    parser.add_argument(
+        "action", choices=("create", "check"), help="create: write a benchmark. check: compare its starts with the stored ones."
+    )
     add_name(parser, "task", "tasks", "create: name of the task. check: folder of the benchmark.", metavar="TASK")
     parser.add_argument(
         "--no-terminate-upon-success",

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from mjsense.tasks.record_job import RecordProgress
 
 EXAMPLES = [
-    ("mjsense evaluate pick --policy net.py:Network --episodes 100 --out results", "Evaluate a policy written in Python on 100 episodes."),
+    (
+        "mjsense evaluate pick --policy net.py:Network --episodes 100 --out results",
+        "Evaluate a policy written in Python on 100 episodes.",
+    ),
     ("mjsense evaluate bench --policy planner --out results", "Evaluate the planner on a benchmark."),
 ]
 _NOT_OFFERED = (
@@ -28,12 +31,14 @@ _NOT_OFFERED = (
     "shard",
     "terminate_upon_success",
 )
-_POLICIES = "planner, random, replay:DIR, python:MODULE:CLASS, FILE.py:CLASS, lerobot:DIR, ws://HOST:PORT"
+_POLICIES = "planner, random, replay:DIR, python:MODULE:CLASS, FILE.py:CLASS"
 
 
 def add_arguments(parser: Parser) -> None:
     add_name(parser, "task", "tasks", "Name of the task, or folder of a benchmark.", nargs="?", default="pick", metavar="TASK")
-    action = parser.add_argument("--policy", default="planner", metavar="TEXT", help=f"The policy: {_POLICIES}, or the name of another one.")
+    action = parser.add_argument(
+        "--policy", default="planner", metavar="TEXT", help=f"The policy: {_POLICIES}, or the name of another one."
+    )
     setattr(complete(action, ("planner", "random")), "shown_default", "planner")  # noqa: B010  # argparse declares no such attribute
     parser.add_argument(
         "--policy-option",
@@ -41,7 +46,7 @@ def add_arguments(parser: Parser) -> None:
         action="append",
         default=[],
         dest="policy_options",
-        help="An argument of the policy's class, or an option of lerobot: and ws://. May be repeated.",
+        help="An argument of the policy's class. May be repeated.",
     )
     parser.add_argument(
         "--episodes",
@@ -53,7 +58,7 @@ def add_arguments(parser: Parser) -> None:
         "--execution-horizon",
         type=int,
         metavar="N",
-        help="Number of actions of a chunk that are executed before the policy is asked again; by default all.",
+        help="Number of actions of a chunk that are executed before the policy is called again; by default all.",
     )
     parser.add_argument(
         "--ensemble",

@@ -10,6 +10,7 @@ mjsense contains, neither files nor code.
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import os
 import re
@@ -32,10 +33,12 @@ _FILE_BYTES = 1 << 24
 _MAX_EPISODES, _MAX_FILES, _MAX_DEPTH = 100_000, 1_000_000, 4
 _PARTS = ("task", "robot", "scene", "split", "arm_controller", "camera_system")
 _IMAGES = ("cameras", "width", "height", "depth", "segmentation", "shadows", "samples", "shadow_samples", "meshes")
+_COLOURS = ("shading", "exposure", "tone_mapping", "environment_intensity", "ambient_occlusion")
 _PLAY = ("seed", "horizon", "policy_dt_ms", "perturb", "instructions", "terminate_upon_success", "max_penetration")
-RECIPE = (*_PARTS, *_IMAGES, *_PLAY)
+RECIPE = (*_PARTS, *_IMAGES, *_COLOURS, *_PLAY)
 """Options of a recording that a benchmark fixes."""
-_NAME = re.compile(r"[A-Za-z0-9_-]{0,100}(/[A-Za-z0-9_-]{1,100})*(@[a-z]{1,20})?(:[0-9]{1,9})?")
+_NAME = re.compile(r"([A-Za-z0-9_+-]{1,100}(@[a-z]{1,20})?(:[0-9]{1,9})?)?")
+_CAMERA = re.compile(r"[A-Za-z0-9_-]{1,100}(/[A-Za-z0-9_-]{1,100}){0,9}")
 
 
 def is_folder(task: Any) -> bool:
@@ -70,16 +73,9 @@ class Benchmark:
 
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """The options of a recording of this benchmark. Raises ValueError for given ones that it fixes."""
-        defaults = {"robot": None, "scene": "", "house": 0}
         options = {name: value for name, value in given.items() if name != "task"}
-        for name in (*RECIPE, *defaults):
-            if name not in options:
-                continue
-            if name in _GIVEN_DEFAULTS and options[name] == _GIVEN_DEFAULTS[name]:
-                del options[name]
-            elif name in defaults and options[name] == defaults[name]:
-                del options[name]
-            elif options[name] != self.recipe.get(name):
+        for name, default in {**_DEFAULTS, "house": 0}.items():
+            if name in options and options.pop(name) not in (default, self.recipe.get(name, default)):
                 raise ValueError(f"benchmark '{self.folder}': it fixes {name}, which is given too; leave it out")
         return {**options, **self.recipe}
 
@@ -87,7 +83,9 @@ class Benchmark:
         """Raises ValueError if a file of the benchmark is missing, was changed or was added."""
         found = dict(_checksums(self.folder / STARTS))
         for name in sorted(found.keys() ^ self._files.keys()):
-            raise ValueError(f"benchmark '{self.folder}': {STARTS}/{name} {'is missing' if name in self._files else 'does not belong to it'}")
+            raise ValueError(
+                f"benchmark '{self.folder}': {STARTS}/{name} {'is missing' if name in self._files else 'does not belong to it'}"
+            )
         for name, checksum in found.items():
             if checksum != self._files[name]:
                 raise ValueError(f"benchmark '{self.folder}': {STARTS}/{name} was changed: its checksum is not the stated one")
@@ -112,28 +110,10 @@ class Benchmark:
             env.close()
 
 
-_GIVEN_DEFAULTS: dict[str, Any] = {
-    "arm_controller": "",
-    "split": "",
-    "seed": 0,
-    "camera_system": "",
-    "cameras": None,
-    "width": None,
-    "height": None,
-    "depth": False,
-    "segmentation": False,
-    "shadows": True,
-    "samples": 1,
-    "shadow_samples": 1,
-    "meshes": "auto",
-    "horizon": None,
-    "policy_dt_ms": None,
-    "perturb": 0.0,
-    "instructions": "varied",
-    "terminate_upon_success": True,
-    "max_penetration": None,
-}
-"""Defaults of the options of an evaluation, which a caller did not choose."""
+_DEFAULTS: dict[str, Any] = {
+    name: parameter.default for name, parameter in inspect.signature(record).parameters.items() if name in RECIPE
+} | {"terminate_upon_success": True}  # as evaluate()
+"""Options that a caller did not choose."""
 
 
 def create_benchmark(
@@ -162,7 +142,7 @@ def create_benchmark(
             raise ValueError(f"benchmark: it cannot fix '{name}'{did_you_mean(name, RECIPE, 'it can fix')}")
     if not 1 <= episodes <= _MAX_EPISODES:
         raise ValueError(f"benchmark: episodes is {episodes}: must be between 1 and {_MAX_EPISODES}")
-    recipe = _recipe({**_GIVEN_DEFAULTS, "robot": None, "scene": "", **options, "task": task}, folder)
+    recipe = _recipe({**_DEFAULTS, **options, "task": task}, folder)
     parts = {name: recipe[name] for name in ("task", "robot", "scene", "split") if recipe[name] is not None}
     _, robot, scene, _, _ = _core.resolved_job({**parts, "out": "."})
     recipe |= {"robot": robot or None, "scene": scene, "split": ""}
@@ -250,11 +230,13 @@ def _recipe(recipe: Any, path: Path) -> dict[str, Any]:
     for name, value in recipe.items():
         if name not in RECIPE:
             raise ValueError(f"{path}: the recipe has the option '{name}'{did_you_mean(name, RECIPE, 'there are')}")
-        texts = value if isinstance(value, list) else [value]
+        texts, pattern = (value, _CAMERA) if isinstance(value, list) else ([value], _NAME)
         for text in texts:
-            if isinstance(text, str) and not _NAME.fullmatch(text):
+            if isinstance(text, str) and not pattern.fullmatch(text):
                 raise ValueError(f"{path}: {name} is '{text[:100]}'; a benchmark can only contain names of what mjsense contains")
-            if not isinstance(text, (str, bool, int, float, type(None))) or (isinstance(value, list) and not isinstance(text, str)):
+            if not isinstance(text, (str, bool, int, float, type(None))) or (
+                isinstance(value, list) and not isinstance(text, str)
+            ):
                 raise ValueError(f"{path}: {name} is {bounded_json.kind_of(text)}; expected a name, a number or true or false")
     if missing := {"task"} - recipe.keys():
         raise ValueError(f"{path}: the recipe has no {min(missing)}")
@@ -296,4 +278,3 @@ def _checksums(folder: Path, depth: int = 0, prefix: str = "") -> Iterator[tuple
                 yield f"{prefix}{entry.name}", hashlib.file_digest(file, "sha256").hexdigest()
         else:
             raise ValueError(f"'{entry.path}' is neither a file nor a folder of a benchmark")
-

@@ -20,7 +20,7 @@ from mjsense.evaluation.replayed import ReplayedPolicy
 from mjsense.evaluation.report import Results, require_parquet, results
 from mjsense.evaluation.timing import Latency, Timed
 from mjsense.tasks.code_checksums import checksums
-from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks
+from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
 from mjsense.tasks.record_job import RecordProgress
 from mjsense.tasks.recording import record
@@ -31,7 +31,7 @@ from mjsense.tasks.vector import checked_episodes
 def evaluate(
     task: Tasks | Path = "pick",
     robot: Robots | None = None,
-    policy: Policies = "planner",
+    policy: Any = "planner",
     *,
     out: str | Path,
     episodes: int | Sequence[int] = 50,
@@ -55,6 +55,11 @@ def evaluate(
     shadows: bool = True,
     samples: int = 1,
     shadow_samples: int = 1,
+    shading: Literal["classic", "pbr"] = "classic",
+    exposure: float = 8.0,
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
+    environment_intensity: float = 1.0,
+    ambient_occlusion: bool = True,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
     policy_dt_ms: int | None = None,
@@ -91,14 +96,13 @@ def evaluate(
             affect the data.
         robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
         policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function ``obs -> actions``, or
-            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``python:MODULE:CLASS``, ``FILE.py:CLASS``,
-            ``lerobot:DIR``, ``ws://HOST:PORT``.
+            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``python:MODULE:CLASS`` or ``FILE.py:CLASS``.
         out: Output directory.
         episodes: Number of episodes, which are then those from 0 on, or a list of their numbers. A benchmark states them itself.
         scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
             scene.
-        policy_options: Arguments of the policy's class, or of ``lerobot:`` and ``ws://``.
-        execution_horizon: Number of actions of a chunk that are executed before the policy is asked again; by default all.
+        policy_options: Arguments of the policy's class.
+        execution_horizon: Number of actions of a chunk that are executed before the policy is called again; by default all.
         ensemble: The executed action is the mean of all chunks that have one for the step, with the weights ``exp(-ensemble * i)``, ``i = 0``
             for the oldest; by default that of the newest chunk.
         latency: Time from an observation until the actions that answer it are executed, rounded up to control steps; ``measured``: the
@@ -123,6 +127,13 @@ def evaluate(
         samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
         shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
+        shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
+            segmentation and the other images are the same. The options below belong to pbr.
+        exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
+            clips.
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room.
+        ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
         horizon: Maximum number of control steps of an episode; by default the task's.
@@ -192,7 +203,8 @@ def play(
     if isinstance(made, ReplayedPolicy):
         made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
         noise = bool(made.settings.get("action_noise", False))
-    execution_horizon = execution_horizon or getattr(made, "execution_horizon", None)
+    if execution_horizon is None:
+        execution_horizon = getattr(made, "execution_horizon", None)
     timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
     if any(value is not None for value in timing.values()):
         if not isinstance(made, Policy):

@@ -19,9 +19,6 @@ from mjsense.tasks.policy import Policy, policy_names, policy_of
 PREFIXES = {
     "replay": "mjsense.evaluation.replayed:policy_of",
     "python": "mjsense.evaluation.policies:of_module",
-    "lerobot": "mjsense.evaluation.lerobot_policy:policy_of",
-    "ws": "mjsense.evaluation.remote:policy_of",
-    "wss": "mjsense.evaluation.remote:policy_of",
 }
 """Prefix -> the function ``f(text, **options) -> Policy`` that makes the policy of a text with this prefix."""
 
@@ -37,7 +34,7 @@ def policy_from(policy: Any, **options: Any) -> Policy | str:
     """
     if not isinstance(policy, str):
         return _of_object(policy, options)
-    prefix, colon, rest = policy.partition(":")
+    prefix, colon, _ = policy.partition(":")
     if colon and prefix in PREFIXES:
         module, _, function = PREFIXES[prefix].partition(":")
         return getattr(importlib.import_module(module), function)(policy, **options)
@@ -48,8 +45,10 @@ def policy_from(policy: Any, **options: Any) -> Policy | str:
         return _of_object(RandomPolicy, options)
     known = policy_names()
     if policy not in known:
-        forms = "replay:DIR, python:MODULE:CLASS, FILE.py:CLASS, lerobot:DIR or ws://HOST:PORT"
-        raise ValueError(f"policy '{policy}' is neither a name nor {forms}{did_you_mean(policy, ['random', *known], 'names are')}")
+        forms = "replay:DIR, python:MODULE:CLASS or FILE.py:CLASS"
+        raise ValueError(
+            f"policy '{policy}' is neither a name nor {forms}{did_you_mean(policy, ['random', *known], 'names are')}"
+        )
     if options:
         raise ValueError(f"policy '{policy}' has no option '{min(options)}'")
     return policy_of(policy)[1] or policy
@@ -76,7 +75,7 @@ def _module_of_file(file: str) -> Any:
     if not path.is_file():
         raise ValueError(f"policy: there is no file '{file}'")
     if str(path.parent) not in sys.path:
-        sys.path.insert(0, str(path.parent))  # modules beside it, as for a program
+        sys.path.insert(0, str(path.parent))  # modules next to it, as for a program
     spec = importlib.util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
         raise ValueError(f"policy: '{file}' is not a Python file")

@@ -59,8 +59,8 @@ def _rows(obs: Mapping[str, Any], worlds: np.ndarray) -> dict[str, Any]:
 
 
 def _array(actions: Any) -> np.ndarray:
-    if callable(detach := getattr(actions, "detach", None)):
-        actions = detach().cpu()
+    if hasattr(actions, "detach"):
+        actions = actions.detach().cpu()
         if str(actions.dtype) == "torch.bfloat16":  # NumPy has no such type
             actions = actions.float()
     return np.asarray(actions, np.float64)

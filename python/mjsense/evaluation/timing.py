@@ -38,13 +38,13 @@ class _Answer:
 class Timed(Policy):
     """Another policy whose chunks of actions are executed as on a robot.
 
-    The policy is asked at an observation and answers with ``H`` actions. ``execution_horizon`` of them are executed, then it is asked again
+    The policy is called at an observation and answers with ``H`` actions. ``execution_horizon`` of them are executed, then it is called again
     (by default all). With a latency of ``L`` steps, every action is executed ``L`` steps later than without it; until the first answer
     arrives, the robot holds its position, later it executes what is left of the previous answers and then holds.
 
     Args:
-        policy: The policy that is asked.
-        execution_horizon: Number of actions of a chunk that are executed before the policy is asked again; None: all.
+        policy: The policy that is called.
+        execution_horizon: Number of actions of a chunk that are executed before the policy is called again; None: all.
         ensemble: None: the newest answer is executed. A number ``m``: the mean of all answers that have an action for the step, with the
             weights ``exp(-m * i)``, ``i = 0`` for the oldest.
         latency: Delay of the answers, rounded up to whole control steps. [s]
@@ -67,7 +67,7 @@ class Timed(Policy):
         if callable(fingerprint):
             self.fingerprint = lambda: f"{fingerprint()} {execution_horizon} {ensemble} {latency}"
 
-    # Steps since the beginning of the episode, and the step at which the policy is asked next: int [B].
+    # Steps since the beginning of the episode, and the step at which the policy is called next: int [B].
     _mjs_step: np.ndarray
     _mjs_next: np.ndarray
 
@@ -161,7 +161,9 @@ class Timed(Policy):
         done = np.array(groups.pop("done", np.zeros(self.num_worlds)), bool)
         success = np.array(groups.pop("success", np.full(self.num_worlds, np.nan)), float)
         hold = np.zeros((self.num_worlds, len(self.action_groups)), bool)
-        hold |= np.array(groups.pop("hold", False), bool).reshape(-1, 1) if np.ndim(groups.get("hold", 0)) < 2 else groups.pop("hold")
+        hold |= (
+            np.array(groups.pop("hold", False), bool).reshape(-1, 1) if np.ndim(groups.get("hold", 0)) < 2 else groups.pop("hold")
+        )
         if "action" in groups:
             chunk = self._chunk("", groups.pop("action"), len(self.action_low))
         elif missing := self.action_groups.keys() - groups.keys():
@@ -199,5 +201,5 @@ class _LatencySensor(Sensor):
         super().__init__()
         self._policy = policy
 
-    def compute(self, sim: Any, world_ids: np.ndarray) -> np.ndarray:
+    def compute(self, sim: Any, world_ids: np.ndarray) -> np.ndarray:  # pyright: ignore[reportIncompatibleMethodOverride]
         return self._policy._mjs_delays[world_ids]

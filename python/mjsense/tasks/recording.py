@@ -181,7 +181,17 @@ def record(
         given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
         if refused := [
             name
-            for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "attempts", "map", "trim_idle", "keep_recording")
+            for name in (
+                "shard",
+                "append",
+                "overwrite",
+                "first_attempt",
+                "num_attempts",
+                "attempts",
+                "map",
+                "trim_idle",
+                "keep_recording",
+            )
             if given[name]
         ]:
             raise ValueError(f"record: {refused[0]} cannot be combined with ray")

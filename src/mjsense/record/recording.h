@@ -51,7 +51,7 @@ struct RecordingCfg : FilesCfg {
   std::int64_t num_attempts = 0;  // number of attempts, if it is fixed; 0: it is not
   // The numbers of the attempts, in ascending order, if they have gaps; the first is first_attempt.
   std::vector<std::int64_t> attempts;
-  int first_batch = 0;            // HDF5 files of the recordings that `append` continues; set by it
+  int first_batch = 0;  // HDF5 files of the recordings that `append` continues; set by it
   // File for replay, stored in the house once: its name, "model_1a2b3c4d.zip", and its bytes. Empty:
   // none. Recordings with the same model have the same name.
   std::string archive_name, archive;

@@ -48,7 +48,8 @@ struct Move {
 std::string settings_of(const std::string& description) {
   nlohmann::json json = parse_description(description);
   if (!json.is_object()) return "";
-  for (const char* count : {"episodes", "batches", "first_attempt", "num_attempts", "attempts", "first_batch"})
+  for (const char* count :
+       {"episodes", "batches", "first_attempt", "num_attempts", "attempts", "first_batch"})
     json.erase(count);
   return json.dump();
 }

@@ -135,8 +135,7 @@ class RecordJob {
       const int before = k == 0 ? -1 : cfg.attempts[k - 1];
       if (cfg.attempts[k] <= before) {
         throw ValueError(fmt::format("attempts: {} follows {}: the numbers start at 0 and ascend",
-                                     cfg.attempts[k],
-                                     k == 0 ? "nothing" : std::to_string(before)));
+                                     cfg.attempts[k], k == 0 ? "nothing" : std::to_string(before)));
       }
     }
     cfg.first_attempt = cfg.attempts.front();
