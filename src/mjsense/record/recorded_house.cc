@@ -135,7 +135,8 @@ std::vector<std::int64_t> attempts_in(const std::string& description) {
   if (found == json.end()) return attempts;
   if (!found->is_array()) throw RuntimeError("'attempts' of the recording is not a list");
   for (const nlohmann::json& number : *found) {
-    if (!number.is_number_integer() || number < (attempts.empty() ? 0 : attempts.back() + 1))
+    if (!number.is_number_unsigned() || number > std::numeric_limits<std::int32_t>::max() ||
+        (!attempts.empty() && number <= attempts.back()))
       throw RuntimeError("'attempts' of the recording is not a list of ascending numbers");
     attempts.push_back(number.get<std::int64_t>());
   }

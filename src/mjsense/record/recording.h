@@ -61,8 +61,8 @@ struct RecordingCfg : FilesCfg {
 };
 
 // One attempt. Episode numbers start at RecordingCfg::first_attempt without gaps, unless
-// RecordingCfg::attempts lists them. They, and not the order in which episodes finish, determine the order on disk, so the files do not depend on the
-// number of worlds or on interruptions.
+// RecordingCfg::attempts lists them. They, and not the order in which episodes finish, determine the
+// order on disk, so the files do not depend on the number of worlds or on interruptions.
 struct EpisodeMeta {
   std::int64_t episode = 0;
   std::uint64_t seed = 0;
