@@ -7,6 +7,8 @@
 
 #include <cstdint>
 
+#include "mjsense/core/system/cpu.h"
+
 namespace mjsense::rays {
 
 struct LocalPacket;
@@ -85,5 +87,6 @@ struct RayKernels {
 const RayKernels& portable_kernels();
 const RayKernels& avx2_kernels();
 const RayKernels& avx512_kernels();
+const RayKernels& kernels_for(Isa isa);
 
 }  // namespace mjsense::rays

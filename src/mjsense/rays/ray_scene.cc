@@ -11,14 +11,6 @@
 namespace mjsense::rays {
 namespace {
 
-const RayKernels& kernels_for(Isa isa) {
-#if defined(__x86_64__)
-  if (isa == Isa::kAvx512) return avx512_kernels();
-  if (isa == Isa::kAvx2) return avx2_kernels();
-#endif
-  return portable_kernels();
-}
-
 KernelFilter kernel_filter(const RayFilter& f) {
   using Backfaces = RayFilter::Backfaces;
   return {f.groups,
@@ -41,6 +33,14 @@ KernelWorld kernel_world(const RayWorld& w) {
 }
 
 }  // namespace
+
+const RayKernels& kernels_for(Isa isa) {
+#if defined(__x86_64__)
+  if (isa == Isa::kAvx512) return avx512_kernels();
+  if (isa == Isa::kAvx2) return avx2_kernels();
+#endif
+  return portable_kernels();
+}
 
 RayScratch::RayScratch(int num_objects)
     : stride_((num_objects + 2 * kPacket - 1) / kPacket * kPacket),

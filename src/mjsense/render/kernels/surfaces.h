@@ -314,16 +314,10 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
   if (color && s.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
 }
 
-// Gathers points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only
-// the rgb image needs.
-inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
-                            std::uint32_t lanes, bool color, Surfaces& out) {
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const Vec3f p = hit_point(view, pixels, hits, k);
-    store(out.p[0] + k, p.x);
-    store(out.p[1] + k, p.y);
-    store(out.p[2] + k, p.z);
-  }
+// Gathers normals (unit, camera frame) and materials of `lanes`, whose points are given. `color`: also
+// what only the rgb image needs.
+inline void gather_at_points(const View& view, const Pixels& pixels, const Hits& hits,
+                             std::uint32_t lanes, bool color, Surfaces& out) {
   for (std::uint32_t todo = lanes; todo;) {
     const int geom = hits.geom[__builtin_ctz(todo)];
     const ViewGeom& g = view.geoms[geom];
@@ -337,6 +331,18 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
     }
     todo &= ~mine;
   }
+}
+
+// The same at the points that the pixels show.
+inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
+                            std::uint32_t lanes, bool color, Surfaces& out) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f p = hit_point(view, pixels, hits, k);
+    store(out.p[0] + k, p.x);
+    store(out.p[1] + k, p.y);
+    store(out.p[2] + k, p.z);
+  }
+  gather_at_points(view, pixels, hits, lanes, color, out);
 }
 
 }  // namespace

@@ -130,6 +130,7 @@ void set_physical(const PhysicalOptions& options, const double rotation[9], Phys
   out.specular_table = specular_table.data();
   out.unit = static_cast<float>(kClassicRadiance / maximum_radiance(options.exposure));
   out.occlusion_reach = options.occlusion_reach;
+  out.all_geoms = options.path_samples > 0;
   for (int i = 0; i < 9; ++i) out.r_wc[i] = static_cast<float>(rotation[i]);
   const EnvironmentLight& light = options.environment->light;
   out.radiance = &light.radiance;

@@ -28,6 +28,7 @@ struct PhysicalOptions {
   std::shared_ptr<const Environment> environment;
   double environment_intensity = 1;
   float occlusion_reach = 0.5f;  // m; 0: no ambient occlusion
+  int path_samples = 0;          // per pixel of path-traced images; 0: images are not path-traced
 };
 
 // Sets `out` for a camera whose rotation (R_WC, row-major) is given, except `reflectance`.

@@ -44,6 +44,8 @@ struct PhysicalView {
   bool shows_environment = false;  // as the background, because there is no skybox
   float unit = 1;         // radiance of a colour of 1 of the skybox, haze, fog and emission
   float reflectance = 0;  // of the mirror
+  // The view has all geoms, including those that neither the image nor its shadows show, for path tracing.
+  bool all_geoms = false;
   // Distance up to which geoms hide the environment from each other, m; 0: they do not.
   float occlusion_reach = 0;
 

@@ -108,7 +108,9 @@ void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rg
   place(source, position, rotation, g);
   const Texture* texture = shape(g);
   const bool sight = find_window(view_, g) && rgba[3] > 0;
-  if (!sight && !view_.shadows && !(view_.physical.occlusion_reach > 0)) return;
+  if (!sight && !view_.shadows && !(view_.physical.occlusion_reach > 0) &&
+      !view_.physical.all_geoms)
+    return;
   set_surface(source, rgba, material, texture, g);
   Order order{sight ? g.transparent : 2, g.min_depth, index};
   if (order.rank == 1) {
@@ -172,7 +174,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   int id = world.num_geoms();
   // Bounding boxes of skins and markers, which may receive shadows, are not stored.
   const bool unbounded = options_.shadows && (world.skins() || !markers.empty());
-  if (grid.distorted_rays || unbounded || options_.disable_culling) {
+  if (grid.distorted_rays || unbounded || options_.disable_culling || view_.physical.all_geoms) {
     for (int i = 0; i < id; ++i) add_geom(i);
   } else {
     Frustum frustum(grid, position, rotation);
@@ -556,6 +558,7 @@ void ViewBuilder::set_lights(const rays::RayWorld& world, const Appearance& appe
     if (view_.physical.on)
       set_physical(options_.physical, appearance.light_intensities()[i],
                    appearance.light_ranges()[i], light);
+    light.radius = appearance.light_radii()[i];
     const int count = light_samples(appearance, i, options_.shadow_samples);
     for (float* rgb : {light.ambient, light.diffuse, light.specular}) {
       for (int k = 0; k < 3 && count > 1; ++k) rgb[k] /= static_cast<float>(count);

@@ -21,6 +21,7 @@ struct ViewLight {
   float attenuation[3];        // 1 / (a[0] + a[1] d + a[2] d^2) at the distance d in m
   float cos_cutoff, exponent;  // for spot lights
   float range;                 // m, distance at which it fades to 0; 0: unlimited
+  float radius;                // m, of the ball that shines; used by path tracing
   // MuJoCo renders a shadow map: a square around the light's axis, outside of which there are no
   // shadows. Its axes are unit vectors. Its half size is in m or, for spot lights, relative to the
   // distance along the light's axis. Not positive: shadows are not limited.

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Random directions towards the surroundings, more of them where they are bright.
+
+#include <array>
+#include <vector>
+
+#include "mjsense/render/light/environment_light.h"
+#include "mjsense/render/light/material.h"
+#include "mjsense/render/light/microfacets.h"
+
+namespace mjsense::render {
+
+// The radiance is that of level 0 of EnvironmentLight::radiance, as images show it: bilinear between the
+// texels of a face. A cell between four texels is chosen in proportion to its light; the position within
+// it is uniform.
+class EnvironmentSampler {
+ public:
+  explicit EnvironmentSampler(const EnvironmentLight& light);
+
+  // Directions are unit vectors in the environment's frame.
+  Rgb64 radiance(const Vec3& direction) const;
+  double mean() const { return mean_; }                  // luminance over all directions
+  Vec3 sample(double choice, double u, double v) const;  // uniform numbers in [0, 1); mean() > 0
+  double density(const Vec3& direction) const;           // of sample(), 1/sr
+
+ private:
+  int size_;                                  // texels along a face's edge
+  std::vector<std::array<float, 3>> texels_;  // [6, size, size]
+  std::vector<double> ends_;  // [6, size - 1, size - 1] cumulative probability of the cells
+  double mean_ = 0;
+};
+
+double luminance(const Rgb64& rgb);
+
+}  // namespace mjsense::render

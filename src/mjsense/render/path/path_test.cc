@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// Path-traced images of scenes whose radiance is known.
+
+#include "mjsense/render/path/path_tracer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "mjsense/render/testing/test_renderer.h"
+
+namespace mjsense::render {
+namespace {
+
+using testing::kDark;
+using testing::TestRenderer;
+
+constexpr std::array<double, 3> kX{1, 0, 0}, kY{0, 1, 0};
+
+PhysicalOptions surrounded_by(double radiance) {
+  PhysicalOptions out;
+  out.on = true;
+  out.path_samples = 1;
+  out.occlusion_reach = 0;
+  out.environment = upright_environment([=](double) { return radiance; });
+  return out;
+}
+
+struct Traced {
+  int width;
+  std::vector<float> radiance;  // [H, W, 3]
+  double unit;                  // of emission
+  double around;                // factor of the environment
+
+  double at(int x, int y, int c = 0) const { return radiance[3 * (y * width + x) + c]; }
+  double mean() const {
+    double sum = 0;
+    for (float x : radiance) sum += x;
+    return sum / static_cast<double>(radiance.size());
+  }
+};
+
+Traced trace(TestRenderer& s, int samples, std::array<double, 3> at, int size, double fovy,
+             std::array<double, 3> x = kX, std::array<double, 3> y = kY) {
+  s.update();
+  s.options.shadows = true;
+  ViewBuilder builder(s.model.get(), *s.assets, s.options);
+  const View& view = s.view(builder, at, x, y, grid_from_fovy(size, size, fovy, false));
+  PathTracer tracer(samples, std::make_shared<const EnvironmentSampler>(
+                                 s.options.physical.environment->light));
+  tracer.build(view);
+  Traced out{size, std::vector<float>(3 * size * size), view.physical.unit,
+             view.physical.radiance_scale};
+  tracer.render(0, (size + kTileSize - 1) / kTileSize, out.radiance.data());
+  return out;
+}
+
+// The sphere reflects all light, so that it has the radiance of the room: it is invisible.
+TEST(PathTracer, WhiteSphereVanishesInWhiteRoom) {
+  for (int metallic = 0; metallic <= 10; metallic += 5)
+    for (int roughness = 0; roughness <= 10; roughness += 2) {
+      TestRenderer s(std::string(kDark) + R"(<asset><material name="m" rgba="1 1 1 1" metallic=")" +
+                     std::to_string(metallic / 10.0) + R"(" roughness=")" +
+                     std::to_string(roughness / 10.0) +
+                     R"("/></asset><worldbody><geom size="1" material="m"/></worldbody>)");
+      s.options.physical = surrounded_by(1);
+      const Traced seen = trace(s, 64, {0, 0, 4}, 16, 20);
+      EXPECT_NEAR(seen.mean() / seen.around, 1, 0.01) << metallic << " " << roughness;
+    }
+}
+
+TEST(PathTracer, MatteSphereHasLambertsCosine) {
+  TestRenderer s(std::string(kDark) +
+                 R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
+    <light type="directional" dir=".6 0 -.8" diffuse="1 1 1"/>
+    <geom size="1" material="m"/></worldbody>)");
+  s.options.physical = surrounded_by(0);
+  for (double x : {-0.9, -0.5, 0.0, 0.4, 0.7, 0.95}) {
+    const double cosine = std::max(0.0, -0.6 * x + 0.8 * std::sqrt(1 - x * x));
+    const Traced seen = trace(s, 16, {x, 0, 3}, 1, 0.01);
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(seen.at(0, 0, c),
+                  kClassicLight * linear_of_srgb(std::array{1.0f, 0.5f, 0.2f}[c]) * cosine, 1e-3)
+          << x << " " << c;
+  }
+}
+
+// 1000 cd at a height of h m: E = 1000 / h^2 lux, and a white matte floor has the radiance E / pi. A ball
+// of any radius gives as much.
+TEST(PathTracer, CandelaFollowInverseSquareLaw) {
+  for (double h : {1.5, 3.0})
+    for (const char* radius : {"0", "0.5"}) {
+      TestRenderer s(std::string(kDark) +
+                     R"(<asset><material name="m" specular="0" rgba="1 1 1 1"/></asset><worldbody>
+      <light type="point" diffuse="1 1 1" intensity="1000" range="1000" pos="0 0 )" +
+                     std::to_string(h) + R"(" bulbradius=")" + radius + R"("/>
+      <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
+      s.options.physical = surrounded_by(0);
+      const double radiance = 1000 / (h * h) / M_PI / maximum_radiance(kDefaultExposure);
+      const Traced seen = trace(s, 256, {0, 0, 1}, 4, 0.01);
+      EXPECT_NEAR(seen.mean() / radiance, 1, 0.01) << h << " " << radius;
+    }
+}
+
+}  // namespace
+}  // namespace mjsense::render
