@@ -273,7 +273,8 @@ def render(
     shadows: bool | None = None,
     samples: int | None = None,
     shadow_samples: int | None = None,
-    shading: Literal["classic", "pbr"] | None = None,
+    shading: Literal["classic", "pbr", "path"] | None = None,
+    samples_per_pixel: int | None = None,
     exposure: float | None = None,
     tone_mapping: Literal["neutral", "filmic", "linear"] | None = None,
     environment_intensity: float | None = None,
@@ -326,7 +327,10 @@ def render(
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points. By default as
             recorded.
         shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
-            segmentation and the other images are the same. The options below belong to pbr. By default as recorded.
+            segmentation and the other images are the same. path: the same by path tracing, which is the reference for
+            pbr and takes a thousand times longer. The options below belong to pbr and path. By default as recorded.
+        samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
+            ``shadow_samples`` are for the other kinds of shading. By default as recorded.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness. By default as recorded.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips. By default as recorded.

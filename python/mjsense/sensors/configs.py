@@ -338,9 +338,13 @@ class CameraSensorCfg(SensorCfg):
     shadow_samples: int = 1
     """Points of each light at which its shadows are computed, within the ball of its ``bulbradius``; more than 1 gives
     soft shadows and takes longer. A view has at most 32 lights and points."""
-    shading: Literal["classic", "pbr"] = "classic"
+    shading: Literal["classic", "pbr", "path"] = "classic"
     """classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth, segmentation and
-    the other images are the same. The options below belong to pbr."""
+    the other images are the same. path: the same by path tracing, which is the reference for pbr and takes a thousand
+    times longer. The options below belong to pbr and path."""
+    samples_per_pixel: int = 64
+    """Paths per pixel with shading path; four times as many halve the noise. ``samples`` and ``shadow_samples`` are for
+    the other kinds of shading."""
     exposure: float = 8.0
     """Exposure in EV at ISO 100; 1 more halves the brightness."""
     tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral"

@@ -467,7 +467,8 @@ def make_vec(
     shadows: bool = True,
     samples: int = 1,
     shadow_samples: int = 1,
-    shading: Literal["classic", "pbr"] = "classic",
+    shading: Literal["classic", "pbr", "path"] = "classic",
+    samples_per_pixel: int = 64,
     exposure: float = 8.0,
     tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
     environment_intensity: float = 1.0,
@@ -524,7 +525,10 @@ def make_vec(
         shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
         shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
-            segmentation and the other images are the same. The options below belong to pbr.
+            segmentation and the other images are the same. path: the same by path tracing, which is the reference for
+            pbr and takes a thousand times longer. The options below belong to pbr and path.
+        samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
+            ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips.

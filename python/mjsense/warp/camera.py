@@ -154,7 +154,7 @@ class Camera(WarpSensor):
         cfg = self.cfg
         missing = {
             "samples > 1": cfg.samples > 1,
-            "shading='pbr' (it has classic shading only)": cfg.shading != "classic",
+            f"shading='{cfg.shading}' (it has classic shading only)": cfg.shading != "classic",
             "distortion": cfg.distortion.model != "none",
             "depth_noise": cfg.depth_noise != "none",
             "renderer='opengl'": cfg.renderer != "rays",

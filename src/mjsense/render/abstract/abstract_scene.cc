@@ -39,7 +39,7 @@ StructReader StructReader::lights(const StructLayout& layout) {
       MJSENSE_FIELD(L, diffuse, false, true),     MJSENSE_FIELD(L, specular, false, true),
       MJSENSE_FIELD(L, attenuation, false, true), MJSENSE_FIELD(L, cutoff, false, true),
       MJSENSE_FIELD(L, exponent, false, true),    MJSENSE_FIELD(L, intensity, false, false),
-      MJSENSE_FIELD(L, range, false, false),
+      MJSENSE_FIELD(L, range, false, false),      MJSENSE_FIELD(L, bulbradius, false, false),
   };
   if (!layout.contains("type") && !layout.contains("directional"))
     throw ValueError("MjvLight of this MuJoCo has neither the field 'type' nor 'directional'");

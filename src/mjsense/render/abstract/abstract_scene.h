@@ -31,7 +31,7 @@ struct AbstractLight {
   float pos[3] = {}, dir[3] = {};
   float ambient[3] = {}, diffuse[3] = {}, specular[3] = {};
   float attenuation[3] = {1, 0, 0}, cutoff = 0, exponent = 0;
-  float intensity = 0, range = 0;
+  float intensity = 0, range = 0, bulbradius = 0;
 };
 
 struct AbstractCamera {

@@ -14,6 +14,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_indices.h"
+#include "mjsense/core/system/thread_pool.h"
+#include "mjsense/render/path/path_tracer.h"
 
 namespace mjsense::render {
 namespace {
@@ -119,7 +121,11 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                     .intensities = intensities_,
                     .ranges = ranges_};
     const View& built = builder_->build(view, position_, rotation_, grid_);
-    kept_.render(built, images, tiles_, memory_->scratch());
+    if (built.physical.all_geoms) {
+      trace_paths(built, images.rgb);
+    } else {
+      kept_.render(built, images, tiles_, memory_->scratch());
+    }
   };
   if (color) {
     ImageTargets images = targets;
@@ -138,6 +144,24 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
       std::replace(targets.depth, targets.depth + static_cast<std::size_t>(width) * height, 0.0f,
                    far_depth(near_, far_, grid_.orthographic));
   }
+}
+
+void SceneRenderer::trace_paths(const View& view, std::uint8_t* rgb) {
+  // Meshes and textures that are prepared on demand belong to one thread.
+  for (int i = 0; i < view.num_geoms; ++i) {
+    const ViewGeom& g = view.geoms[i];
+    if (g.mesh_on_demand) g.mesh_on_demand->prepare_surface(g.surface.uses_mesh_uvs);
+    for (const Texture* texture : {g.surface.texture, view.skybox})
+      if (texture && texture->on_demand) texture->on_demand->add_level(0);
+  }
+  if (around_ != physical_.environment) {
+    sampler_ = std::make_shared<const EnvironmentSampler>(physical_.environment->light);
+    around_ = physical_.environment;
+  }
+  PathTracer paths(physical_.path_samples, sampler_);
+  paths.build(view);
+  ThreadPool(0).run((view.grid.height + kTileSize - 1) / kTileSize,
+                    [&](int row, int) { paths.render(row, row + 1, rgb); });
 }
 
 // `all`: include geoms without segmentation id, which depth and segmentation do not show.
@@ -517,6 +541,7 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
     std::copy_n(light.diffuse, 3, out.diffuse);
     std::copy_n(light.specular, 3, out.specular);
     out.attenuation[0] = 1;
+    out.radius = light.bulbradius;
     if (out.casts_shadows && !drawn_point) limit_shadows(settings_, light.cutoff, out);
     if (directional) continue;
     if (!drawn_point) std::copy_n(light.attenuation, 3, out.attenuation);  // MuJoCo leaves it at 0

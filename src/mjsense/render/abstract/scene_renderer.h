@@ -13,6 +13,7 @@
 #include "mjsense/render/abstract/model_arrays.h"
 #include "mjsense/render/abstract/scene_assets.h"
 #include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/render/path/environment_sampler.h"
 #include "mjsense/render/view/view_builder.h"
 
 namespace mjsense::render {
@@ -95,6 +96,7 @@ class SceneRenderer {
   void add_skin(const AbstractGeom& geom, DrawnGeom drawn);
   void read_lights(const SceneMemory& scene);
   void read_camera(const SceneMemory& scene, int width, int height);
+  void trace_paths(const View& view, std::uint8_t* rgb);
 
   std::unique_ptr<mjModel> model_;
   std::unique_ptr<mjModel> indices_;  // model_ with what only MuJoCo reads
@@ -121,6 +123,8 @@ class SceneRenderer {
   std::unique_ptr<TileMemory> memory_;
   RenderTiles tiles_ = best_render_tiles();
   KeptImages kept_;
+  std::shared_ptr<const Environment> around_;  // the environment of `sampler_`
+  std::shared_ptr<const EnvironmentSampler> sampler_;
 };
 
 }  // namespace mjsense::render

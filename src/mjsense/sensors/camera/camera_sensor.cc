@@ -11,6 +11,7 @@
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/render/path/path_tracer.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/depth_noise.h"
@@ -39,7 +40,7 @@ render::ViewOptions view_options(const CameraSensorCfg& cfg, double near, double
   options.textures = cfg.use_textures;
   const bool colors = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
   options.shadows = cfg.use_shadows && colors;
-  options.shadow_samples = cfg.shadow_samples;
+  options.shadow_samples = cfg.shading == Shading::kPath ? 1 : cfg.shadow_samples;
   options.reflections = colors;
   options.near = static_cast<float>(near);
   options.far = static_cast<float>(far);
@@ -66,6 +67,7 @@ struct CameraSensor::Workspace {
   // By builder: tiles of the fixed layer that must be rendered before the image; null: none.
   std::vector<render::FixedTile*> making;
   std::vector<render::TileMemory> memory;  // by thread
+  std::vector<render::PathTracer> paths;   // by builder; empty: images are not path-traced
   render::RenderTiles render = render::best_render_tiles();
 };
 
@@ -171,7 +173,8 @@ std::unique_ptr<render::GlRenderer> CameraSensor::make_gl_renderer(int num_world
 
 // Prepares the parts of images that are kept for later ones, where the camera cannot move.
 void CameraSensor::prepare_layers(int num_worlds) {
-  const bool fixed = render::FixedLayer::possible(model_, camera_);
+  const bool fixed =
+      cfg_.shading != Shading::kPath && render::FixedLayer::possible(model_, camera_);
   changed_tiles_.clear();
   // The other fields follow from images that are not stored.
   if (fixed && !optical_flow_ && !owners_ && clean_.empty()) changed_tiles_.resize(num_worlds);
@@ -193,6 +196,12 @@ void CameraSensor::allocate_workspace(const SensorInit& init) {
   if (wants("rgb")) options.physical = physical_options(cfg_);
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
+  if (options.physical.path_samples > 0) {
+    const auto around = std::make_shared<const render::EnvironmentSampler>(
+        options.physical.environment->light);
+    for (int i = 0; i < slots; ++i)
+      workspace_->paths.emplace_back(options.physical.path_samples, around);
+  }
   const int geoms = static_cast<int>(render::ViewBuilder::max_geoms(model_) + options.markers);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }
@@ -326,6 +335,8 @@ const render::View& CameraSensor::build_view(const rays::RayScene& rays, int wor
   const render::View& view = builder.build(state, rays.shared(), w.appearance, w.markers.all(),
                                            camera.pos, camera.mat, w.grid);
   if (fixed_layers_) builder.use_fixed(fixed_layers_->find(world, view));
+  if (!workspace_->paths.empty())
+    workspace_->paths[&builder - workspace_->builders.data()].build(view);
   return view;
 }
 
@@ -367,9 +378,13 @@ void CameraSensor::add_noise(const CastContext& context) {
   });
 }
 
-void CameraSensor::render_rows(const render::View& view, int world, int first, int last,
-                               int thread) {
+void CameraSensor::render_rows(int slot, int world, int first, int last, int thread) {
+  const render::View& view = workspace_->builders[slot].view();
   render::ImageTargets image = targets(world, thread);
+  if (!workspace_->paths.empty()) {
+    workspace_->paths[slot].render(first, last, image.rgb);
+    image.rgb = nullptr;
+  }
   if (render::ChangedTiles* tiles = changed_tiles(world)) {
     image.changed_tiles = tiles->changed();
     image.receivers = tiles->receivers();
@@ -415,7 +430,7 @@ void CameraSensor::render_due(const CastContext& context) {
         make_fixed(view, tiles, 0, tile_rows, thread);
         builder.use_fixed(tiles);
       }
-      render_rows(view, due_[item], 0, tile_rows, thread);
+      render_rows(thread, due_[item], 0, tile_rows, thread);
       if (changed) changed->keep(view);
     });
     return;
@@ -443,7 +458,7 @@ void CameraSensor::render_due(const CastContext& context) {
       if (making[i]) work.builders[i].use_fixed(making[i]);
   }
   run_bands([&](int image, int first, int last, int thread) {
-    render_rows(work.builders[image].view(), due_[image], first, last, thread);
+    render_rows(image, due_[image], first, last, thread);
   });
   if (changed_tiles_.empty()) return;
   context.pool.run(

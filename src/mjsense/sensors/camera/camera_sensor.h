@@ -75,7 +75,8 @@ class CameraSensor final : public Sensor {
   render::ImageTargets targets(int world, int thread);
   void derive(int world, const render::ImageTargets& image, int first, int last);
   // Renders rows of tiles [first, last) of an image, and computes the fields that follow from it.
-  void render_rows(const render::View& view, int world, int first, int last, int thread);
+  // slot: of the builder that has the view.
+  void render_rows(int slot, int world, int first, int last, int thread);
   // Renders rows of tiles [first, last) of the fixed geoms of a view.
   void make_fixed(const render::View& view, render::FixedTile* tiles, int first, int last,
                   int thread);

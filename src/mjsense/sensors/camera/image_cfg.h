@@ -11,8 +11,10 @@
 
 namespace mjsense::sensors {
 
-enum class Shading { kClassic, kPbr };
-constexpr std::array<std::string_view, 2> enum_names(Shading) { return {"classic", "pbr"}; }
+enum class Shading { kClassic, kPbr, kPath };
+constexpr std::array<std::string_view, 3> enum_names(Shading) {
+  return {"classic", "pbr", "path"};
+}
 
 // As render::ToneMapping.
 enum class ToneMap { kNeutral, kFilmic, kLinear };
@@ -26,6 +28,7 @@ struct RgbCfg {
   int samples = 1;
   int shadow_samples = 1;
   NamedEnum<Shading> shading;
+  int samples_per_pixel = 64;
   double exposure = 8;
   NamedEnum<ToneMap> tone_mapping;
   double environment_intensity = 1;
@@ -47,7 +50,14 @@ void visit_fields(V& v, RgbCfg& c) {
   v("shading", c.shading,
     "classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; "
     "depth, "
-    "segmentation and the other images are the same. The options below belong to pbr.")
+    "segmentation and the other images are the same. path: the same by path tracing, which is the "
+    "reference "
+    "for pbr and takes a thousand times longer. The options below belong to pbr and path.")
+      .decides_data();
+  v("samples_per_pixel", c.samples_per_pixel,
+    "Paths per pixel with shading path; four times as many halve the noise. ``samples`` and "
+    "``shadow_samples`` are for the other kinds of shading.")
+      .within(1, 65536)
       .decides_data();
   v("exposure", c.exposure, "Exposure in EV at ISO 100; 1 more halves the brightness.")
       .within(-10, 30)

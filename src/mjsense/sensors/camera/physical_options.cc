@@ -5,13 +5,14 @@ namespace mjsense::sensors {
 
 render::PhysicalOptions physical_options(const RgbCfg& cfg) {
   render::PhysicalOptions out;
-  out.on = cfg.shading == Shading::kPbr;
+  out.on = cfg.shading != Shading::kClassic;
   if (!out.on) return out;
   out.exposure = cfg.exposure;
   out.tone_mapping = static_cast<render::ToneMapping>(static_cast<ToneMap>(cfg.tone_mapping));
   out.environment = render::studio();
   out.environment_intensity = cfg.environment_intensity;
-  if (!cfg.ambient_occlusion) out.occlusion_reach = 0;
+  if (cfg.shading == Shading::kPath) out.path_samples = cfg.samples_per_pixel;
+  if (!cfg.ambient_occlusion || out.path_samples > 0) out.occlusion_reach = 0;
   return out;
 }
 
