@@ -12,6 +12,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields/fields.h"
 #include "mjsense/render/abstract/scene_renderer.h"
 #include "mjsense/sensors/camera/physical_options.h"
 #include "python/bindings/bindings.h"

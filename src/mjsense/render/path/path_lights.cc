@@ -121,7 +121,7 @@ double PathLights::total(const Vec3& p) const {
   return sum;
 }
 
-void PathLights::sample_light(const ViewLight& light, const Vec3& p, Rng& rng,
+void PathLights::sample_light(const ViewLight& light, const Vec3& p, PathRandom& random,
                               LightSample& out) const {
   const Arriving at = arriving(light, p);
   out.blocked = view_->shadows && light.casts_shadows;
@@ -136,9 +136,10 @@ void PathLights::sample_light(const ViewLight& light, const Vec3& p, Rng& rng,
   }
   if (!is_ball(light, at.distance)) return;
   const Cone cone(light.radius, at.distance);
-  const double cosine = 1 - rng.uniform() * cone.square_sine / (1 + cone.least_cosine);
+  const auto [u, v] = random.square();
+  const double cosine = 1 - u * cone.square_sine / (1 + cone.least_cosine);
   const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
-  const double angle = 2 * pi * rng.uniform();
+  const double angle = 2 * pi * v;
   const auto [x, y] = tangents(at.to);
   for (int k = 0; k < 3; ++k)
     out.direction[k] = cosine * at.to[k] + sine * (std::cos(angle) * x[k] + std::sin(angle) * y[k]);
@@ -150,10 +151,10 @@ void PathLights::sample_light(const ViewLight& light, const Vec3& p, Rng& rng,
   for (double& c : out.radiance) c /= pi * cone.square_sine;
 }
 
-bool PathLights::sample_emitter(const Emitter& emitter, const Vec3& p, Rng& rng,
+bool PathLights::sample_emitter(const Emitter& emitter, const Vec3& p, PathRandom& random,
                                 LightSample& out) const {
   const ViewGeom& g = view_->geoms[emitter.geom];
-  const double u = rng.uniform(), v = rng.uniform();
+  const auto [u, v] = random.square();
   const double s = 2 * u - 1, t = 2 * v - 1;
   Vec3 at{}, n{0, 0, 1};  // geom frame
   const double x = g.size[0], y = g.size[1], z = g.size[2];
@@ -168,8 +169,9 @@ bool PathLights::sample_emitter(const Emitter& emitter, const Vec3& p, Rng& rng,
       break;
     }
     default: {
-      double face = rng.uniform() * (x * y + y * z + z * x);
-      const double sign = rng.uniform() < 0.5 ? -1 : 1;
+      const auto [side, end] = random.square();
+      double face = side * (x * y + y * z + z * x);
+      const double sign = end < 0.5 ? -1 : 1;
       if (face < x * y) {
         at = {s * x, t * y, sign * z};
         n = {0, 0, sign};
@@ -205,25 +207,26 @@ Vec3 PathLights::to_environment(const Vec3& d) const {
   return unit(out);
 }
 
-bool PathLights::sample(const Vec3& p, double total, Rng& rng, LightSample& out) const {
+bool PathLights::sample(const Vec3& p, double total, PathRandom& random, LightSample& out) const {
   if (!(total > 0)) return false;
   out = {};
-  double left = rng.uniform() * total;
+  double left = random.uniform() * total;
   const std::size_t lights = view_->num_lights;
   for (std::size_t i = 0; i < lights + emitters_.size(); ++i) {
     const double part = estimate(i, p);
     left -= part;
     if (left >= 0) continue;
     out.choice = part / total;
-    if (i >= lights) return sample_emitter(emitters_[i - lights], p, rng, out);
-    sample_light(view_->lights[i], p, rng, out);
+    if (i >= lights) return sample_emitter(emitters_[i - lights], p, random, out);
+    sample_light(view_->lights[i], p, random, out);
     return true;
   }
   const double part = environment_estimate();
   if (!(part > 0)) return false;
   out.choice = part / total;
-  const double choice = rng.uniform(), u = rng.uniform();
-  const Vec3 d = environment_->sample(choice, u, rng.uniform());
+  const double choice = random.uniform();
+  const auto [u, v] = random.square();
+  const Vec3 d = environment_->sample(choice, u, v);
   const float* r = view_->physical.r_wc;
   for (int k = 0; k < 3; ++k) out.direction[k] = r[k] * d[0] + r[3 + k] * d[1] + r[6 + k] * d[2];
   out.direction = unit(out.direction);

@@ -14,8 +14,8 @@
 #include <span>
 #include <vector>
 
-#include "mjsense/core/rng.h"
 #include "mjsense/render/path/environment_sampler.h"
+#include "mjsense/render/path/path_random.h"
 #include "mjsense/render/path/path_scene.h"
 
 namespace mjsense::render {
@@ -42,7 +42,7 @@ class PathLights {
   // Sum of the estimates of all lights at a point; 0: it gets no light that can be chosen.
   double total(const Vec3& p) const;
   // Draws a light and a direction. False: the sample has no light.
-  bool sample(const Vec3& p, double total, Rng& rng, LightSample& out) const;
+  bool sample(const Vec3& p, double total, PathRandom& random, LightSample& out) const;
 
   // Light of a ray that was reflected at `from` with the density `density` (0: exactly in this direction),
   // weighted against sample() (the balance heuristic: E. Veach, Robust Monte Carlo Methods for Light
@@ -73,8 +73,10 @@ class PathLights {
   bool is_ball(const ViewLight& light, double distance) const;
   double estimate(std::size_t i, const Vec3& p) const;
   double environment_estimate() const;
-  void sample_light(const ViewLight& light, const Vec3& p, Rng& rng, LightSample& out) const;
-  bool sample_emitter(const Emitter& emitter, const Vec3& p, Rng& rng, LightSample& out) const;
+  void sample_light(const ViewLight& light, const Vec3& p, PathRandom& random,
+                    LightSample& out) const;
+  bool sample_emitter(const Emitter& emitter, const Vec3& p, PathRandom& random,
+                      LightSample& out) const;
   Vec3 to_environment(const Vec3& direction) const;
 
   const View* view_ = nullptr;

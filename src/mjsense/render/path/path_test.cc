@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path-traced images of scenes whose radiance is known.
 
-#include "mjsense/render/path/path_tracer.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "mjsense/render/path/path_tracer.h"
 #include "mjsense/render/testing/test_renderer.h"
 
 namespace mjsense::render {
@@ -46,8 +45,8 @@ Traced trace(TestRenderer& s, int samples, std::array<double, 3> at, int size, d
   s.options.shadows = true;
   ViewBuilder builder(s.model.get(), *s.assets, s.options);
   const View& view = s.view(builder, at, x, y, grid_from_fovy(size, size, fovy, false));
-  PathTracer tracer(samples, std::make_shared<const EnvironmentSampler>(
-                                 s.options.physical.environment->light));
+  PathTracer tracer(
+      samples, std::make_shared<const EnvironmentSampler>(s.options.physical.environment->light));
   tracer.build(view);
   Traced out{size, std::vector<float>(3 * size * size), view.physical.unit,
              view.physical.radiance_scale};

@@ -3,7 +3,7 @@
 // Path-traced images: the reference for physically based shading. Light is followed from the pixels over
 // any number of reflections, so that the expected value of an image is the solution of the rendering
 // equation (J. Kajiya, The Rendering Equation, SIGGRAPH 1986) for the materials and lights of
-// physically based views. Its noise falls with the square root of the number of samples.
+// physically based views. Its noise falls at least with the square root of the number of samples.
 //
 // A pixel is the mean of its samples, which are uniform in its square. At each surface one light is
 // chosen (path_lights.h), and the direction of the reflection is drawn from the material (scatter.h); both

@@ -68,8 +68,8 @@ void PathWave::start(int x0, int x1, int y0, int y1, int sample) {
     for (int x = x0; x < x1; ++x) {
       const int pixel = static_cast<int>(paths_.size());
       Path& path = paths_.emplace_back();
-      path.rng = Rng(stream_of("path"), static_cast<std::uint32_t>(y * grid.width + x), 0, sample);
-      const double right = path.rng.uniform(), down = path.rng.uniform();
+      path.random = PathRandom(static_cast<std::uint32_t>(y * grid.width + x), sample);
+      const auto [right, down] = path.random.square();
       PathPixel& seen = pixels_.emplace_back();
       seen = {};
       seen.geom = -1;
@@ -166,7 +166,8 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
   const bool back = dot(face, path.d) > 0;
   if (back)
     for (double& x : face) x = -x;
-  if (surface.alpha < 1 && (back || path.rng.uniform() >= surface.alpha)) {
+  path.random.begin_surface(path.surfaces++);
+  if (surface.alpha < 1 && (back || path.random.uniform() >= surface.alpha)) {
     // Seen through. The ray continues behind the surface.
     path.o = advanced(point, clearance(point, hit.t), path.d);
     return true;
@@ -185,13 +186,13 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
   }
   if (path.reflections >= kSurvivors) {
     const double going = std::min(0.95, std::ranges::max(path.throughput));
-    if (path.rng.uniform() >= going) return false;
+    if (path.random.uniform() >= going) return false;
     for (double& c : path.throughput) c /= going;
   }
   ++path.reflections;
   const Vec3 start = advanced(point, clearance(point, hit.t), face);
   const Vec3 to_viewer{-path.d[0], -path.d[1], -path.d[2]};
-  if (is_mirror(view, hit) && path.rng.uniform() < view.physical.reflectance) {
+  if (is_mirror(view, hit) && path.random.uniform() < view.physical.reflectance) {
     const double twice = 2 * dot(to_viewer, face);
     path.d = unit({twice * face[0] - to_viewer[0], twice * face[1] - to_viewer[1],
                    twice * face[2] - to_viewer[2]});
@@ -210,7 +211,7 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
   const Scatter scatter(surface.substance, unit(v));
   path.total = lights_.total(start);
   LightSample light;
-  if (lights_.sample(start, path.total, path.rng, light) && dot(light.direction, face) > 0) {
+  if (lights_.sample(start, path.total, path.random, light) && dot(light.direction, face) > 0) {
     const Scatter::Value value = scatter.value(frame.local(light.direction));
     const double density = light.choice * light.density;
     double weight = 1 / light.choice;  // for a light of exactly this direction
@@ -228,8 +229,9 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
       for (int c = 0; c < 3; ++c) path.radiance[c] += shadow.light[c];
     }
   }
-  const double choice = path.rng.uniform(), u = path.rng.uniform();
-  const Vec3 l = scatter.sample(choice, u, path.rng.uniform());
+  const double choice = path.random.uniform();
+  const auto [a, b] = path.random.square();
+  const Vec3 l = scatter.sample(choice, a, b);
   const Scatter::Value value = scatter.value(l);
   path.d = frame.world(l);
   if (!(value.density > 0) || dot(path.d, face) <= 0) return false;

@@ -5,7 +5,6 @@
 
 #include <vector>
 
-#include "mjsense/core/rng.h"
 #include "mjsense/render/path/path_lights.h"
 #include "mjsense/render/path/path_scene.h"
 #include "mjsense/render/path/path_surfaces.h"
@@ -27,9 +26,9 @@ class PathWave {
     double density;  // of its direction, 1/sr; 0: not random
     double total;    // PathLights::total(from)
     Rgb64 throughput, radiance;
-    Rng rng{0, 0, 0, 0};
+    PathRandom random;
     int pixel;
-    int reflections = 0;
+    int surfaces = 0, reflections = 0;
   };
   // Light that reaches a path unless something is in between.
   struct Shadow {
