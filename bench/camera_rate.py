@@ -9,7 +9,7 @@ import os
 import statistics
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import camera_scenes
 import harness  # noqa: F401  adds the measured build to sys.path
@@ -27,6 +27,7 @@ class Shot:
     size: tuple[int, int]
     kinds: tuple[Any, ...] = ("rgb",)
     shadows: bool = True
+    shading: Literal["classic", "pbr"] = "classic"
 
 
 class Ours:
@@ -42,6 +43,7 @@ class Ours:
                 height=shot.size[1],
                 data_types=shot.kinds,
                 use_shadows=shot.shadows,
+                shading=shot.shading,
             )
             for i, shot in enumerate(shots)
         ]

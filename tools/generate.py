@@ -109,10 +109,16 @@ class Signature(NamedTuple):
 
 # Options that follow from what is rendered or imported.
 OF_RECORDING = ("episodes", "append", "overwrite", "house")
+OF_ATTEMPTS = ("episodes", "append", "max_attempts", "num_attempts", "first_attempt", "attempts", "shard")
 OF_IMPORT = (*OF_RECORDING, "resume", "molmospaces_depth")
 
 SIGNATURES = {
     "tasks/recording.py": Signature(("RecordJobCfg",), ("task", "robot", "policy", "scene", "out")),
+    "evaluation/playing.py": Signature(
+        ("RecordJobCfg",),
+        ("task", "robot", "policy", "scene", "out", "action_noise", "keep_failures", *OF_ATTEMPTS),
+        defaults={"terminate_upon_success": "True"},
+    ),
     "tasks/vector.py": Signature(
         ("RolloutCfg",),
         ("task", "robot", "policy", "scene"),

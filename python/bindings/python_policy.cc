@@ -8,6 +8,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "mjsense/core/error.h"
 #include "mjsense_tasks/rollout/rollout.h"
@@ -92,11 +93,13 @@ void PythonPolicy::initialize(tasks::episode::Task& task) {
     width_.push_back(groups[g].command_size);
     n_ += groups[g].command_size;
   }
+  broken_.assign(B, "");
   phase_.assign(B, 0);
   retries_.assign(B, 0);
   chunk_ = {.given = std::vector<std::uint8_t>(B * group_.size()),
             .done = std::vector<std::uint8_t>(B),
             .success = std::vector<std::int8_t>(B),
+            .hold = std::vector<std::uint8_t>(B * group_.size()),
             .left = std::vector<std::size_t>(B)};
 }
 
@@ -133,13 +136,17 @@ std::vector<std::pair<std::string, std::string>> PythonPolicy::info(int world) c
 }
 
 std::string PythonPolicy::failure(int world) const {
+  if (!broken_[world].empty()) return broken_[world];
   return host_->call(place("failure"), [&] {
     return nb::cast<std::string>(nb::str(policy_.get().attr("failure")(world)));
   });
 }
 
 void PythonPolicy::reset_all(tasks::episode::ActiveWorlds& worlds) {
-  for (int w : worlds.ids()) chunk_.left[w] = 0;
+  for (int w : worlds.ids()) {
+    chunk_.left[w] = 0;
+    broken_[w].clear();
+  }
   host_->call(place("reset"), [&] {
     nb::list ids, episodes, instructions;
     for (int w : worlds.ids()) {
@@ -201,6 +208,7 @@ void PythonPolicy::read(nb::handle value) {
   };
   for (std::size_t w = 0; w < B; ++w) {
     if (!wanted_rows_[w]) continue;
+    std::fill_n(&chunk_.hold[w * group_.size()], group_.size(), 0);
     chunk_.done[w] = 0;
     chunk_.success[w] = -1;
   }
@@ -212,11 +220,17 @@ void PythonPolicy::read(nb::handle value) {
   for (auto [key, item] : nb::cast<nb::dict>(value)) {
     const auto name = nb::cast<std::string>(key);
     if (name == "done") {
-      read_flags(item, "done", [&](std::size_t w, bool x) { chunk_.done[w] = x; });
+      read_flags(item, "done", [&](std::size_t w, double x) { chunk_.done[w] = x != 0; });
       continue;
     }
     if (name == "success") {
-      read_flags(item, "success", [&](std::size_t w, bool x) { chunk_.success[w] = x; });
+      read_flags(item, "success", [&](std::size_t w, double x) {
+        chunk_.success[w] = std::isnan(x) ? std::int8_t{-1} : std::int8_t{x != 0};
+      });
+      continue;
+    }
+    if (name == "hold") {
+      read_hold(item);
       continue;
     }
     if (name == "action") {
@@ -225,7 +239,7 @@ void PythonPolicy::read(nb::handle value) {
       continue;
     }
     std::size_t first = 0, i = 0;
-    std::vector<std::string> names{"action", "done", "success"};
+    std::vector<std::string> names{"action", "done", "success", "hold"};
     for (; i < group_.size(); ++i) {
       const std::string& group = task_->robot().groups()[group_[i]].name;
       if (group == name) break;
@@ -280,7 +294,22 @@ void PythonPolicy::read_flags(nb::handle value, const char* what, auto&& set) {
                                  shape_text(flags), B));
   }
   for (std::size_t w = 0; w < B; ++w) {
-    if (wanted_rows_[w]) set(w, flags.data()[w] != 0);
+    if (wanted_rows_[w]) set(w, flags.data()[w]);
+  }
+}
+
+void PythonPolicy::read_hold(nb::handle value) {
+  const auto B = static_cast<std::size_t>(task_->num_worlds()), groups = group_.size();
+  const auto flags = nb::cast<Numbers>(as_array_.get()(value, nb::arg("dtype") = "float64"));
+  const bool of_groups = flags.ndim() == 2 && flags.shape(1) == groups;
+  if ((flags.ndim() != 1 && !of_groups) || flags.shape(0) != B) {
+    throw ValueError(
+        fmt::format("{} returned 'hold' of shape {}, expected ({},) or ({}, {}): move groups",
+                    place("act"), shape_text(flags), B, B, groups));
+  }
+  for (std::size_t w = 0; w < B; ++w) {
+    for (std::size_t i = 0; wanted_rows_[w] && i < groups; ++i)
+      chunk_.hold[w * groups + i] = flags.data()[of_groups ? w * groups + i : w] != 0;
   }
 }
 
@@ -299,11 +328,31 @@ void PythonPolicy::read_phases() {
   read_ints("num_retries", retries_);
 }
 
+// "policy 'net' returned an action that is not finite (arm[2] is nan)", or "".
+std::string PythonPolicy::not_finite(int world, const double* values) const {
+  for (std::size_t i = 0; i < group_.size(); ++i) {
+    for (int k = 0; commands(world, i) && k < width_[i]; ++k) {
+      if (std::isfinite(values[k])) continue;
+      return fmt::format("policy '{}' returned an action that is not finite ({}[{}] is {})", name_,
+                         task_->robot().groups()[group_[i]].name, k, values[k]);
+    }
+    values += width_[i];
+  }
+  return "";
+}
+
 void PythonPolicy::fill(int world, tasks::robots::Action& action) {
   const std::size_t at = chunk_.steps - chunk_.left[world];
   const double* values = chunk_.values.data() + (world * chunk_.steps + at) * n_;
+  broken_[world] = not_finite(world, values);
+  if (!broken_[world].empty()) {  // The groups hold their position in the last step of the episode.
+    chunk_.left[world] = 0;
+    action.done = true;
+    action.success = false;
+    return;
+  }
   for (std::size_t i = 0; i < group_.size(); ++i) {
-    if (chunk_.given[world * group_.size() + i])
+    if (commands(world, i))
       action.commands[group_[i]].set({values, static_cast<std::size_t>(width_[i])});
     values += width_[i];
   }

@@ -58,6 +58,7 @@ class PythonPolicy final : public tasks::episode::PlannerPolicy {
     std::vector<std::uint8_t> given;   // [B, move groups]
     std::vector<std::uint8_t> done;    // [B], at the last step
     std::vector<std::int8_t> success;  // [B], -1: not reported
+    std::vector<std::uint8_t> hold;    // [B, move groups], the group holds its position
     std::vector<std::size_t> left;     // [B]
   };
   std::string place(const char* method) const;
@@ -65,8 +66,14 @@ class PythonPolicy final : public tasks::episode::PlannerPolicy {
   void call_act();
   void read(nb::handle value);
   void read_group(nb::handle value, std::size_t first, std::size_t width, const std::string& what);
+  void read_hold(nb::handle value);
   void read_flags(nb::handle value, const char* what, auto&& set);
   void read_phases();
+  // Whether the policy gives a command to the i-th controlled group.
+  bool commands(int world, std::size_t i) const {
+    return chunk_.given[world * group_.size() + i] && !chunk_.hold[world * group_.size() + i];
+  }
+  std::string not_finite(int world, const double* values) const;
   void fill(int world, tasks::robots::Action& action);
 
   PyHandle policy_;
@@ -77,6 +84,7 @@ class PythonPolicy final : public tasks::episode::PlannerPolicy {
   std::vector<std::string> phase_names_;
   std::vector<tasks::episode::Phase> phases_;
   std::vector<int> phase_, retries_;  // [B]
+  std::vector<std::string> broken_;   // [B], why the last action could not be executed, or ""
   PyHandle act_, observation_, wanted_, as_array_;
   bool* wanted_rows_ = nullptr;     // [B], memory of wanted_
   std::vector<int> group_, width_;  // of the controlled move groups

@@ -13,6 +13,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/render/abstract/scene_renderer.h"
+#include "mjsense/sensors/camera/physical_options.h"
 #include "python/bindings/bindings.h"
 
 namespace mjsense::python {
@@ -170,6 +171,12 @@ void bind_renderer(nb::module_& m) {
   nb::class_<BoundRenderer>(m, "SceneRenderer")
       .def(nb::init<nb::dict, nb::dict, nb::dict, nb::dict, nb::dict>())
       .def("render", &BoundRenderer::render)
+      .def("set_shading",
+           [](BoundRenderer& r, const std::string& word) {
+             sensors::RgbCfg cfg;
+             cfg.shading = from_word<sensors::Shading>(word, "Renderer", "shading");
+             r.renderer.set_physical(sensors::physical_options(cfg));
+           })
       .def("check_indices", [](const BoundRenderer& r) { r.renderer.check_indices(); })
       .def("reload",
            [](BoundRenderer& r) {

@@ -448,6 +448,13 @@ void bind_rollout(nb::module_& m) {
       .def(
           "instruction", [](PyRollout& s, int w) { return s.rollout().task().instruction(w); },
           nb::arg("world"))
+      .def(
+          "object",
+          [](PyRollout& s, int w) {
+            const auto objects = s.rollout().task().objects(w);
+            return objects.empty() ? std::string() : objects.front().name;
+          },
+          nb::arg("world"), "Name of the object of the world's task; empty: it has none.")
       .def_prop_ro("fps", [](PyRollout& s) { return s.rollout().task().fps(); })
       .def_prop_ro("horizon", [](PyRollout& s) { return s.rollout().task().cfg().horizon; })
       .def("simulation", &PyRollout::simulation);

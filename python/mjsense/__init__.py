@@ -23,6 +23,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv)
     making recordings            record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: of any
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
+    evaluating policies          evaluate: the same episodes for every policy; mjsense.evaluation: benchmarks, comparison
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     editing recordings           delete_episodes, split_dataset, merge_datasets
     files of other programs      export; import_lerobot, import_robomimic
@@ -53,6 +54,7 @@ from mjsense import _core
 _core.leave_no_log_file()
 
 from mjsense import dataset as dataset
+from mjsense import evaluation as evaluation
 from mjsense import exporting as exporting
 from mjsense import recording as recording
 from mjsense import scene as scene
@@ -68,6 +70,7 @@ from mjsense.dataset import Dataset, check_replay, render, replay
 from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
 from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
+from mjsense.evaluation.playing import evaluate
 from mjsense.exporting import export
 from mjsense.recording import RecordEpisodes, Recorder
 from mjsense.rendering import Renderer
@@ -176,6 +179,7 @@ __all__ = [
     "delete_episodes",
     "effects",
     "embedded_models",
+    "evaluate",
     "export",
     "import_lerobot",
     "import_robomimic",

@@ -2,7 +2,8 @@
 """mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
 The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
-another robosuite, build/mjlab, build/warp and build/programs. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,programs makes them.
+another robosuite, build/mjlab, build/warp, build/molmospaces and build/programs. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,programs
+makes them; build/molmospaces uses the torch of build/mjlab, because the one that molmo-spaces requires takes several GB.
 MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/dm_control, tonyzhaozh/act and
 kevinzakka/mink, whose programs are run.
 """
@@ -42,6 +43,32 @@ PACKAGES = {
     ),
     "mjlab": ("mjlab==1.6.0", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
     "warp": ("mujoco==4.0.0", "mujoco-warp==4.0.0", "gymnasium==1.4.0", "nanobind-backend>=1.0"),
+    "molmospaces": (
+        "mujoco==3.5.0",
+        "mujoco-warp==3.5.0.2",
+        "molmospaces-resources==0.0.2",
+        "compress-json",
+        "filelock",
+        "gymnasium",
+        "h5py",
+        "imageio[ffmpeg]",
+        "lxml",
+        "matplotlib",
+        "nanobind-backend>=1.0",
+        "nltk~=3.9.2",
+        "numpy-quaternion~=2024.0.10",
+        "opencv-python-headless",
+        "packaging~=26.2",
+        "pillow",
+        "pydantic<3",
+        "PyOpenGL",
+        "pytest",
+        "scikit-image",
+        "scipy",
+        "shapely",
+        "stringcase~=1.2",
+        "tqdm",
+    ),
     "programs": (
         "mujoco==3.8.1",
         "dm_control==1.0.41",
@@ -80,6 +107,8 @@ def environment():
                 pytest.skip(f"pip cannot install {' '.join(PACKAGES[name])}: {done.stderr.strip()[-300:]}")
             if name == "libero":
                 prepare_libero(folder)
+            if name == "molmospaces":
+                prepare_molmospaces(folder, get("mjlab"), pip)
             (folder / "complete").touch()
         return folder / "bin/python"
 
@@ -100,6 +129,14 @@ def prepare_libero(folder):
         "assets": "assets",
     }
     (folder / "config.yaml").write_text("".join(f"{key}: {root / path}\n" for key, path in paths.items()))
+
+
+def prepare_molmospaces(folder, python_with_torch, pip):
+    """Installs the package and models without what they require, and makes the packages of another environment available after its own."""
+    subprocess.run([*pip, "--no-deps", "molmo-spaces==0.2.9", "gymnasium-robotics==1.4.2", "dm_control==1.0.41"], check=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    (torch,) = python_with_torch.parents[1].resolve().glob("lib/python*/site-packages")
+    (packages / "torch_of_mjlab.pth").write_text(f"{torch}\n")
 
 
 def run(python, *arguments):
@@ -161,6 +198,12 @@ def test_scripts_of_mjlab(environment, tmp_path, monkeypatch):
     assert [*tmp_path.glob("logs/rsl_rl/*/*/model_*.pt")]
 
 
+@pytest.mark.parametrize("script", ["molmospaces_use", "molmospaces_images"])
+def test_molmospaces(environment, script, tmp_path, monkeypatch):
+    monkeypatch.setenv("MLSPACES_ASSETS_DIR", str(tmp_path))
+    run(environment("molmospaces"), Path(__file__).parent / f"adapters/{script}.py", ROOT / "docs/drop_in/molmospaces.md")
+
+
 def test_gym_hil(environment):
     run(environment("programs"), Path(__file__).parent / "adapters/gym_hil_images.py")
 
@@ -194,4 +237,4 @@ def test_examples_of_mink(environment):
 
 
 def test_every_page_is_tested():
-    assert {page.stem for page in ROOT.glob("docs/drop_in/*.md")} == {*PAGES, "mujoco_warp"}
+    assert {page.stem for page in ROOT.glob("docs/drop_in/*.md")} == {*PAGES, "mujoco_warp", "molmospaces"}

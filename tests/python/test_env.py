@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requirements of Gymnasium on environments."""
 
+from contextlib import closing
+
 import gymnasium
 import numpy as np
 import pytest
@@ -30,12 +32,12 @@ def test_a_single_environment_is_the_first_of_many():
     task, many = mjs.make(Cart(), cameras=[], horizon=3), make(num_envs=1, horizon=3)
     observation, info = task.reset(seed=5)
     others, _ = many.reset(seed=5)
-    assert task.observation_space.contains(observation) and info == {}
+    assert task.observation_space.contains(observation) and info["episode_info"]["number"] == 0 and info["episode_info"]["seed"] == 5
     for _ in range(3):
         np.testing.assert_array_equal(observation["qpos"]["joints"], others["qpos"]["joints"][0])
         observation, reward, terminated, truncated, info = task.step(task.action_space.high)
         others, rewards, *_ = many.step(many.action_space.high)
-        assert type(reward) is float and reward == rewards[0] and type(terminated) is bool and info == {"success": False}
+        assert type(reward) is float and reward == rewards[0] and type(terminated) is bool and info["success"] is False
     assert truncated
     task.reset()
     task.close()
@@ -174,3 +176,49 @@ def test_no_observation_is_text():
     assert all(a.dtype.kind in "fib" for a in arrays(observation))
     assert {"qpos", "qvel", "actions/joint_pos", "grasp_state_pickup_obj"} <= set(observation)
     env.close()
+
+
+def ended(env, options=None):
+    """(number, success) of each episode in the order in which they end, and the number of steps."""
+    infos, found = env.reset(**(options or {}))[1], []
+    for step in range(1, 200):
+        _, _, terminated, truncated, infos = env.step(np.tile(env.single_action_space.high, (env.num_envs, 1)))
+        final = infos.get("final_info", infos)
+        for world in np.flatnonzero(terminated | truncated):
+            found.append((int(final["episode_info"]["number"][world]), bool(final["success"][world])))
+        if env.all_played:
+            return found, step
+    raise AssertionError("not all episodes were played")
+
+
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_given_episodes_are_played_once_each(mode):
+    numbers = [7, 3, 12, 5, 4]
+    results = {}
+    for worlds in (1, 2, 8):
+        with closing(mjs.make_vec(Cart(), num_envs=worlds, cameras=[], horizon=6, seed=2, episodes=numbers, autoreset_mode=mode)) as env:
+            played, _ = ended(env)
+            assert sorted(number for number, _ in played) == sorted(numbers)
+            results[worlds] = dict(played)
+            assert env.all_played
+            with pytest.raises(gymnasium.error.ResetNeeded, match="all given episodes have been played"):
+                env.step(np.zeros(env.action_space.shape))
+            assert dict(ended(env)[0]) == results[worlds]  # again from the first one
+    assert results[1] == results[2] == results[8]
+
+
+def test_an_episode_has_the_same_start_by_its_number():
+    with closing(mjs.make_vec(Cart(), num_envs=4, cameras=[], seed=9)) as env:
+        start = env.reset()[0]["qpos"]["joints"][3]
+    with closing(mjs.make_vec(Cart(), num_envs=2, cameras=[], seed=9, episodes=[3])) as env:
+        observation, info = env.reset()
+        np.testing.assert_array_equal(observation["qpos"]["joints"][0], start)
+        assert info["_episode_info"].tolist() == [True, False] and info["episode_info"]["number"][0] == 3
+        _, _, terminated, truncated, infos = env.step(np.zeros(env.action_space.shape))
+        assert infos["_success"].tolist() == [True, False] and not (terminated | truncated)[1]
+
+
+@pytest.mark.parametrize("episodes, text", [([], "list of different numbers"), ([1, 1], "different numbers"), ([-1], "has -1"), ([0.5], "episodes")])
+def test_wrong_episodes_are_refused(episodes, text):
+    with pytest.raises((ValueError, TypeError), match=text):
+        mjs.make_vec(Cart(), episodes=episodes)

@@ -253,6 +253,23 @@ def test_worlds_share_the_rows_of_the_model_in_turn(rows):
     np.testing.assert_allclose(program.qvel, [data.qvel for data in datas], atol=2e-6)
 
 
+def test_one_row_for_all_worlds_replaces_the_values_of_each():
+    program = Program()
+    program.ctrl[:] = 1
+    mass = np.tile(program.model.body_mass.astype(np.float32), (WORLDS, 1))
+    assert program.add("model", "body_mass", mass)
+    mass[3, 1] = 2.5
+    program.worlds.run(FORWARD)
+    assert np.ptp(program.qacc[:, 6]) > 0
+    shared = mass[:1].copy()  # equals the first world's values
+    program.worlds.clear(20 * WORLDS, 100)
+    for name in (*STATE, *DERIVED):
+        assert program.add("data", name, getattr(program, name), name in STATE)
+    assert program.add("model", "body_mass", shared)
+    program.worlds.run(FORWARD)
+    assert np.ptp(program.qacc[:, 6]) == 0
+
+
 @pytest.mark.parametrize("name", ["geom_bodyid", "geom_type"])
 def test_values_that_were_refused_are_not_used(name):
     program = Program()

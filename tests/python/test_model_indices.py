@@ -80,6 +80,7 @@ def test_integers_are_refused(recorded, worlds, tmp_path):
     ("geom_size", (0, 1), np.inf, r"\[0, 1\]: is inf, expected a number of at most 1e\+10"), ("geom_pos", (2, 0), 1e300, r"\[2, 0\]: is 1e\+300, expected"),
     ("geom_size", (1, 0), -1.0, "values must be at least 0; .* is -1.0"), ("body_quat", (1, slice(None)), 0.0, "values must be quaternions"),
     ("bvh_aabb", (0, 4), -1.0, r"\[0, 4\]: is -1.0, expected a size of at least 0"),
+    ("jnt_range", (0, 1), -9.0, r"\[0\]: is limited to \[-?[\d.]+, -9.0\], expected a range"), ("actuator_actlimited", 0, 1, r"\[0\]: is limited to \[0.0, 0.0\]"),
 ], ids=str)  # fmt: skip
 def test_values_are_refused(recorded, worlds, tmp_path, name, index, value, message):
     values = np.array(getattr(mjs.Dataset(recorded).episodes[0].model(), name))

@@ -227,7 +227,6 @@ def test_sensors_of_a_policy(tmp_path):
         ({"action": np.zeros((3, 8)), "done": True}, ValueError, r"'done' of shape \(1,\), expected \(3,\)"),
         ({"arm": np.zeros((3, 2, 7)), "gripper": np.zeros((3, 1))}, ValueError, "has 1 steps, another group 2"),
         ("up", ValueError, None),
-        (np.full((3, 8), np.nan), ValueError, r"actions of worlds \[0, 1, 2\] are not finite"),
     ],
 )  # fmt: skip
 def test_errors_say_what_was_expected(value, error, text):
@@ -240,6 +239,45 @@ def test_errors_say_what_was_expected(value, error, text):
     with pytest.raises(error, match=text):
         env.step(env.expert_action())
     env.close()
+
+
+def test_an_action_that_is_not_finite_ends_only_its_episode(tmp_path):
+    class Breaks(mjs.Policy):
+        def reset(self, ids):
+            self.step = 0
+
+        def act(self, obs):
+            self.step += 1
+            actions = np.tile(HOLD, (self.num_worlds, 1))
+            if self.step == 3:
+                actions[1, 2] = np.nan
+            return actions
+
+    options = {"episodes": 3, "num_worlds": 3, "max_attempts": 3, "horizon": 5, "cameras": [], "keep_failures": True}
+    summary = mjs.record("pick", policy=Breaks(), out=tmp_path, **options)
+    assert sorted(summary.lengths) == [4, 6, 6]  # the robot holds its position in the last step
+    outcomes = {e.number: e.outcome for e in mjs.Dataset(tmp_path).episodes}
+    assert outcomes[1] == "the policy gave up: policy 'breaks' returned an action that is not finite (arm[2] is nan)"
+    assert outcomes[0].startswith("horizon reached") and outcomes[2].startswith("horizon reached")
+
+
+def test_a_policy_may_hold_some_worlds_or_groups(tmp_path):
+    class Holds(mjs.Policy):
+        def act(self, obs):
+            hold = np.zeros((self.num_worlds, 2), bool)
+            hold[0] = [True, False]
+            return {"action": np.tile(HOLD, (self.num_worlds, 1)), "hold": hold}
+
+    summary = mjs.record("pick", policy=Holds(), out=tmp_path, episodes=2, num_worlds=2, max_attempts=2, horizon=2, cameras=[], keep_failures=True)
+    given = [sorted(json_rows(rows["actions/commanded_action"])[1]) for rows in trajectories(summary)]
+    assert given == [["gripper"], ["arm", "gripper"]]
+
+    class Wrong(mjs.Policy):
+        def act(self, obs):
+            return {"action": np.tile(HOLD, (self.num_worlds, 1)), "hold": np.zeros((self.num_worlds, 3), bool)}
+
+    with pytest.raises(ValueError, match=r"returned 'hold' of shape \(1, 3\), expected \(1,\) or \(1, 2\)"):
+        mjs.record("pick", policy=Wrong(), out=tmp_path / "wrong", cameras=[])
 
 
 def test_errors_of_user_code_name_the_method(tmp_path):

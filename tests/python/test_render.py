@@ -84,12 +84,15 @@ def test_image_options_are_those_of_cameras_and_of_render():
     assert set(given) <= inspect.signature(mjs.render).parameters.keys()
 
 
+PHYSICAL = ("exposure", "tone_mapping", "environment_intensity", "ambient_occlusion")
+
+
 @pytest.mark.parametrize("option", render_cameras.image_options())
 def test_every_image_option_is_kept(option, tmp_path):
     default = render_cameras.recorded_images({})[option]
-    value = not default if isinstance(default, bool) else 4
-    made = {}
-    for name, given in (("usual", {}), ("data", {option: value})):
+    value = {"shading": "pbr", "tone_mapping": "linear"}.get(option, not default if isinstance(default, bool) else 4)
+    made, physical = {}, {"shading": "pbr"} if option in PHYSICAL else {}
+    for name, given in (("usual", physical), ("data", {**physical, option: value})):
         mjs.record("pick", out=tmp_path / name, **{**RECORDING, "episodes": 1, "horizon": 3, **given})
         made[name] = videos(tmp_path / name)
     assert made["data"] != made["usual"]

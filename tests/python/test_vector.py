@@ -30,7 +30,11 @@ def test_spaces(env):
     assert env.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
     assert env.action_space.shape == (3, 8) and list(env.action_groups) == ["arm", "gripper"]
     observation, info = env.reset(seed=0)
-    assert env.observation_space.contains(observation) and info == {}
+    assert env.observation_space.contains(observation)
+    about = info["episode_info"]
+    assert info["_episode_info"].all() and about["number"].tolist() == [0, 1, 2] and about["seed"].tolist() == [0, 0, 0]
+    assert about["instruction"].tolist() == env.instructions and about["_object"].all()
+    assert all(f"env_states/actors/{name.replace(' ', '_')}" in env.rows for name in about["object"])
     assert observation["tcp_pose"].shape == (3, 7)
     assert env.specs["tcp_pose"].unit.startswith("m")
 

@@ -133,7 +133,7 @@ def test_ctrl_c_while_a_page_plays(port):
         try:
             with devtools.Page(process.stdout.readline().split()[1]) as page:
                 page.click("button", "Play")
-                eventually(lambda: re.search(r"World 1 of 2, t = (0\.[1-9]|[1-9])", page.run("document.body.textContent")))
+                eventually(lambda: re.search(r"World 1 of 2, t = (0\.[1-9]|[1-9])", page.run("document.body.textContent")), 90)
                 process.send_signal(signal.SIGINT)
                 out, errors = process.communicate(timeout=30)
         finally:

@@ -29,6 +29,7 @@ _FREE = _OF_RECORD | {
     "threads",
     "episodes",
     "max_attempts",
+    "attempts",
     "first_attempt",
     "num_attempts",
     "shard",

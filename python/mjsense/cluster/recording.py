@@ -19,7 +19,7 @@ def record_from_options(
 ) -> RecordSummary:
     """``mjsense.record(..., ray=address)``."""
     own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
-    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
+    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "attempts"):
         del options[name]
     if not options["threads"]:
         del options["threads"]  # one per worker

@@ -25,7 +25,7 @@ EXAMPLES = [
     ),
 ]
 ENDS_AT_CTRL_C = True  # before the recording, which catches the signal
-_NOT_ON_RAY = ("shard", "append", "overwrite", "first_attempt", "num_attempts")
+_NOT_ON_RAY = ("shard", "append", "overwrite", "first_attempt", "num_attempts", "attempts")
 _NOT_WITH_FORMAT = ("shard", "append", "overwrite")
 
 

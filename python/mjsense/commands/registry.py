@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "record": "Record episodes of a task.",
+    "evaluate": "Evaluate a policy: play episodes, record them, count successes.",
+    "benchmark": "Fix the episodes of an evaluation in a folder, or check them.",
     "sensors": "List the sensors of a scene or task: shapes, units, frames and cost.",
     "scan": "Write the point cloud that a lidar measures in a scene.",
     "inspect": "Show the contents and statistics of a recording.",
@@ -29,6 +31,8 @@ COMMANDS = {
     "replay": "Replay recorded episodes and report every difference.",
     "render": "Render recorded episodes with other cameras and sensors.",
     "quality": "Show how recorded episodes were performed: idle share, jerk, approach, visibility.",
+    "results": "Show the success rates of an evaluation or recording, and write a table and a report.",
+    "compare": "Compare two policies on the same episodes.",
     "dataset": "Delete episodes of recordings, split them, merge them.",
     "export": "Write a recording in the format of another program.",
     "import": "Write a data set of another program as a recording.",

@@ -67,6 +67,7 @@ FIELDS = {
         Field('max_attempts', 'max_attempts', 'max_attempts', 'int', 'Maximum number of episodes to attempt; 0: six times the number to keep.', default='0', low=0.0),
         Field('num_attempts', 'num_attempts', 'num_attempts', 'int', 'Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.', default='0', low=0.0),
         Field('first_attempt', 'first_attempt', 'first_attempt', 'int', 'Number of the first attempt.', default='0', low=0.0),
+        Field('attempts', 'attempts', 'attempts', 'int', 'Numbers of the attempts to play, in ascending order, instead of first_attempt and num_attempts.', default='none', is_list=True),
         Field('shard', 'shard', 'shard', 'text', 'k/n, k from 0: play only part k of n of the attempts, in the directory shard_k of the output directory; requires num_attempts, the number of attempts of all shards.'),
         Field('keep_failures', 'keep_failures', 'keep_failures', 'bool', 'Keep failed episodes too.'),
         Field('replay', 'replay', 'replay', 'bool', "Do not store what replay needs: the model, and the simulation's state and controls of every step.", is_on=True),

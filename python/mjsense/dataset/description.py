@@ -23,6 +23,7 @@ _RATE = re.compile(rf"[0-9]{{1,{RATE_DIGITS}}}(/[0-9]{{1,{RATE_DIGITS}}})?")
 _PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow", "placebo")
 _TUNES = ("", "fastdecode", "zerolatency", "film", "animation", "grain", "stillimage", "psnr", "ssim")
 _PROVENANCE = (
+    "attempts",
     "batches",
     "episodes",
     "first_attempt",
@@ -69,9 +70,17 @@ def _is_finite(v: Any) -> bool:
     return isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) < 1e300
 
 
+_BOOL: tuple[Check, str] = (lambda v: isinstance(v, bool), "true or false")
+
+
 def _declared(option: dict[str, Any]) -> tuple[Check, str]:
-    """The rule of an option that is a number, from its declaration."""
+    """The rule of an option that is a number, a word, or true or false, from its declaration."""
     kind, low, high = option["type"]["kind"], option.get("low", -1e300), option.get("high", 1e300)
+    if kind == "bool":
+        return _BOOL
+    if kind == "word":
+        words: list[str] = option["type"]["words"]
+        return (lambda v: isinstance(v, str) and v in words), f"one of {', '.join(words)}"
 
     def check(v: Any) -> bool:
         is_of_kind = isinstance(v, int) or kind != "int"
@@ -80,7 +89,6 @@ def _declared(option: dict[str, Any]) -> tuple[Check, str]:
     return check, f"a{' whole' if kind == 'int' else ''} number from {low:g} to {high:g}"
 
 
-_BOOL: tuple[Check, str] = (lambda v: isinstance(v, bool), "true or false")
 _TEXT: tuple[Check, str] = (lambda v: isinstance(v, str) and len(v) <= TEXT_BYTES, f"a text of at most {TEXT_BYTES} characters")
 _NAME: tuple[Check, str] = (lambda v: isinstance(v, str) and is_plain_name(v), "a plain name, without a folder")
 # A camera's name may have the name of its robot in front: robot_0/wrist.

@@ -54,6 +54,16 @@ _PARTS = (
     "key_",
 )
 """Beginnings of the names of fields that may differ between worlds."""
+_RANGES = {
+    "jnt_limited": "jnt_range",
+    "jnt_actfrclimited": "jnt_actfrcrange",
+    "tendon_limited": "tendon_range",
+    "tendon_actfrclimited": "tendon_actfrcrange",
+    "actuator_ctrllimited": "actuator_ctrlrange",
+    "actuator_forcelimited": "actuator_forcerange",
+    "actuator_actlimited": "actuator_actrange",
+}
+"""Whether something is limited, and to what."""
 _BOXES = "bvh_aabb"
 """The boxes of bodies contain objects that are larger in an episode. Of the others, which fields name as structure, this is the only one."""
 
@@ -80,7 +90,26 @@ def check_model_fields(fields: Mapping[str, Any], model: mujoco.MjModel, about: 
     Raises:
         ValueError: A field is unknown, has another type or shape, or a value that the model cannot have.
     """
-    return {name: _checked(name, dataset, model, f"{about}: replay/model/{name}") for name, dataset in fields.items()}
+    values = {name: _checked(name, dataset, model, f"{about}: replay/model/{name}") for name, dataset in fields.items()}
+    for flag, name in _RANGES.items():
+        if flag in values or name in values:
+            _check_ranges(flag, name, values, model, about)
+    return values
+
+
+def _check_ranges(flag: str, name: str, values: Mapping[str, np.ndarray], model: mujoco.MjModel, about: str) -> None:
+    """A range of what is limited is not empty: MuJoCo compiles no other."""
+    archived = getattr(model, name)
+    ranges = values.get(name, archived)
+    ranges = np.where(np.isnan(ranges), archived, ranges)
+    limited = np.ravel(values.get(flag, getattr(model, flag))) != 0
+    changed = (ranges != archived).any(-1) | (limited & (np.ravel(getattr(model, flag)) == 0))
+    if (wrong := changed & limited & ~(ranges[:, 0] < ranges[:, 1])).any():
+        row = int(np.argmax(wrong))
+        raise ValueError(
+            f"{about}: replay/model/{name if name in values else flag}[{row}]: is limited to {ranges[row].tolist()}, "
+            "expected a range whose end is larger than its beginning"
+        )
 
 
 def _checked(name: str, dataset: Any, model: mujoco.MjModel, place: str) -> np.ndarray:

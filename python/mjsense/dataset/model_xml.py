@@ -106,8 +106,13 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
                 element.fullinertia, element.explicitinertial = np.full(6, np.nan), True
             elif prefix != "geom" or model.geom_type[i] != _MESH or name not in ("dataid", "pos", "quat", "size"):
                 _set(element, _RENAMED.get(field, name), new[i])
-    result = _exact_xml(spec)
-    compiled = mujoco.MjModel.from_xml_string(result, assets)
+    try:
+        result = _exact_xml(spec)
+        compiled = mujoco.MjModel.from_xml_string(result, assets)
+    except ValueError as error:
+        raise ValueError(
+            f"{playback.where(episode)}: MuJoCo does not compile its model: {' '.join(str(error).split())}"
+        ) from error
     if wrong := [
         field for field in changed if not np.allclose(field_of(compiled, field), field_of(model, field), rtol=1e-5, atol=1e-8)
     ]:

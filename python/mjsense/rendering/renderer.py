@@ -130,7 +130,6 @@ class Renderer:
     ) -> None:
         import mujoco
 
-        self._checked_size(height, width)
         self._set_up(model, height, width, mujoco.MjvScene(model, max(int(max_geom), 2)))
 
     @classmethod
@@ -153,12 +152,13 @@ class Renderer:
         self._mujoco = mujoco
         self._version = tuple(int(x) for x in mujoco.mj_versionString().split(".")[:2])
         self._model = model
-        self._height, self._width = int(height), int(width)
+        self._height, self._width = self._checked_size(height, width)
         self._scene = scene
         self._scene_option = mujoco.MjvOption()
         self._fixed_camera = -1
         """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
         self._depth = self._segmentation = self._point_lights = False
+        self._shading = "classic"
         self._sizes = self._sizes_of(model)
         flag = mujoco.mjtRndFlag
         self._flags = {
@@ -227,6 +227,17 @@ class Renderer:
     @point_lights.setter
     def point_lights(self, value: bool) -> None:
         self._point_lights = bool(value)
+
+    @property
+    def shading(self) -> str:
+        """``"classic"``, the default: MuJoCo's light model; or ``"pbr"``: physically based colours, as those of cameras with ``shading="pbr"``. Depth and
+        segmentation are the same."""
+        return self._shading
+
+    @shading.setter
+    def shading(self, value: str) -> None:
+        self._opened().set_shading(value)
+        self._shading = value
 
     @property
     def height(self) -> int:
@@ -320,13 +331,17 @@ class Renderer:
         if not _has_poses(data):
             self._warn(f"{_NO_POSES} before update_scene()")
 
-    def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
+    def check_data(self, data: mujoco.MjData) -> None:
+        """Raises the errors of ``update_scene`` for `data` and the model, for callers that update the scene themselves."""
         self._opened()
         self._check_sizes(self._model, "the model has changed")
         owner = getattr(data, "model", self._model)
         if owner is not self._model:
             self._check_sizes(owner, "`data` belongs to another model")
         self._native.check_indices()
+
+    def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
+        self.check_data(data)
         mujoco, view = self._mujoco, self._camera(camera)
         self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
         # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.
@@ -429,6 +444,8 @@ class Renderer:
             renderer = pool.take()
             try:
                 renderer._point_lights = self._point_lights
+                if renderer._shading != self._shading:
+                    renderer.shading = self._shading
                 renderer._update(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
             except ValueError as error:

@@ -42,9 +42,9 @@ class TaskEnv(gymnasium.Env):
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts the next episode; with a seed, the first episode of that seed."""
         super().reset(seed=seed)
-        observation, _ = self.worlds.reset(seed=seed)
+        observation, infos = self.worlds.reset(seed=seed)
         self._ended = ""
-        return _row(observation, 0), {}
+        return _row(observation, 0), {"episode_info": _about(infos)}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Performs one control step with the action ``[n]``: commands of the move groups; see :meth:`TaskVectorEnv.step`."""
@@ -69,7 +69,7 @@ class TaskEnv(gymnasium.Env):
         truncated: np.ndarray,
         infos: dict[str, Any],
     ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        info: dict[str, Any] = {"success": bool(infos["success"][0])}
+        info: dict[str, Any] = {"success": bool(infos["success"][0]), "episode_info": _about(infos)}
         if "fault" in infos:
             info["fault"] = infos["fault"][0]
         self._ended = "terminated" if terminated[0] else "truncated" if truncated[0] else ""
@@ -97,6 +97,12 @@ class TaskEnv(gymnasium.Env):
     def close(self) -> None:
         """Frees the world."""
         self.worlds.close()
+
+
+def _about(infos: dict[str, Any]) -> dict[str, Any]:
+    """Which episode the world plays: seed, number, house, instruction and object."""
+    values = {name: rows[0] for name, rows in infos["episode_info"].items() if not name.startswith("_")}
+    return {name: value if name in ("instruction", "object", "seed") else int(value) for name, value in values.items()}
 
 
 @checked

@@ -69,7 +69,8 @@ class Policy:
         Returns:
             ``[B, n]``, or ``[B, H, n]`` for the next ``H`` steps, or a dict: move group -> ``[B, k]`` or ``[B, H, k]`` (omitted
             groups hold their position), or ``"action"`` -> ``[B, n]``. The dict may also contain ``"done"`` and ``"success"``,
-            bool ``[B]``: the episode ends after this step, and the policy's own verdict.
+            ``[B]``: the episode ends after this step, and the policy's own verdict (NaN: none); and ``"hold"``, bool
+            ``[B]`` or ``[B, move groups]``: these groups hold their position. In a world whose commands are not finite, the episode ends as a failure.
         """
         raise NotImplementedError(f"{type(self).__name__}: write act(obs)")
 

@@ -68,6 +68,7 @@ def record(
     max_attempts: int = 0,
     num_attempts: int = 0,
     first_attempt: int = 0,
+    attempts: Sequence[int] = (),
     shard: str = "",
     keep_failures: bool = False,
     replay: bool = True,
@@ -152,6 +153,8 @@ def record(
         max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
         num_attempts: Play exactly this number of attempts instead of ending at a number of kept episodes; 0: do not.
         first_attempt: Number of the first attempt.
+        attempts: Numbers of the attempts to play, in ascending order, instead of ``first_attempt`` and
+            ``num_attempts``.
         shard: ``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the output
             directory; requires ``num_attempts``, the number of attempts of all shards.
         keep_failures: Keep failed episodes too.
@@ -178,7 +181,17 @@ def record(
         given = {**options, "map": map, "trim_idle": trim_idle is not None, "keep_recording": keep_recording}
         if refused := [
             name
-            for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "map", "trim_idle", "keep_recording")
+            for name in (
+                "shard",
+                "append",
+                "overwrite",
+                "first_attempt",
+                "num_attempts",
+                "attempts",
+                "map",
+                "trim_idle",
+                "keep_recording",
+            )
             if given[name]
         ]:
             raise ValueError(f"record: {refused[0]} cannot be combined with ray")

@@ -50,6 +50,12 @@ class TaskVectorEnv(VectorEnv):
       again, its last observation and the reward 0. A step in which no world can move raises ``gymnasium.error.ResetNeeded``.
 
     ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` is the mask of the worlds it applies to, as in gymnasium.
+    ``infos["episode_info"]`` says which episode each world plays: ``seed``, ``number`` and ``house``, by which ``record`` plays the same
+    episode, ``instruction`` and ``object``. (``infos["episode"]`` belongs to gymnasium's ``RecordEpisodeStatistics``.)
+
+    With ``make_vec(episodes=[3, 7, 12])`` the worlds play exactly these episodes, each once, in this order. A world that finds none left
+    rests: its flags and its masks are False. When all are played, :attr:`all_played` is true, and ``step`` raises
+    ``gymnasium.error.ResetNeeded``; ``reset()`` begins the list again.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 15.15, "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -62,6 +68,7 @@ class TaskVectorEnv(VectorEnv):
         render_mode: str | None,
         autoreset_mode: str | AutoresetMode,
         action_space: str,
+        episodes: Sequence[int] | None = None,
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', not {render_mode!r}")
@@ -92,8 +99,12 @@ class TaskVectorEnv(VectorEnv):
         self.horizon: int = self._rollout.horizon
         """Number of control steps after which an episode is truncated."""
         self._next_episode = 0
+        self._episodes = None if episodes is None else list(episodes)
+        self._idle = np.zeros(self.num_envs, bool)
+        kinds = {"seed": np.uint64, "number": np.int64, "house": np.int64, "instruction": object, "object": object}
+        self._playing = {name: np.zeros(self.num_envs, kind) for name, kind in kinds.items()}
         self._ended = np.zeros(self.num_envs, bool)
-        self._ends = (self._ended, self._ended)  # terminated, truncated
+        self._ends = np.zeros(self.num_envs, bool), np.zeros(self.num_envs, bool)  # terminated, truncated
         self._started = False
         layout = self._rollout.action_layout()
         self.action_groups: dict[str, slice] = group_slices(layout)
@@ -147,7 +158,8 @@ class TaskVectorEnv(VectorEnv):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
-        seed. An environment that has never received a seed plays other episodes than all others."""
+        seed. An environment that has never received a seed plays other episodes than all others. With ``episodes``, a reset of all
+        worlds begins with the first of them."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -161,8 +173,10 @@ class TaskVectorEnv(VectorEnv):
             self._seed = seed
             self._next_episode = 0
             mask[:] = True
+        if self._episodes is not None and mask.all():
+            self._next_episode = 0
         self._begin(np.flatnonzero(mask))
-        return self._observe(), {}
+        return self._observe(), self._episode_infos()
 
     def _one_seed(self, seed: Any) -> int:
         """Returns the seed from which episodes are numbered; gymnasium's list of seeds, s, s + 1, ..., is reduced to its first
@@ -177,11 +191,34 @@ class TaskVectorEnv(VectorEnv):
         return int(seed)
 
     def _begin(self, worlds: np.ndarray) -> None:
-        episodes = list(range(self._next_episode, self._next_episode + len(worlds)))
-        self._next_episode += len(worlds)
-        self._rollout.start(worlds.tolist(), episodes)
-        self._ended[worlds] = False
+        numbers = range(self._next_episode, self._next_episode + len(worlds))
+        episodes = list(numbers) if self._episodes is None else self._episodes[numbers.start : numbers.stop]
+        worlds, idle = worlds[: len(episodes)], worlds[len(episodes) :]
+        self._next_episode += len(episodes)
+        if len(worlds):
+            self._rollout.start(worlds.tolist(), episodes)
+        for world in idle:
+            self._rollout.stop(int(world))
+        self._idle[worlds], self._idle[idle] = False, True
+        self._ended[worlds], self._ended[idle] = False, True
+        for flags in self._ends:
+            flags[idle] = False
         self._started = True
+        self._playing = {name: values.copy() for name, values in self._playing.items()}  # the old ones belong to the caller
+        for world, episode in zip(worlds.tolist(), episodes, strict=True):
+            about = (self._seed, episode, 0, self._rollout.instruction(world), self._rollout.object(world))
+            for values, value in zip(self._playing.values(), about, strict=True):
+                values[world] = value
+
+    def _episode_infos(self) -> dict[str, Any]:
+        playing = ~self._idle
+        masks = {f"_{name}": playing for name in self._playing}
+        return {"episode_info": {**self._playing, **masks}, "_episode_info": playing}
+
+    @property
+    def all_played(self) -> bool:
+        """Whether every episode of ``make_vec(episodes=...)`` has ended; always False without that argument."""
+        return self._episodes is not None and self._next_episode >= len(self._episodes) and bool(self._ended.all())
 
     def step(self, actions: Any, done: Any = None) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Performs one control step.
@@ -231,6 +268,8 @@ class TaskVectorEnv(VectorEnv):
         return low + (actions.clip(-1, 1) + 1) / 2 * (high - low)
 
     def _play(self, play: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        if self._idle.all() or (self.all_played and self.autoreset_mode != AutoresetMode.DISABLED):
+            raise gymnasium.error.ResetNeeded("step(): all given episodes have been played: reset() begins them again")
         resting = self._ended.copy()
         stays = self.autoreset_mode == AutoresetMode.DISABLED
         if stays and resting.all():
@@ -249,24 +288,25 @@ class TaskVectorEnv(VectorEnv):
         broken = [world for world in faults if not resting[world]]
         for world in broken:
             truncated[world] = 1
-        infos: dict[str, Any] = {"success": success, "_success": ~resting}
+        infos: dict[str, Any] = {"success": success, "_success": ~resting, **self._episode_infos()}
         if broken:
             infos["fault"], infos["_fault"] = np.full(self.num_envs, "", object), np.zeros(self.num_envs, bool)
             for world in broken:
                 infos["fault"][world], infos["_fault"][world] = faults[world], True
         self._ends = self._on_host(terminated).copy(), self._on_host(truncated).copy()
-        self._ended = self._ends[0] | self._ends[1]
+        self._ended = self._ends[0] | self._ends[1] | self._idle
         if self.autoreset_mode == AutoresetMode.NEXT_STEP and resting.any():
-            self._begin(np.flatnonzero(resting))
-        elif self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
-            over = self._ended.copy()
+            self._begin(np.flatnonzero(resting & ~self._idle))
+            infos |= self._episode_infos()
+        elif self.autoreset_mode == AutoresetMode.SAME_STEP and (self._ended & ~self._idle).any():
+            over = self._ended & ~self._idle
             last = self._observe()
             final = np.full(self.num_envs, None, object)
             for world in np.flatnonzero(over):
                 final[world] = _row(last, int(world))
             infos = {"final_obs": final, "_final_obs": over, "final_info": {**infos, "_success": over}, "_final_info": over}
             self._begin(np.flatnonzero(over))
-            infos |= {"success": np.where(over, False, success), "_success": ~over}
+            infos |= {"success": np.where(over, False, success), "_success": ~over & ~self._idle, **self._episode_infos()}
         return self._observe(), reward, terminated, truncated, infos
 
     def expert_action(self) -> np.ndarray:
@@ -381,6 +421,7 @@ _WITH_WARP = {
     "meshes",
     "autoreset_mode",
     "action_space",
+    "episodes",
     "backend",
     "device",
     "nconmax",
@@ -440,6 +481,7 @@ def make_vec(
     terminate_upon_success: bool = False,
     max_penetration: float | None = None,
     # end of options
+    episodes: Sequence[int] | None = None,
     use_sensors: bool = True,
     autoreset_mode: str | AutoresetMode = "next_step",
     render_mode: str | None = None,
@@ -502,6 +544,8 @@ def make_vec(
             any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
             deeper at the start do not count. [m]
         Others:
+        episodes: Numbers of the episodes to play, each once, instead of all from 0 on; see :class:`TaskVectorEnv`. They are the numbers
+            of ``record(first_attempt=...)``: the start depends on the seed and the number only.
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.
         render_mode: None or rgb_array.
@@ -519,7 +563,8 @@ def make_vec(
         raise ValueError(f"make_vec(): num_envs is {num_envs}: must be at least 1")
     arguments = dict(options)
     _check_backend(options)
-    for name in ("observations", "sensors", "autoreset_mode", "render_mode", "action_space", "backend"):
+    numbers = None if episodes is None else checked_episodes("make_vec()", episodes)
+    for name in ("episodes", "observations", "sensors", "autoreset_mode", "render_mode", "action_space", "backend"):
         del options[name]
     if backend == "cpu":
         for name in ("device", "nconmax", "njmax"):
@@ -531,11 +576,22 @@ def make_vec(
             raise ValueError(
                 f"make_vec(): task '{options['task']}' is not available with backend='warp', which plays tasks written in Python"
             )
-        made = provided("warp_environment")(options, objects, observations, render_mode, autoreset_mode, action_space)
+        made = provided("warp_environment")(options, objects, observations, render_mode, autoreset_mode, action_space, numbers)
     else:
-        made = TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space)
+        made = TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode, action_space, numbers)
     made._arguments = arguments
     return made
+
+
+def checked_episodes(place: str, episodes: Sequence[int]) -> list[int]:
+    """Numbers of episodes as a list. Raises ValueError if there are none, one is not a number from 0 on, or one is there twice."""
+    numbers = list(episodes)
+    for number in numbers:
+        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 0 <= number < 2**31:
+            raise ValueError(f"{place}: episodes has {number!r}: must be ints from 0 on")
+    if not numbers or len(set(numbers)) < len(numbers):
+        raise ValueError(f"{place}: episodes must be a list of different numbers, not {numbers!r}")
+    return [int(number) for number in numbers]
 
 
 def _made_again(wrapper: Any, arguments: dict[str, Any]) -> Any:

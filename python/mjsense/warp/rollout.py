@@ -200,5 +200,9 @@ class WarpRollout:
     def instruction(self, world: int) -> str:
         return self._call("description", self._task._mjs_description, world)
 
+    def object(self, world: int) -> str:
+        bodies = list(self._call("objects", self._task._mjs_roles, world).values())
+        return bodies[0].rpartition("/")[2] if bodies else ""
+
     def act(self) -> None:
         raise ValueError("expert_action(): policies are not available with backend='warp'")

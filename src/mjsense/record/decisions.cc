@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/record/decisions.h"
 
+#include <iterator>
+
 namespace mjsense::record {
 
 void Decisions::add(std::int64_t episode, bool kept) {
   if (!kept_by_episode_.emplace(episode, kept).second) return;
   kept_ += kept;
-  for (auto at = kept_by_episode_.find(next_); at != kept_by_episode_.end() && at->first == next_;
-       ++at, ++next_) {
-    if (at->second) settled_.push_back(next_);
+  for (;; ++next_) {
+    if (!only_.empty() && next_ >= std::ssize(only_)) return;
+    const auto at = kept_by_episode_.find(only_.empty() ? first_ + next_ : only_[next_]);
+    if (at == kept_by_episode_.end()) return;
+    if (at->second) settled_.push_back(at->first);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 namespace mjsense::record {
@@ -10,8 +11,10 @@ namespace mjsense::record {
 // Set of the attempts that were kept or discarded.
 class Decisions {
  public:
-  // `first`: the first attempt of the recording.
-  explicit Decisions(std::int64_t first = 0) : next_(first) {}
+  // `first`: the first attempt of the recording. `only`: its attempts, in ascending order, if they
+  // are not all numbers from `first` on.
+  explicit Decisions(std::int64_t first = 0, std::vector<std::int64_t> only = {})
+      : only_(std::move(only)), first_(first) {}
 
   void add(std::int64_t episode, bool kept);  // call once per episode
 
@@ -25,7 +28,9 @@ class Decisions {
  private:
   std::map<std::int64_t, bool> kept_by_episode_;
   std::vector<std::int64_t> settled_;
-  std::int64_t next_;  // lowest undecided episode
+  std::vector<std::int64_t> only_;
+  std::int64_t first_;
+  std::int64_t next_ = 0;  // position of the lowest undecided attempt
   int kept_ = 0;
 };
 

@@ -128,6 +128,21 @@ RecordingStart start_in(const std::string& description) {
           static_cast<int>(std::min(number_of(json, "first_batch"), kMaxBatches))};
 }
 
+std::vector<std::int64_t> attempts_in(const std::string& description) {
+  const nlohmann::json json = parse_description(description);
+  const auto found = json.find("attempts");
+  std::vector<std::int64_t> attempts;
+  if (found == json.end()) return attempts;
+  if (!found->is_array()) throw RuntimeError("'attempts' of the recording is not a list");
+  for (const nlohmann::json& number : *found) {
+    if (!number.is_number_unsigned() || number > std::numeric_limits<std::int32_t>::max() ||
+        (!attempts.empty() && number <= attempts.back()))
+      throw RuntimeError("'attempts' of the recording is not a list of ascending numbers");
+    attempts.push_back(number.get<std::int64_t>());
+  }
+  return attempts;
+}
+
 std::string unfinished_recording(const Folder& staging) {
   std::string text = read_whole(staging, kDescription);
   const bool sound = is_description(text);
@@ -173,6 +188,8 @@ RecordingStart start_after(const fs::path& house) {
     const nlohmann::json description = parse_description(file.recording);
     start.attempt = std::max(start.attempt, number_of(description, "first_attempt") +
                                                 number_of(description, "num_attempts"));
+    const std::vector<std::int64_t> attempts = attempts_in(file.recording);
+    if (!attempts.empty()) start.attempt = std::max(start.attempt, attempts.back() + 1);
   }
   return start;
 }

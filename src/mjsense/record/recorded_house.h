@@ -47,6 +47,8 @@ struct RecordingStart {
 };
 // The start that a recording's description states.
 RecordingStart start_in(const std::string& description);
+// RecordingCfg::attempts of a recording with this description.
+std::vector<std::int64_t> attempts_in(const std::string& description);
 // Start of a recording that continues those of this house. Throws ValueError if one of them is
 // unfinished.
 RecordingStart start_after(const std::filesystem::path& house);

@@ -49,7 +49,9 @@ struct RecordingCfg : FilesCfg {
   // it.
   std::int64_t first_attempt = 0;
   std::int64_t num_attempts = 0;  // number of attempts, if it is fixed; 0: it is not
-  int first_batch = 0;            // HDF5 files of the recordings that `append` continues; set by it
+  // The numbers of the attempts, in ascending order, if they have gaps; the first is first_attempt.
+  std::vector<std::int64_t> attempts;
+  int first_batch = 0;  // HDF5 files of the recordings that `append` continues; set by it
   // File for replay, stored in the house once: its name, "model_1a2b3c4d.zip", and its bytes. Empty:
   // none. Recordings with the same model have the same name.
   std::string archive_name, archive;
@@ -58,9 +60,9 @@ struct RecordingCfg : FilesCfg {
   const std::atomic<int>* stop = nullptr;
 };
 
-// One attempt. Episode numbers start at RecordingCfg::first_attempt without gaps. They, and not the
-// order in which episodes finish, determine the order on disk, so the files do not depend on the
-// number of worlds or on interruptions.
+// One attempt. Episode numbers start at RecordingCfg::first_attempt without gaps, unless
+// RecordingCfg::attempts lists them. They, and not the order in which episodes finish, determine the
+// order on disk, so the files do not depend on the number of worlds or on interruptions.
 struct EpisodeMeta {
   std::int64_t episode = 0;
   std::uint64_t seed = 0;

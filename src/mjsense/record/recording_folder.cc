@@ -48,7 +48,8 @@ struct Move {
 std::string settings_of(const std::string& description) {
   nlohmann::json json = parse_description(description);
   if (!json.is_object()) return "";
-  for (const char* count : {"episodes", "batches", "first_attempt", "num_attempts", "first_batch"})
+  for (const char* count :
+       {"episodes", "batches", "first_attempt", "num_attempts", "attempts", "first_batch"})
     json.erase(count);
   return json.dump();
 }
@@ -82,7 +83,7 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
   first_attempt_ = start_in(fingerprint).attempt;
   first_batch_ = start_in(fingerprint).batch;
-  decisions_ = Decisions(first_attempt_);
+  decisions_ = Decisions(first_attempt_, attempts_in(fingerprint));
 
   make_dir(dir);
   dir_ = Folder::open(dir);

@@ -150,6 +150,7 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
   if (!cfg.archive_name.empty()) j["model_archive"] = cfg.archive_name;
   if (cfg.first_attempt > 0) j["first_attempt"] = cfg.first_attempt;
   if (cfg.num_attempts > 0) j["num_attempts"] = cfg.num_attempts;
+  if (!cfg.attempts.empty()) j["attempts"] = cfg.attempts;
   if (cfg.first_batch > 0) j["first_batch"] = cfg.first_batch;
   if (cfg.model) j["model"] = model_checksums(*cfg.model);
   if (!plan.videos.empty()) {

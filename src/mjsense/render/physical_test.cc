@@ -74,7 +74,8 @@ TEST(Physical, CandelaFollowInverseSquareLaw) {
   for (double h : {1.5, 2.0, 3.0}) {
     TestRenderer s(std::string(kDark) +
                    R"(<asset><material name="m" specular="0" rgba="1 1 1 1"/></asset><worldbody>
-      <light type="point" pos="0 0 )" + std::to_string(h) +
+      <light type="point" pos="0 0 )" +
+                   std::to_string(h) +
                    R"(" diffuse="1 1 1" intensity="1000" range="100" castshadow="false"/>
       <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
     s.options.physical = linear(0);
@@ -125,7 +126,7 @@ TEST(Physical, InstructionSetsAgree) {
   EXPECT_LE(differ, 1e-5 * static_cast<double>(wide.size()));
 }
 
-// Beside a tall wall, a floor sees half of the surroundings; far from it, all of them.
+// Next to a tall wall, a floor sees half of the surroundings; far from it, all of them.
 TEST(Physical, WallHidesHalfOfTheSurroundings) {
   TestRenderer s(std::string(kDark) +
                  R"(<asset><material name="m" specular="0" rgba="0.4 0.4 0.4 1"/></asset><worldbody>

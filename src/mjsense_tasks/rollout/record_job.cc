@@ -35,6 +35,7 @@ record::RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout,
   cfg.out_dir = job.out;
   cfg.num_attempts = job.num_attempts;
   cfg.first_attempt = job.first_attempt;
+  cfg.attempts.assign(job.attempts.begin(), job.attempts.end());
   cfg.num_worlds = rollout.num_worlds();
   cfg.fps = record::Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
   for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
@@ -59,10 +60,9 @@ class RecordJob {
         recorder_(recording_cfg(cfg_, rollout_, stop)),
         lengths_(rollout_.num_worlds(), 0),
         begun_(rollout_.num_worlds()),
-        next_(recorder_.first_attempt()),
-        end_(next_ + (cfg_.num_attempts > 0   ? cfg_.num_attempts
-                      : cfg_.max_attempts > 0 ? cfg_.max_attempts
-                                              : 6 * std::int64_t{cfg_.episodes})) {
+        end_(cfg_.num_attempts > 0   ? cfg_.num_attempts
+             : cfg_.max_attempts > 0 ? cfg_.max_attempts
+                                     : 6 * std::int64_t{cfg_.episodes}) {
     for (const RecordedCamera& camera : rollout_.cameras()) pictures_ += camera.depth ? 2 : 1;
   }
 
@@ -112,6 +112,7 @@ class RecordJob {
     if (cfg.rollout.policy.empty() && !cfg.rollout.make_policy) {
       throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
     }
+    if (!cfg.attempts.empty()) cfg = with_attempts(std::move(cfg));
     cfg = without_shard(std::move(cfg));
     if (cfg.num_attempts > 0 && (cfg.episodes != 1 || cfg.max_attempts > 0)) {
       throw ValueError(
@@ -123,6 +124,27 @@ class RecordJob {
     cfg.rollout = resolved(std::move(cfg.rollout));
     cfg.rollout.replay_sensor = cfg.replay;
     return cfg;
+  }
+
+  static RecordJobCfg with_attempts(RecordJobCfg cfg) {
+    if (cfg.num_attempts > 0 || cfg.first_attempt > 0 || cfg.append) {
+      throw ValueError(
+          "attempts excludes num_attempts, first_attempt, append and shard: it lists all attempts");
+    }
+    for (std::size_t k = 0; k < cfg.attempts.size(); ++k) {
+      const int before = k == 0 ? -1 : cfg.attempts[k - 1];
+      if (cfg.attempts[k] <= before) {
+        throw ValueError(fmt::format("attempts: {} follows {}: the numbers start at 0 and ascend",
+                                     cfg.attempts[k], k == 0 ? "nothing" : std::to_string(before)));
+      }
+    }
+    cfg.first_attempt = cfg.attempts.front();
+    cfg.num_attempts = static_cast<int>(cfg.attempts.size());
+    return cfg;
+  }
+
+  std::int64_t attempt(std::int64_t position) const {
+    return cfg_.attempts.empty() ? recorder_.first_attempt() + position : cfg_.attempts[position];
   }
 
   static RolloutCfg rollout_cfg(const RecordJobCfg& cfg) {
@@ -150,10 +172,10 @@ class RecordJob {
     episodes_.clear();
     for (int w = 0; w < rollout_.num_worlds(); ++w) {
       if (rollout_.active(w)) continue;
-      while (next_ < end_ && recorder_.decided(next_)) ++next_;
+      while (next_ < end_ && recorder_.decided(attempt(next_))) ++next_;
       if (next_ >= end_ || recorder_.kept() + running_ >= cfg_.episodes) break;
       worlds_.push_back(w);
-      episodes_.push_back(next_++);
+      episodes_.push_back(attempt(next_++));
       ++running_;
     }
     if (worlds_.empty()) return false;
@@ -311,7 +333,7 @@ class RecordJob {
   std::vector<std::vector<record::EpisodeArray>> begun_;  // own_values() at the beginning, by world
   std::vector<int> worlds_;
   std::vector<std::int64_t> episodes_;
-  std::int64_t next_, end_;  // the next attempt, and the one after the last
+  std::int64_t next_ = 0, end_;  // positions of the next attempt, and after the last
   std::int64_t ended_steps_ = 0;
   int running_ = 0;
   int pictures_ = 0;  // images per observation
@@ -326,6 +348,7 @@ RecordJobCfg without_shard(RecordJobCfg job) {
                                  std::int64_t{job.first_attempt} + job.num_attempts, kMaximum));
   }
   if (job.shard.empty()) return job;
+  if (!job.attempts.empty()) throw ValueError("shard and attempts exclude each other");
   std::int64_t k = -1, n = 0;
   const char *first = job.shard.data(), *last = first + job.shard.size();
   const auto [slash, k_error] = std::from_chars(first, last, k);

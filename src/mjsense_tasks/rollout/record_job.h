@@ -22,6 +22,7 @@ struct RecordJobCfg : record::FilesCfg {
   std::filesystem::path out;
   int max_attempts = 0;
   int num_attempts = 0, first_attempt = 0;
+  std::vector<int> attempts;
   std::string shard;  // "2/8"; "": not a shard
   bool keep_failures = false;
   bool replay = true;
@@ -40,6 +41,9 @@ void visit_fields(V& v, RecordJobCfg& c) {
     "not.")
       .at_least(0);
   v("first_attempt", c.first_attempt, "Number of the first attempt.").at_least(0);
+  v("attempts", c.attempts,
+    "Numbers of the attempts to play, in ascending order, instead of ``first_attempt`` and "
+    "``num_attempts``.");
   v("shard", c.shard,
     "``k/n``, k from 0: play only part k of n of the attempts, in the directory ``shard_k`` of the "
     "output directory; requires ``num_attempts``, the number of attempts of all shards.");

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks, policies, robots and sensors that are written for MolmoSpaces: change ``molmo_spaces`` to ``mjsense.compat.molmospaces`` where
-they are imported.
+"""MolmoSpaces' own programs, unchanged, draw with mjsense after ``mjsense.compat.molmospaces.use()``.
+
+Tasks, policies, robots and sensors that are written for MolmoSpaces run in mjsense's worlds: change ``molmo_spaces`` to
+``mjsense.compat.molmospaces`` where they are imported.
 
     from mjsense.compat.molmospaces.env.abstract_sensors import Sensor, SensorSuite
     from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStartPoseSensor, get_core_sensors
@@ -18,6 +20,7 @@ from mjsense.compat.molmospaces.env.abstract_sensors import Sensor, SensorSuite
 from mjsense.compat.molmospaces.env.sensors import *  # noqa: F403
 from mjsense.compat.molmospaces.env.sensors import __all__ as _sensors
 from mjsense.compat.molmospaces.policy.base_policy import BasePolicy, PlannerPolicy
+from mjsense.compat.molmospaces.program import stop, use, used
 from mjsense.compat.molmospaces.robots.abstract import Robot
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_string, dict_to_byte_array, is_camera_sensor
@@ -32,5 +35,8 @@ __all__ = [
     "byte_array_to_string",
     "dict_to_byte_array",
     "is_camera_sensor",
+    "stop",
+    "use",
+    "used",
     *_sensors,
 ]

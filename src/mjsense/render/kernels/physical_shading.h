@@ -25,9 +25,9 @@ struct alignas(64) Reflectances {
   float matte[3][kLanes];
   float specular[3][kLanes];  // at normal incidence, with the energy of further bounces
   float grazing[3][kLanes];
-  float albedo[3][kLanes];     // of the specular lobe
-  float square[kLanes];        // alpha^2, alpha: roughness^2
-  float cosine[kLanes];        // N . V
+  float albedo[3][kLanes];  // of the specular lobe
+  float square[kLanes];     // alpha^2, alpha: roughness^2
+  float cosine[kLanes];     // N . V
 };
 
 // A and B of SpecularTable.
@@ -64,8 +64,7 @@ inline void find_reflectances(const View& view, const Surfaces& s, const ToEye& 
   const Float zero = splat(0.0f), one = splat(1.0f);
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f n = load3(s.n, k), p = load3(s.p, k);
-    const Float cosine =
-        min(max(abs(dot(n, p) * load(eye.scale + k)), splat(1e-4f)), one);
+    const Float cosine = min(max(abs(dot(n, p) * load(eye.scale + k)), splat(1e-4f)), one);
     const Float roughness = load(s.roughness + k), metallic = load(s.metallic + k);
     const LobeScale lobe(view.physical.specular_table, roughness, cosine);
     const Float loss = one / max(lobe.a + lobe.b, splat(1e-3f)) - one;
@@ -101,8 +100,7 @@ inline void add_direct(const ViewLight& light, const LightTerm& term, const Surf
                        const Reflectances& r, const ToEye& eye, int k, std::uint32_t dark,
                        Colors& sum) {
   const Float zero = splat(0.0f), one = splat(1.0f), half = splat(0.5f);
-  const Float lit =
-      select(mask_of(dark >> k & kAllLanes), zero, term.scale * term.diffuse);
+  const Float lit = select(mask_of(dark >> k & kAllLanes), zero, term.scale * term.diffuse);
   if (!any(zero < lit)) return;
   const Vec3f p = load3(s.p, k);
   const Float to_eye = load(eye.scale + k), a2 = load(r.square + k), nv = load(r.cosine + k),

@@ -24,8 +24,8 @@ inline Float tone_curve(const float* table, Float x) {
   Int left, right;
   gather_pairs(reinterpret_cast<const std::uint32_t*>(table),
                shift_right(at, ToneCurve::kShift) + int_of(-ToneCurve::kFirst), left, right);
-  const Float fraction = to_float(bits_and(at, (1 << ToneCurve::kShift) - 1)) *
-                         splat(1.0f / (1 << ToneCurve::kShift));
+  const Float fraction =
+      to_float(bits_and(at, (1 << ToneCurve::kShift) - 1)) * splat(1.0f / (1 << ToneCurve::kShift));
   return fma(fraction, float_of(right) - float_of(left), float_of(left));
 }
 
@@ -36,8 +36,7 @@ inline Vec3f neutral(Vec3f c) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   const Vec3f in{max(c.x, zero), max(c.y, zero), max(c.z, zero)};
   const Float low = min(in.x, min(in.y, in.z));
-  const Float offset =
-      select(low < splat(0.08f), low - splat(6.25f) * low * low, splat(0.04f));
+  const Float offset = select(low < splat(0.08f), low - splat(6.25f) * low * low, splat(0.04f));
   const Vec3f base{in.x - offset, in.y - offset, in.z - offset};
   const Float peak = max(base.x, max(base.y, base.z));
   constexpr float kRoom = 1 - kStart;

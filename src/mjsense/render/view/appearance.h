@@ -15,9 +15,9 @@ namespace mjsense::render {
 struct Material {
   float specular, shininess, emission, reflectance;
   float metallic = 0, roughness = -1;  // 0..1; roughness -1: 1 - shininess
-  int texture;      // id; -1: none
-  float repeat[2];  // of a 2D texture
-  bool uniform;     // `repeat` is per metre instead of per geom
+  int texture;                         // id; -1: none
+  float repeat[2];                     // of a 2D texture
+  bool uniform;                        // `repeat` is per metre instead of per geom
 };
 
 // The fields of mjModel's vis.map and vis.rgba that affect the sky.

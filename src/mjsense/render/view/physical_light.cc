@@ -29,8 +29,9 @@ using Curve = std::array<float, ToneCurve::kValues + 1>;
 Curve make_curve(bool is_filmic) {
   Curve out;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const auto bits = (static_cast<std::uint32_t>(ToneCurve::kFirst) + static_cast<std::uint32_t>(i))
-                      << ToneCurve::kShift;
+    const auto bits =
+        (static_cast<std::uint32_t>(ToneCurve::kFirst) + static_cast<std::uint32_t>(i))
+        << ToneCurve::kShift;
     const double x = static_cast<double>(std::bit_cast<float>(bits)) - ToneCurve::kOffset;
     out[i] = static_cast<float>(
         std::clamp(srgb_of_linear(is_filmic ? filmic(x) : std::clamp(x, 0.0, 1.0)), 0.0, 1.0));
@@ -62,8 +63,8 @@ std::vector<std::uint32_t> make_specular_table() {
         const double vh = vx * s * std::cos(phi) + nv * c;
         const double nl = 2 * vh * c - nv;
         if (nl <= 0) continue;
-        const double smith = nl * std::sqrt(nv * nv * (1 - a2) + a2) +
-                             nv * std::sqrt(nl * nl * (1 - a2) + a2);
+        const double smith =
+            nl * std::sqrt(nv * nv * (1 - a2) + a2) + nv * std::sqrt(nl * nl * (1 - a2) + a2);
         const double weight = 2 * nl * vh / (smith * c) / kSamples;  // V * 4 nl vh / c
         const double fresnel = std::pow(1 - vh, 5);
         a += weight * (1 - fresnel);
@@ -92,9 +93,8 @@ void turn(const double m[3][3], const float r[9], double out[3][3]) {
 void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& out) {
   for (int c = 0; c < 3; ++c) {
     const auto k = [&](int i) { return scale * light.irradiance[i][c]; };
-    const double quadratic[3][3] = {{k(8), k(4) / 2, k(7) / 2},
-                                    {k(4) / 2, -k(8), k(5) / 2},
-                                    {k(7) / 2, k(5) / 2, 3 * k(6)}};
+    const double quadratic[3][3] = {
+        {k(8), k(4) / 2, k(7) / 2}, {k(4) / 2, -k(8), k(5) / 2}, {k(7) / 2, k(5) / 2, 3 * k(6)}};
     const double linear[3] = {k(3), k(1), k(2)};
     double q[3][3];
     turn(quadratic, out.r_wc, q);
@@ -117,8 +117,9 @@ void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& o
 double maximum_radiance(double exposure) { return 1.2 * std::exp2(exposure); }
 
 float linear_of_srgb(float x) {
-  return x <= 0.04045f ? x / 12.92f
-                       : static_cast<float>(std::pow((static_cast<double>(x) + 0.055) / 1.055, 2.4));
+  return x <= 0.04045f
+             ? x / 12.92f
+             : static_cast<float>(std::pow((static_cast<double>(x) + 0.055) / 1.055, 2.4));
 }
 
 void set_physical(const PhysicalOptions& options, const double rotation[9], PhysicalView& out) {

@@ -27,7 +27,7 @@ struct PhysicalOptions {
   ToneMapping tone_mapping = ToneMapping::kNeutral;
   std::shared_ptr<const Environment> environment;
   double environment_intensity = 1;
-  float occlusion_reach = 0.5f;                                // m; 0: no ambient occlusion
+  float occlusion_reach = 0.5f;  // m; 0: no ambient occlusion
 };
 
 // Sets `out` for a camera whose rotation (R_WC, row-major) is given, except `reflectance`.

@@ -32,18 +32,18 @@ struct SpecularTable {
 struct PhysicalView {
   bool on = false;  // otherwise the light model is MuJoCo's classic one
   ToneMapping tone_mapping = ToneMapping::kNeutral;
-  const float* tone_curve = nullptr;                // [ToneCurve::kValues]
-  const std::uint32_t* specular_table = nullptr;    // [kRows, kStride]
+  const float* tone_curve = nullptr;              // [ToneCurve::kValues]
+  const std::uint32_t* specular_table = nullptr;  // [kRows, kStride]
   // Radiance of a white matte surface of normal n in the light of the environment: the sum of these
   // coefficients times 1, x, y, z, x^2, y^2, z^2, xy, xz, yz.
   float irradiance[10][3] = {};
   // The environment's radiance by perceptual roughness / (levels - 1), see EnvironmentLight
   const Texture* radiance = nullptr;
   float radiance_scale = 0;
-  float r_wc[9] = {};        // R_WC, row-major
+  float r_wc[9] = {};              // R_WC, row-major
   bool shows_environment = false;  // as the background, because there is no skybox
-  float unit = 1;            // radiance of a colour of 1 of the skybox, haze, fog and emission
-  float reflectance = 0;     // of the mirror
+  float unit = 1;         // radiance of a colour of 1 of the skybox, haze, fog and emission
+  float reflectance = 0;  // of the mirror
   // Distance up to which geoms hide the environment from each other, m; 0: they do not.
   float occlusion_reach = 0;
 
@@ -51,8 +51,8 @@ struct PhysicalView {
 };
 
 // Spheres around the geoms that hide the environment, by geom, with kWindowPadding more entries that
-// kernels may read: what is outside is not affected. Camera frame, m; a negative radius: the geom hides
-// nothing.
+// kernels may read. A geom changes nothing outside its sphere. Camera frame, m; a negative radius: the
+// geom hides nothing.
 struct OccluderSpheres {
   float *x = nullptr, *y = nullptr, *z = nullptr, *radius = nullptr;
 };

@@ -15,11 +15,11 @@ namespace mjsense::render {
 // The material of a geom. Colours are in [0, 1]; in a physically based view, rgb is linear.
 struct Surface {
   float rgba[4];
-  float specular, emission;  // physically based: F0 of dielectrics, instead of `specular`
-  float roughness, metallic;           // 0..1, for physically based views
-  float exponent;                      // 128 * shininess
-  float highlight_threshold;           // (N . H)^2 below which the specular highlight is 0, or -1
-  const Texture* texture;              // null: no texture
+  float specular, emission;   // physically based: F0 of dielectrics, instead of `specular`
+  float roughness, metallic;  // 0..1, for physically based views
+  float exponent;             // 128 * shininess
+  float highlight_threshold;  // (N . H)^2 below which the specular highlight is 0, or -1
+  const Texture* texture;     // null: no texture
   // For 2D textures: coordinates are multiplied by uv_scale, then uv_offset is added.
   float uv_scale[2], uv_offset[2];
   float cube_scale[3];     // for cube maps: multiplies the direction in which the texture is read

@@ -13,8 +13,8 @@
 #include "mjsense/render/kernels/tile_memory.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/sensors/camera/camera_data.h"
-#include "mjsense/sensors/camera/physical_options.h"
 #include "mjsense/sensors/camera/depth_noise.h"
+#include "mjsense/sensors/camera/physical_options.h"
 
 namespace mjsense::sensors {
 namespace {

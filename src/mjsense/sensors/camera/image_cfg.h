@@ -45,17 +45,20 @@ void visit_fields(V& v, RgbCfg& c) {
       .within(1, 16)
       .decides_data();
   v("shading", c.shading,
-    "classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth, "
+    "classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; "
+    "depth, "
     "segmentation and the other images are the same. The options below belong to pbr.")
       .decides_data();
   v("exposure", c.exposure, "Exposure in EV at ISO 100; 1 more halves the brightness.")
       .within(-10, 30)
       .decides_data();
   v("tone_mapping", c.tone_mapping,
-    "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: "
+    "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; "
+    "linear: "
     "clips.")
       .decides_data();
-  v("environment_intensity", c.environment_intensity, "Factor of the light from the surroundings, a neutral bright room.")
+  v("environment_intensity", c.environment_intensity,
+    "Factor of the light from the surroundings, a neutral bright room.")
       .within(0, 1e6)
       .decides_data();
   v("ambient_occlusion", c.ambient_occlusion,

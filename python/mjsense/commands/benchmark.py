@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjsense benchmark``"""
+
+from __future__ import annotations
+
+import argparse
+
+from mjsense.commands.parser import Parser, add_name, field_values
+
+EXAMPLES = [
+    (
+        "mjsense benchmark create pick --episodes 200 --split test --out bench",
+        "Fix 200 episodes of the task pick, so that other users can play the same.",
+    ),
+    ("mjsense benchmark check bench", "Check that the episodes of a benchmark start as when it was made."),
+]
+_NOT_FIXED = (
+    "policy",
+    "threads",
+    "noise",
+    "resume",
+    "append",
+    "overwrite",
+    "house",
+    "batches",
+    "gzip",
+    "ffmpeg",
+    "crf",
+    "preset",
+    "tune",
+    "keyint",
+    "molmospaces_depth",
+    "max_attempts",
+    "num_attempts",
+    "first_attempt",
+    "attempts",
+    "shard",
+    "keep_failures",
+    "replay",
+    "terminate_upon_success",
+    "worlds",
+)
+
+
+def add_arguments(parser: Parser) -> None:
+    parser.add_argument(
+        "action", choices=("create", "check"), help="create: write a benchmark. check: compare its starts with the stored ones."
+    )
+    add_name(parser, "task", "tasks", "create: name of the task. check: folder of the benchmark.", metavar="TASK")
+    parser.add_argument(
+        "--no-terminate-upon-success",
+        dest="terminate_upon_success",
+        action="store_const",
+        const=False,
+        default=argparse.SUPPRESS,
+        help="Do not end an episode at its first success: the last observation decides.",
+    )
+    parser.add_fields("RecordJobCfg", ("task",), _NOT_FIXED)
+    parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from mjsense.evaluation.benchmarks import Benchmark, create_benchmark
+
+    options = field_values(arguments, "RecordJobCfg")
+    del options["task"]  # an argument
+    if arguments.action == "check":
+        if options:
+            raise ValueError(f"benchmark check: --{min(options).replace('_', '-')} is an option of create")
+        found = Benchmark(arguments.task)
+        found.check_starts()
+        if not arguments.quiet:
+            print(f"All {len(found.episodes)} episodes start as when the benchmark was made.")
+        return 0
+    if not options.get("out"):
+        raise ValueError("benchmark: the output directory is missing: pass --out DIR")
+    found = create_benchmark(arguments.task, progress=False if arguments.quiet else None, **options)
+    if not arguments.quiet:
+        print(f"{len(found.episodes)} episodes of {found.name} in {found.folder}, {found.checksum}")
+    return 0

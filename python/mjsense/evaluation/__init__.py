@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evaluation of policies: fixed episodes of a task are played and recorded, and their results are counted. Modules are imported when they
+are used."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+_PLACES: dict[str, str] = {
+    "Benchmark": "benchmarks",
+    "BatchedPolicy": "protocol",
+    "Comparison": "comparison",
+    "Results": "report",
+    "Timed": "timing",
+    "compare": "comparison",
+    "create_benchmark": "benchmarks",
+    "evaluate": "playing",
+    "policy_from": "policies",
+    "results": "report",
+}
+"""Module of each public name."""
+__all__ = [
+    "BatchedPolicy",
+    "Benchmark",
+    "Comparison",
+    "Results",
+    "Timed",
+    "compare",
+    "create_benchmark",
+    "evaluate",
+    "policy_from",
+    "results",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

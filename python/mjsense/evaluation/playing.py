@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evaluation of a policy: given episodes of a task are played and recorded, each once, and their results are counted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from mjsense import _core
+from mjsense.core.arguments import Seed, checked
+from mjsense.evaluation.benchmarks import Benchmark, is_folder
+from mjsense.evaluation.facts import FILE
+from mjsense.evaluation.policies import policy_from
+from mjsense.evaluation.replayed import ReplayedPolicy
+from mjsense.evaluation.report import Results, require_parquet, results
+from mjsense.evaluation.timing import Latency, Timed
+from mjsense.tasks.code_checksums import checksums
+from mjsense.tasks.parts import Robots, Scenes, Tasks
+from mjsense.tasks.policy import Policy
+from mjsense.tasks.record_job import RecordProgress
+from mjsense.tasks.recording import record
+from mjsense.tasks.vector import checked_episodes
+
+
+@checked
+def evaluate(
+    task: Tasks | Path = "pick",
+    robot: Robots | None = None,
+    policy: Any = "planner",
+    *,
+    out: str | Path,
+    episodes: int | Sequence[int] = 50,
+    scene: Scenes = "",
+    policy_options: Mapping[str, Any] | None = None,
+    execution_horizon: int | None = None,
+    ensemble: float | None = None,
+    latency: float | Literal["measured"] = 0.0,
+    # options of a recording
+    arm_controller: str = "",
+    split: Literal["", "train", "test"] = "",
+    num_worlds: int = 4,
+    threads: int = 0,
+    seed: Seed = 0,
+    camera_system: str = "",
+    cameras: Sequence[str] | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    depth: bool = False,
+    segmentation: bool = False,
+    shadows: bool = True,
+    samples: int = 1,
+    shadow_samples: int = 1,
+    shading: Literal["classic", "pbr"] = "classic",
+    exposure: float = 8.0,
+    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
+    environment_intensity: float = 1.0,
+    ambient_occlusion: bool = True,
+    meshes: Literal["auto", "shapes", "real"] = "auto",
+    horizon: int | None = None,
+    policy_dt_ms: int | None = None,
+    perturb: float = 0.0,
+    instructions: Literal["varied", "canonical"] = "varied",
+    terminate_upon_success: bool = True,
+    max_penetration: float | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    house: int = 0,
+    batches: int = 0,
+    gzip: int = 4,
+    ffmpeg: str = "",
+    crf: int = 25,
+    preset: str = "veryfast",
+    tune: str = "fastdecode",
+    keyint: int = 20,
+    molmospaces_depth: bool = False,
+    replay: bool = True,
+    # end of options
+    sensors: Iterable[Any] = (),
+    ray: str | None = None,
+    progress: bool | Callable[[RecordProgress], None] | None = None,
+) -> Results:
+    """Plays episodes of a task with a policy, each once, and returns their results.
+
+    Every episode is recorded into ``out/house_<house>/``, failed ones too, as :func:`mjsense.record` does: it can be viewed, replayed and
+    exported. ``out/results.parquet`` and ``out/report.html`` are the results, and ``out/evaluation.json`` says what was evaluated. There is
+    no action noise. The starts depend only on the seed and the number of the episode, and so do the results of a policy that is a
+    function of its observations. An interrupted evaluation continues with ``resume=True``.
+
+    Args:
+        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or the folder of a benchmark, which fixes all options that
+            affect the data.
+        robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
+        policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function ``obs -> actions``, or
+            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``python:MODULE:CLASS`` or ``FILE.py:CLASS``.
+        out: Output directory.
+        episodes: Number of episodes, which are then those from 0 on, or a list of their numbers. A benchmark states them itself.
+        scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
+            scene.
+        policy_options: Arguments of the policy's class.
+        execution_horizon: Number of actions of a chunk that are executed before the policy is called again; by default all.
+        ensemble: The executed action is the mean of all chunks that have one for the step, with the weights ``exp(-ensemble * i)``, ``i = 0``
+            for the oldest; by default that of the newest chunk.
+        latency: Time from an observation until the actions that answer it are executed, rounded up to control steps; ``measured``: the
+            wall-clock time that the policy needs for all worlds, with which results vary. [s]
+
+        Options:
+        arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
+            ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
+        split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
+            or ``@test`` after the scene's name.
+        num_worlds: Number of worlds that run in parallel.
+        threads: Number of simulation threads; 0: one per available CPU.
+        seed: Random seed; the same seed gives the same episodes.
+        camera_system: Name or file of the camera system; by default the cameras of the robot's model.
+        cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
+        width: Width of the images; by default each camera's. ``width`` or ``height`` alone keeps the aspect ratio.
+            [pixels]
+        height: Height of the images; by default each camera's. [pixels]
+        depth: Add a lossless depth image for every camera.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
+        shadows: Draw shadows.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadow_samples: Points of each light at which its shadows are computed, within the ball of its ``bulbradius``;
+            more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
+        shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
+            segmentation and the other images are the same. The options below belong to pbr.
+        exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
+            clips.
+        environment_intensity: Factor of the light from the surroundings, a neutral bright room.
+        ambient_occlusion: Darken the light from the surroundings where other geoms are near.
+        meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
+            if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
+        horizon: Maximum number of control steps of an episode; by default the task's.
+        policy_dt_ms: Duration of one action of the policy, a multiple of the controllers' period; by default the
+            robot's or the task's. 50 ms gives 20 observations per second. [ms]
+        perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        instructions: Instruction of each episode. ``varied``: paraphrases that describe the objects by what
+            distinguishes them in that episode; ``canonical``: one sentence per task and object.
+        terminate_upon_success: End an episode at its first success.
+        max_penetration: Depth of a contact. After an observation with a deeper one, the episode is not a success; 0:
+            any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
+            deeper at the start do not count. [m]
+        resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        overwrite: Replace an existing recording of this house.
+        house: Number of the ``house_N`` folder in the output directory. Each house of a task has its own random
+            numbers.
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        tune: Tuning of x264 for a purpose; empty: none. ``fastdecode`` halves the time of decoding, and files are a
+            seventh larger.
+        keyint: Maximum number of frames between key frames. A small value makes random access faster, a large value
+            makes files smaller.
+        molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
+        replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        Others:
+        sensors: Additional sensors, as in :func:`mjsense.record`.
+        ray: ``local``, ``auto`` or the address of a Ray cluster, as in :func:`mjsense.record`. ``episodes`` must be a number.
+        progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
+            True where stderr is a terminal or a notebook.
+    """
+    options = dict(locals())
+    arguments = {
+        name: options.pop(name)
+        for name in ("policy", "policy_options", "execution_horizon", "ensemble", "latency", "sensors", "ray", "progress")
+    }
+    return play(options, **arguments)
+
+
+def play(
+    options: dict[str, Any],
+    policy: Any,
+    *,
+    policy_options: Mapping[str, Any] | None = None,
+    execution_horizon: int | None = None,
+    ensemble: float | None = None,
+    latency: Latency = 0.0,
+    sensors: Iterable[Any] = (),
+    ray: str | None = None,
+    progress: bool | Callable[[RecordProgress], None] | None = None,
+) -> Results:
+    """See :func:`evaluate`.
+
+    Args:
+        options: ``task``, ``out``, ``episodes``, and those options of a recording that differ from the defaults.
+    """
+    require_parquet()
+    out, spec = Path(options["out"]), policy if isinstance(policy, str) else None
+    benchmark = Benchmark(options["task"]) if is_folder(options["task"]) else None
+    numbers: int | Sequence[int] = options.pop("episodes", 50)
+    if benchmark is not None:
+        options, numbers = benchmark.options(options), benchmark.episodes
+    made = policy_from(policy, **(policy_options or {}))
+    noise = False
+    if isinstance(made, ReplayedPolicy):
+        made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
+        noise = bool(made.settings.get("action_noise", False))
+    if execution_horizon is None:
+        execution_horizon = getattr(made, "execution_horizon", None)
+    timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
+    if any(value is not None for value in timing.values()):
+        if not isinstance(made, Policy):
+            raise ValueError(f"policy '{made}' is computed together with its episode: it has neither chunks nor latency")
+        made = Timed(made, execution_horizon=execution_horizon, ensemble=ensemble, latency=latency)
+    if benchmark is not None:
+        benchmark.check_starts(int(options.get("num_worlds", 4)))
+    about = {
+        "policy": {"spec": spec, "name": made if isinstance(made, str) else made._mjs_name(), "fingerprint": fingerprint(made)},
+        "benchmark": None if benchmark is None else {"name": benchmark.name, "checksum": benchmark.checksum},
+        "settings": {name: value for name, value in timing.items() if value is not None},
+        "episodes": numbers if isinstance(numbers, int) else list(numbers),
+    }
+    begun = time.perf_counter()
+    options |= {"policy": made, "action_noise": noise, "keep_failures": True, **_attempts(numbers, ray)}
+    try:
+        record(**options, sensors=sensors, ray=ray, progress=progress)
+    except Exception as error:
+        if any(out.glob("house_*/*")):
+            error.add_note(f"The finished episodes are in '{out}'; resume the evaluation to play the others.")
+        raise
+    _write(out, {**about, "wall_s": round(time.perf_counter() - begun, 3)})
+    found = results(out)
+    found.write(out)
+    return found
+
+
+def _attempts(numbers: int | Sequence[int], ray: str | None) -> dict[str, Any]:
+    """The options of ``record`` that play these episodes."""
+    if isinstance(numbers, int):
+        if numbers < 1:
+            raise ValueError(f"evaluate: episodes is {numbers}: must be at least 1")
+        return {"num_attempts": numbers} if ray is None else {"episodes": numbers, "max_attempts": numbers}
+    listed = sorted(checked_episodes("evaluate", numbers))
+    if listed == list(range(len(listed))):
+        return _attempts(len(listed), ray)
+    if ray is not None:
+        raise ValueError("evaluate: on Ray, episodes must be a number: those from 0 on are played")
+    return {"attempts": listed}
+
+
+def _settings(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings that a replayed recording must share, as recordings state them."""
+    names = {name: options[name] for name in ("task", "robot", "scene", "split") if options.get(name) is not None}
+    found = {"seed": 0, "arm_controller": "", "perturb": 0.0, "instructions": "varied"}
+    found = {name: options.get(name, value) for name, value in found.items()}
+    if all(isinstance(value, str) for value in names.values()):
+        found["task"], found["robot"], found["scene"], _, _ = _core.resolved_job({**names, "out": "."})
+    return found
+
+
+def fingerprint(policy: Policy | str) -> str:
+    """Checksum of a policy's code and values, or of its name and the version of mjsense."""
+    if isinstance(policy, str):
+        parts: Any = [policy, _core.__version__]  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
+    else:
+        parts = checksums(policy, "policy")
+    return "sha256:" + hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _write(out: Path, about: dict[str, Any]) -> None:
+    part = out / f".{FILE}.part"
+    part.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    os.replace(part, out / FILE)
