@@ -173,12 +173,15 @@ void bind_renderer(nb::module_& m) {
       .def(nb::init<nb::dict, nb::dict, nb::dict, nb::dict, nb::dict>())
       .def("render", &BoundRenderer::render)
       .def("set_shading",
-           [](BoundRenderer& r, const std::string& word, int samples_per_pixel) {
+           [](BoundRenderer& r, const std::string& word, const std::string& environment,
+              int samples_per_pixel) {
              sensors::RgbCfg cfg;
              cfg.shading = from_word<sensors::Shading>(word, "Renderer", "shading");
+             cfg.environment = environment;
              cfg.samples_per_pixel = samples_per_pixel;
              check_fields(cfg, "Renderer");
-             r.renderer.set_physical(sensors::physical_options(cfg));
+             r.renderer.check_indices();
+             r.renderer.set_physical(sensors::physical_options(cfg, r.renderer.model()));
            })
       .def("check_indices", [](const BoundRenderer& r) { r.renderer.check_indices(); })
       .def("reload",

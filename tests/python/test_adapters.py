@@ -2,8 +2,9 @@
 """mjsense.compat against the renderers of the packages themselves, each in a process of its own (adapters/).
 
 The packages and the MuJoCo that they need are in environments of their own: build/adapters, and build/libero, because LIBERO needs
-another robosuite, build/mjlab, build/warp, build/molmospaces and build/programs. MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,programs
-makes them; build/molmospaces uses the torch of build/mjlab, because the one that molmo-spaces requires takes several GB.
+another robosuite, build/mjlab, build/warp, build/molmospaces, build/mitsuba and build/programs.
+MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,mitsuba,programs makes them; build/molmospaces uses the torch of
+build/mjlab, because the one that molmo-spaces requires takes several GB.
 MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/dm_control, tonyzhaozh/act and
 kevinzakka/mink, whose programs are run.
 """
@@ -69,6 +70,7 @@ PACKAGES = {
         "stringcase~=1.2",
         "tqdm",
     ),
+    "mitsuba": ("mitsuba==3.9.1", "mujoco==3.8.1", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
     "programs": (
         "mujoco==3.8.1",
         "dm_control==1.0.41",
@@ -206,6 +208,10 @@ def test_molmospaces(environment, script, tmp_path, monkeypatch):
 
 def test_gym_hil(environment):
     run(environment("programs"), Path(__file__).parent / "adapters/gym_hil_images.py")
+
+
+def test_path_traced_images_are_those_of_mitsuba(environment):
+    run(environment("mitsuba"), Path(__file__).parent / "adapters/mitsuba_images.py")
 
 
 def checkout(path):

@@ -405,6 +405,7 @@ def test_options_that_the_backend_lacks_are_errors():
     for cfg, what in [
         (mjs.CameraSensorCfg("x", data_types=("flow",), **camera), "data type 'flow'"),
         (mjs.CameraSensorCfg("x", samples=4, **camera), "samples > 1"),
+        (mjs.CameraSensorCfg("x", shading="path", **camera), "shading='path' \\(it has classic shading only"),
         (mjs.CameraSensorCfg("x", data_types=("depth",), depth_noise="d435", **camera), "depth_noise"),
     ]:
         with pytest.raises(ValueError, match=f"sensor 'x': {what}.* is not available with backend='warp'"):

@@ -30,7 +30,7 @@ _MODEL_ARRAYS = (
     "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
     "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
     "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
-    "mat_metallic", "mat_roughness",
+    "mat_metallic", "mat_roughness", "light_type", "light_texid", "light_active",
 )
 """The model's arrays that an image depends on and that are not in the abstract scene."""
 
@@ -158,8 +158,7 @@ class Renderer:
         self._fixed_camera = -1
         """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
         self._depth = self._segmentation = self._point_lights = False
-        self._shading = "classic"
-        self._samples_per_pixel = 64
+        self._shading, self._environment, self._samples_per_pixel = "classic", "model", 64
         self._sizes = self._sizes_of(model)
         flag = mujoco.mjtRndFlag
         self._flags = {
@@ -230,6 +229,10 @@ class Renderer:
         self._point_lights = bool(value)
 
     @property
+    def _look(self) -> tuple[str, str, int]:
+        return self._shading, self._environment, self._samples_per_pixel
+
+    @property
     def shading(self) -> str:
         """``"classic"``, the default: MuJoCo's light model; ``"pbr"``: physically based colours, as those of cameras with ``shading="pbr"``; or ``"path"``:
         the same by path tracing, on all CPUs. Depth and segmentation are the same."""
@@ -237,17 +240,27 @@ class Renderer:
 
     @shading.setter
     def shading(self, value: str) -> None:
-        self._opened().set_shading(value, self._samples_per_pixel)
+        self._opened().set_shading(value, self._environment, self._samples_per_pixel)
         self._shading = value
 
     @property
+    def environment(self) -> str:
+        """With ``shading="pbr"`` or ``"path"``: the light from the surroundings, as the option `environment` of cameras; ``"model"`` by default."""
+        return self._environment
+
+    @environment.setter
+    def environment(self, value: str) -> None:
+        self._opened().set_shading(self._shading, value, self._samples_per_pixel)
+        self._environment = value
+
+    @property
     def samples_per_pixel(self) -> int:
-        """Paths per pixel with ``shading="path"``; four times as many halve the noise."""
+        """Paths per pixel with ``shading="path"``, 64 by default; four times as many halve the noise."""
         return self._samples_per_pixel
 
     @samples_per_pixel.setter
     def samples_per_pixel(self, value: int) -> None:
-        self._opened().set_shading(self._shading, value)
+        self._opened().set_shading(self._shading, self._environment, value)
         self._samples_per_pixel = value
 
     @property
@@ -455,9 +468,8 @@ class Renderer:
             renderer = pool.take()
             try:
                 renderer._point_lights = self._point_lights
-                if renderer._samples_per_pixel != self._samples_per_pixel:
-                    renderer.samples_per_pixel = self._samples_per_pixel
-                if renderer._shading != self._shading:
+                if renderer._look != self._look:
+                    renderer._environment, renderer._samples_per_pixel = self._environment, self._samples_per_pixel
                     renderer.shading = self._shading
                 renderer._update(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
@@ -496,6 +508,7 @@ class Renderer:
         may be missed.
         """
         self._opened().reload()
+        self.shading = self._shading  # a skybox or an image light may have changed
 
     def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
         if kind not in _KINDS:

@@ -179,7 +179,7 @@ inline void add_ambient(const View& view, const Surfaces& s, const Reflectances&
                        fma(splat(2.0f) * nv, n.y, -(p.y * to_eye)),
                        fma(splat(2.0f) * nv, n.z, -(p.z * to_eye))};
   const Radiance ahead =
-      environment_radiance(*v.radiance, from_geom(v.r_wc, mirrored), load(s.roughness + k));
+      environment_radiance(*v.radiance, from_geom(v.r_ec, mirrored), load(s.roughness + k));
   const Float visible = load(open + k);
   // Filament 5.6.2 (Lagarde): surfaces mirror what is above their horizon.
   const Float seen = load(r.cosine + k) + visible;

@@ -5,6 +5,7 @@
 #include <mujoco/mujoco.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/render/light/microfacets.h"
@@ -30,8 +31,18 @@ struct EnvironmentImage {
 // The surroundings that a cube texture of the model shows as its skybox.
 EnvironmentImage skybox_image(const mjModel* model, int texture);
 
-// Reads a Radiance picture (.hdr): 32-bit RGBE, equirectangular, of at most 8192 x 4096 pixels.
-// Throws ValueError that names the file.
-EnvironmentImage read_radiance_file(const std::string& path);
+// Whether `name` is the path of a file; names of surroundings have no suffix.
+inline bool is_environment_file(std::string_view name) { return name.ends_with(".hdr"); }
+
+// The bytes of a file. Throws ValueError that names it.
+std::string read_environment_file(const std::string& path);
+
+// A Radiance picture: 32-bit RGBE, equirectangular, of at most 8192 x 4096 pixels. Throws ValueError
+// that names the file.
+EnvironmentImage parse_radiance(const std::string& path, std::string_view bytes);
+
+inline EnvironmentImage read_radiance_file(const std::string& path) {
+  return parse_radiance(path, read_environment_file(path));
+}
 
 }  // namespace mjsense::render

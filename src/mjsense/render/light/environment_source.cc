@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kLevels = 9;
 // Texels along a face's edge. With fewer, interpolation between them is visible in smooth spheres.
-constexpr int kFaceSizes[kLevels] = {256, 64, 64, 32, 32, 16, 16, 16, 16};
+constexpr int kFaceSizes[kLevels] = {256, 64, 32, 32, 16, 16, 16, 16, 16};
 constexpr int kSamples = 128;
 
 // The radiance with all its halved images, for means over a solid angle.
@@ -204,56 +204,42 @@ int skybox_of(const mjModel* m) {
   return -1;
 }
 
+// Null arrays: the model is of a version of MuJoCo without image lights.
 int image_light_of(const mjModel* m) {
+  if (!m->light_type || !m->light_texid || !m->light_active) return -1;
   for (int i = 0; i < m->nlight; ++i) {
     const int id = m->light_texid[i];
-    if (m->light_type[i] == mjLIGHT_IMAGE && m->light_active[i] && id >= 0 &&
+    if (m->light_type[i] == mjLIGHT_IMAGE && m->light_active[i] && id >= 0 && id < m->ntex &&
         m->tex_type[id] != mjTEXTURE_2D && is_color(m, id))
       return id;
   }
   return -1;
 }
 
-EnvironmentImage image_of(const mjModel* m, const std::string& name) {
-  if (name == "skybox") {
-    const int id = skybox_of(m);
-    if (id < 0)
-      throw ValueError(
-          "environment 'skybox': the model has no skybox texture; use 'studio' or an .hdr file");
-    return skybox_image(m, id);
-  }
-  if (!name.ends_with(".hdr"))
-    throw ValueError(fmt::format(
-        "environment '{}': expected 'studio', 'skybox', 'model' or the path of an .hdr file",
-        name));
-  return read_radiance_file(name);
+// By the content of a texture or a file.
+ContentCache<Environment>& prepared_sources() {
+  static ContentCache<Environment> all;
+  return all;
+}
+
+std::shared_ptr<const Environment> of_texture(const mjModel* m, int id) {
+  const int sizes[] = {m->tex_width[id], m->tex_height[id], m->tex_nchannel[id]};
+  const std::size_t bytes = std::size_t{1} * sizes[0] * sizes[1] * sizes[2];
+  const ContentKey key = ContentKey()
+                             .add(std::span<const int>(sizes))
+                             .add(std::span<const mjtByte>(m->tex_data + m->tex_adr[id], bytes));
+  return prepared_sources().get(key, [&] { return prepared(skybox_image(m, id)); });
+}
+
+[[noreturn]] void throw_no_environment(const std::string& name) {
+  if (name.find('.') == std::string::npos && name.find('/') == std::string::npos)
+    throw_unknown("environment", "surroundings", name,
+                  {{std::string("model"), "auto", "skybox", "studio", "FILE.hdr"}});
+  throw ValueError(
+      fmt::format("environment '{:.300}': only Radiance pictures (.hdr) are read", name));
 }
 
 }  // namespace
-
-std::uint32_t pack_rgb9e5(const float rgb[3]) {
-  const float largest = std::max({rgb[0], rgb[1], rgb[2]});
-  if (!(largest > 0)) return 0;
-  constexpr float kLargest = 65408;  // 511 / 512 * 2^16
-  int exponent;
-  std::frexp(std::min(largest, kLargest), &exponent);
-  exponent = std::max(exponent, -15);
-  if (std::lround(std::ldexp(std::min(largest, kLargest), 9 - exponent)) == 512) ++exponent;
-  std::uint32_t out = static_cast<std::uint32_t>(exponent + 15) << 27;
-  for (int c = 0; c < 3; ++c)
-    out |= static_cast<std::uint32_t>(
-               std::lround(std::ldexp(std::clamp(rgb[c], 0.0f, kLargest), 9 - exponent)))
-           << 9 * c;
-  return out;
-}
-
-std::array<float, 3> unpack_rgb9e5(std::uint32_t texel) {
-  const int exponent = static_cast<int>(texel >> 27) - 15 - 9;
-  std::array<float, 3> out;
-  for (int c = 0; c < 3; ++c)
-    out[c] = std::ldexp(static_cast<float>(texel >> 9 * c & 511), exponent);
-  return out;
-}
 
 std::shared_ptr<const Environment> prepared(EnvironmentImage image) {
   static ContentCache<Environment> all;
@@ -270,10 +256,20 @@ std::shared_ptr<const Environment> prepared(EnvironmentImage image) {
 }
 
 std::shared_ptr<const Environment> environment(const mjModel* model, const std::string& name) {
-  const int light = name == "model" ? image_light_of(model) : -1;
-  if (light >= 0) return prepared(skybox_image(model, light));
-  if (name == "studio" || name == "model") return studio();
-  return prepared(image_of(model, name));
+  if (is_environment_file(name)) {
+    const std::string bytes = read_environment_file(name);
+    return prepared_sources().get(ContentKey().add(std::span<const char>(bytes)),
+                                  [&] { return prepared(parse_radiance(name, bytes)); });
+  }
+  if (name == "studio") return studio();
+  if (name != "auto" && name != "model" && name != "skybox") throw_no_environment(name);
+  if (const int light = name == "skybox" ? -1 : image_light_of(model); light >= 0)
+    return of_texture(model, light);
+  if (name == "model") return studio();
+  if (const int sky = skybox_of(model); sky >= 0) return of_texture(model, sky);
+  if (name == "auto") return studio();
+  throw ValueError(
+      "environment 'skybox': the model has no skybox texture; use 'studio' or an .hdr file");
 }
 
 }  // namespace mjsense::render

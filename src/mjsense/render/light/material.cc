@@ -22,7 +22,9 @@ double alpha_of(double roughness) {
   return r * r;
 }
 
-double dielectric_f0(double specular) { return 0.16 * specular * specular; }
+double dielectric_f0(double specular) {
+  return std::min(1.0, 0.16 * specular * specular);  // Filament 4.8.3.2
+}
 
 double roughness_of(double roughness, double shininess) {
   return std::clamp(roughness >= 0 ? roughness : 1 - shininess, 0.0, 1.0);

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
-#include <iterator>
 #include <string_view>
 
 #include "mjsense/core/error.h"
@@ -24,15 +23,15 @@ constexpr std::size_t kMaxBytes = std::size_t{512} << 20;
 
 class Reader {
  public:
-  Reader(const std::string& path, std::string bytes) : path_(path), bytes_(std::move(bytes)) {}
+  Reader(const std::string& path, std::string_view bytes) : path_(path), bytes_(bytes) {}
 
   [[noreturn]] void fail(const std::string& why) const {
     throw ValueError(fmt::format("environment '{}': {}", path_, why));
   }
   std::string_view line() {
     const std::size_t end = bytes_.find('\n', at_);
-    if (end == std::string::npos || end - at_ > 4096) fail("its header is not complete");
-    const std::string_view out = std::string_view(bytes_).substr(at_, end - at_);
+    if (end == std::string_view::npos || end - at_ > 4096) fail("its header is not complete");
+    const std::string_view out = bytes_.substr(at_, end - at_);
     at_ = end + 1;
     return out;
   }
@@ -50,7 +49,7 @@ class Reader {
 
  private:
   const std::string& path_;
-  std::string bytes_;
+  std::string_view bytes_;
   std::size_t at_ = 0;
 };
 
@@ -80,7 +79,9 @@ void read_channels(Reader& in, int width, std::vector<std::uint8_t>& out) {
     }
 }
 
-std::string contents(const std::string& path) {
+}  // namespace
+
+std::string read_environment_file(const std::string& path) {
   struct stat state;
   if (stat(path.c_str(), &state) != 0)
     throw ValueError(fmt::format("environment '{}': no such file", path));
@@ -91,13 +92,14 @@ std::string contents(const std::string& path) {
                                  state.st_size, kMaxBytes));
   std::ifstream file(path, std::ios::binary);
   if (!file) throw ValueError(fmt::format("environment '{}': the file cannot be read", path));
-  return {std::istreambuf_iterator<char>(file), {}};
+  std::string bytes(static_cast<std::size_t>(state.st_size), '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return bytes;
 }
 
-}  // namespace
-
-EnvironmentImage read_radiance_file(const std::string& path) {
-  Reader in(path, contents(path));
+EnvironmentImage parse_radiance(const std::string& path, std::string_view bytes) {
+  Reader in(path, bytes);
   if (const std::string_view magic = in.rest() ? in.line() : "";
       magic != "#?RADIANCE" && magic != "#?RGBE")
     in.fail("not a Radiance picture (.hdr): it does not start with '#?RADIANCE'");

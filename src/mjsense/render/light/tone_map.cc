@@ -7,8 +7,6 @@
 namespace mjsense::render {
 namespace {
 
-using Matrix = std::array<Rgb64, 3>;
-
 Rgb64 times(const Matrix& m, const Rgb64& v) {
   Rgb64 out;
   for (int i = 0; i < 3; ++i) out[i] = m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2];
@@ -65,14 +63,22 @@ double exposure_scale(double ev) { return 1 / (1.2 * std::exp2(ev)); }
 
 Rgb64 white_balance(double kelvin) {
   // The colour that white gets in this light, in linear sRGB with the same luminance.
-  const Rgb64 light = cones(kelvin), day = cones(6504);
-  Rgb64 white = times(kBradford, times(kSrgbToXyz, {1, 1, 1}));
-  for (int i = 0; i < 3; ++i) white[i] *= light[i] / day[i];
-  const Rgb64 seen = times(kXyzToSrgb, times(kBradfordInverse, white));
+  const auto seen = [](double k) {
+    const Rgb64 light = cones(k), day = cones(kDaylight);
+    Rgb64 white = times(kBradford, times(kSrgbToXyz, {1, 1, 1}));
+    for (int i = 0; i < 3; ++i) white[i] *= light[i] / day[i];
+    return times(kXyzToSrgb, times(kBradfordInverse, white));
+  };
+  const Rgb64 color = seen(kelvin), day = seen(kDaylight);
   Rgb64 gains;
-  for (int i = 0; i < 3; ++i) gains[i] = 1 / std::max(seen[i], 0.02);
-  const double luminance = 0.2126729 * gains[0] + 0.7151522 * gains[1] + 0.0721750 * gains[2];
-  for (double& gain : gains) gain /= luminance;
+  for (int i = 0; i < 3; ++i) gains[i] = 1 / std::max(color[i] / day[i], 0.02);
+  const Rgb64 weights{0.2126729, 0.7151522, 0.0721750};
+  double luminance = 0, whole = 0;
+  for (int i = 0; i < 3; ++i) {
+    luminance += weights[i] * gains[i];
+    whole += weights[i];
+  }
+  for (double& gain : gains) gain *= whole / luminance;
   return gains;
 }
 
@@ -97,22 +103,26 @@ Rgb64 neutral(const Rgb64& rgb) {
   return out;
 }
 
-Rgb64 agx(const Rgb64& rgb) {
-  constexpr Matrix kInset = {{{0.842479062253094, 0.0784335999999992, 0.0792237451477643},
-                              {0.0423282422610123, 0.878468636469772, 0.0791661274605434},
-                              {0.0423756549057051, 0.0784336, 0.879142973793104}}};
-  constexpr Matrix kOutset = {{{1.19687900512017, -0.0980208811401368, -0.0990297440797205},
-                               {-0.0528968517574562, 1.15190312990417, -0.0989611768448433},
-                               {-0.0529716355144438, -0.0980434501171241, 1.15107367264116}}};
+const Matrix kAgxInset{{{0.842479062253094, 0.0784335999999992, 0.0792237451477643},
+                        {0.0423282422610123, 0.878468636469772, 0.0791661274605434},
+                        {0.0423756549057051, 0.0784336, 0.879142973793104}}};
+const Matrix kAgxOutset{{{1.19687900512017, -0.0980208811401368, -0.0990297440797205},
+                         {-0.0528968517574562, 1.15190312990417, -0.0989611768448433},
+                         {-0.0529716355144438, -0.0980434501171241, 1.15107367264116}}};
+
+double agx_contrast(double x) {
   constexpr double kLow = -12.47393, kHigh = 4.026069;  // stops around 1
-  Rgb64 mixed = times(kInset, rgb);
-  for (double& x : mixed) {
-    const double v =
-        (std::clamp(std::log2(std::max(x, 1e-10)), kLow, kHigh) - kLow) / (kHigh - kLow);
-    x = (((((15.5 * v - 40.14) * v + 31.96) * v - 6.868) * v + 0.4298) * v + 0.1191) * v - 0.00232;
-  }
-  Rgb64 out = times(kOutset, mixed);
-  for (double& x : out) x = std::pow(std::clamp(x, 0.0, 1.0), 2.2);
+  const double v = (std::clamp(std::log2(std::max(x, 1e-10)), kLow, kHigh) - kLow) / (kHigh - kLow);
+  return (((((15.5 * v - 40.14) * v + 31.96) * v - 6.868) * v + 0.4298) * v + 0.1191) * v - 0.00232;
+}
+
+double agx_linear(double x) { return std::pow(std::clamp(x, 0.0, 1.0), 2.2); }
+
+Rgb64 agx(const Rgb64& rgb) {
+  Rgb64 mixed = times(kAgxInset, rgb);
+  for (double& x : mixed) x = agx_contrast(x);
+  Rgb64 out = times(kAgxOutset, mixed);
+  for (double& x : out) x = agx_linear(x);
   return out;
 }
 

@@ -15,8 +15,10 @@ double srgb_decode(double encoded);
 // 100) can record without clipping: ISO 12232's saturation, as in Filament 8.1.
 double exposure_scale(double ev);
 
+inline constexpr double kDaylight = 6504;  // K, the white of sRGB
+
 // Factors of linear sRGB after which light of this colour temperature, K, appears white: von Kries's
-// adaptation in Bradford's cone space, applied to white. 1667 to 25000 K; {1, 1, 1} at 6504 K.
+// adaptation in Bradford's cone space, applied to white. 1667 to 25000 K; {1, 1, 1} at kDaylight.
 Rgb64 white_balance(double kelvin);
 
 // Curves from linear radiance to linear display values in [0, 1].
@@ -27,5 +29,11 @@ Rgb64 white_balance(double kelvin);
 double filmic(double x);
 Rgb64 neutral(const Rgb64& rgb);
 Rgb64 agx(const Rgb64& rgb);
+
+// AgX is agx_linear(kAgxOutset agx_contrast(kAgxInset rgb)).
+using Matrix = std::array<Rgb64, 3>;
+extern const Matrix kAgxInset, kAgxOutset;
+double agx_contrast(double x);
+double agx_linear(double x);
 
 }  // namespace mjsense::render

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/render/light/environment_source.h"
-
 namespace mjsense::render {
 namespace {
 

@@ -201,7 +201,7 @@ bool PathLights::sample_emitter(const Emitter& emitter, const Vec3& p, PathRando
 }
 
 Vec3 PathLights::to_environment(const Vec3& d) const {
-  const float* r = view_->physical.r_wc;
+  const float* r = view_->physical.r_ec;
   Vec3 out;
   for (int k = 0; k < 3; ++k) out[k] = r[3 * k] * d[0] + r[3 * k + 1] * d[1] + r[3 * k + 2] * d[2];
   return unit(out);
@@ -227,7 +227,7 @@ bool PathLights::sample(const Vec3& p, double total, PathRandom& random, LightSa
   const double choice = random.uniform();
   const auto [u, v] = random.square();
   const Vec3 d = environment_->sample(choice, u, v);
-  const float* r = view_->physical.r_wc;
+  const float* r = view_->physical.r_ec;
   for (int k = 0; k < 3; ++k) out.direction[k] = r[k] * d[0] + r[3 + k] * d[1] + r[6 + k] * d[2];
   out.direction = unit(out.direction);
   out.distance = INFINITY;

@@ -42,7 +42,7 @@ void find_surfaces(const View& view, std::span<const PathHit> hits, std::span<co
       o.substance.metallic = s.metallic[i];
       o.substance.roughness = s.roughness[i];
       o.substance.f0 = s.specular[i];
-      o.alpha = view.geoms[at.geom[i]].transparent ? s.alpha[i] : 1.0;
+      o.alpha = lets_light_through(view.geoms[at.geom[i]]) ? s.alpha[i] : 1.0;
       o.emission = static_cast<double>(s.emission[i]) * view.physical.unit;
     }
   }
@@ -73,6 +73,18 @@ void add_background(const View& view, std::span<PathPixel> pixels) {
     if (view.sky_distance > 0) add_haze(view, at, hits, colors);
     for (int i = 0; i < count; ++i)
       for (int c = 0; c < 3; ++c) pixels[first + i].rgb[c] = colors.rgb[c][i];
+  }
+}
+
+void map_to_display(const View& view, std::span<PathPixel> pixels) {
+  for (std::size_t first = 0; first < pixels.size(); first += kLanes) {
+    const std::size_t last = std::min(pixels.size(), first + kLanes);
+    Colors colors = {};
+    for (std::size_t i = first; i < last; ++i)
+      for (int c = 0; c < 3; ++c) colors.rgb[c][i - first] = pixels[i].rgb[c];
+    map_tones(view, colors);
+    for (std::size_t i = first; i < last; ++i)
+      for (int c = 0; c < 3; ++c) pixels[i].rgb[c] = colors.rgb[c][i - first];
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What path tracing shares with the kernels of images: the surface at a hit, with its normal and
-// textures, and the sky, haze and fog that a pixel shows. Frame: the camera's.
+// textures, the sky, haze and fog that a pixel shows, and the tone mapping. Frame: the camera's.
 
 #include <span>
 
@@ -18,6 +18,9 @@ struct PathSurface {
   double emission;  // radiance is `emission` times the base colour
 };
 
+// Planes seen from behind, which images show as a veil, are opaque for light on their front.
+inline bool lets_light_through(const ViewGeom& g) { return g.transparent && !g.shows_back; }
+
 // Textures are read at their finest level, because the samples of a pixel are averaged. `points`: of the
 // hits, m. Each hit has a geom.
 void find_surfaces(const View& view, std::span<const PathHit> hits, std::span<const Vec3> points,
@@ -33,5 +36,8 @@ struct PathPixel {
 
 // Replaces the radiance of pixels that hit nothing by the background's; adds haze and fog.
 void add_background(const View& view, std::span<PathPixel> pixels);
+
+// From linear radiance to the colours of a display, 0..1.
+void map_to_display(const View& view, std::span<PathPixel> pixels);
 
 }  // namespace mjsense::render

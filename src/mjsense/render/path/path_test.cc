@@ -101,5 +101,81 @@ TEST(PathTracer, CandelaFollowInverseSquareLaw) {
     }
 }
 
+// A ball of light and a sphere that glows as much light a floor equally, matte or metallic.
+TEST(PathTracer, BallOfLightIsAGlowingSphere) {
+  const double glow = 1000 / (M_PI * 0.3 * 0.3) / kClassicRadiance;
+  const std::string light =
+      R"(<light type="point" diffuse="1 1 1" intensity="1000" range="1000" pos="0 0 1" bulbradius="0.3"/>)";
+  const std::string sphere = R"(<geom size="0.3" pos="0 0 1" rgba="1 1 1 1" material="glow"/>)";
+  for (const char* metallic : {"0", "1"}) {
+    double means[2];
+    for (int k = 0; k < 2; ++k) {
+      TestRenderer s(
+          std::string(kDark) + R"(<asset><material name="glow" rgba="1 1 1 1" emission=")" +
+          std::to_string(glow) + R"("/><material name="m" rgba=".7 .7 .7 1" roughness=".3"
+        metallic=")" +
+          metallic + R"("/></asset><worldbody>)" + (k ? sphere : light) +
+          R"(<geom type="plane" size="5 5 1" material="m"/></worldbody>)");
+      s.options.physical = surrounded_by(0);
+      means[k] = trace(s, 64, {0.5, -1.5, 1}, 16, 40, {1, 0, 0}, {0, 0.5547, 0.83205}).mean();
+    }
+    EXPECT_GT(means[0], 0.05) << metallic;
+    EXPECT_NEAR(means[1] / means[0], 1, 0.03) << metallic;
+  }
+}
+
+// In a closed room whose walls have the albedo a = 0.5 and the emission e, the radiance is
+// e (1 + a + a^2 + ...) = e / (1 - a).
+TEST(PathTracer, ClosedRoomIsLitByAllReflections) {
+  TestRenderer s(std::string(kDark) + R"(<compiler angle="degree"/><asset>
+    <material name="m" specular="0" rgba=".735357 .735357 .735357 1" emission=".5"/></asset><worldbody>
+    <geom type="plane" size="1 1 1" pos="0 0 -1" material="m"/>
+    <geom type="plane" size="1 1 1" pos="0 0 1" euler="180 0 0" material="m"/>
+    <geom type="plane" size="1 1 1" pos="0 1 0" euler="90 0 0" material="m"/>
+    <geom type="plane" size="1 1 1" pos="0 -1 0" euler="-90 0 0" material="m"/>
+    <geom type="plane" size="1 1 1" pos="-1 0 0" euler="0 90 0" material="m"/>
+    <geom type="plane" size="1 1 1" pos="1 0 0" euler="0 -90 0" material="m"/></worldbody>)");
+  s.options.physical = surrounded_by(100);
+  const Traced seen = trace(s, 64, {0.1, -0.2, 0.3}, 16, 90, {1, 0, 0}, {0, 0.8, 0.6});
+  EXPECT_NEAR(seen.mean(), 0.5 * 0.5 / (1 - 0.5), 0.005);
+}
+
+// E = 2 pi times the integral of (1 + z) z from 0 to 1; and half of it under glass of alpha 0.5.
+TEST(PathTracer, SurroundingsLightAMatteFloor) {
+  for (const bool glass : {false, true}) {
+    TestRenderer s(
+        std::string(kDark) +
+        R"(<asset><material name="m" specular="0" rgba="1 1 1 1"/></asset><worldbody>
+      <geom type="plane" size="5 5 1" material="m"/>)" +
+        (glass ? R"(<geom type="box" size="900 900 1" pos="0 0 2" rgba="0 0 0 .5"/>)" : "") +
+        "</worldbody>");
+    s.options.physical = surrounded_by(0);
+    s.options.physical.environment = upright_environment([](double z) { return 1 + z; });
+    const Traced seen = trace(s, 256, {0, 0, 0.9}, 4, 1);
+    // The black glass reflects 4 % and more of the floor's light.
+    const double share = glass ? 0.5 : 1, room = glass ? 0.06 : 0.01;
+    EXPECT_NEAR(seen.mean() / seen.around, share * 5 / 3, room * 5 / 3);
+  }
+}
+
+TEST(PathTracer, ErrorFallsAtLeastWithTheSquareRootOfTheSamples) {
+  TestRenderer s(std::string(kDark) + R"(<asset><material name="m" rgba=".8 .6 .3 1" metallic=".5"
+    roughness=".3"/></asset><worldbody><light pos="1 -1 2" dir="-1 1 -2" bulbradius=".3"/>
+    <geom type="plane" size="5 5 1"/><geom size=".5" pos="0 0 .5" material="m"/></worldbody>)");
+  s.options.physical = surrounded_by(1);
+  const auto shot = [&](int samples) {
+    return trace(s, samples, {0, -2, 1.5}, 16, 40, {1, 0, 0}, {0, 0.6, 0.8}).radiance;
+  };
+  const std::vector<float> reference = shot(4096);
+  const auto error = [&](int samples) {
+    const std::vector<float> seen = shot(samples);
+    double sum = 0;
+    for (std::size_t i = 0; i < seen.size(); ++i) sum += std::pow(seen[i] - reference[i], 2);
+    return std::sqrt(sum / static_cast<double>(seen.size()));
+  };
+  EXPECT_GT(error(4) / error(64), 3.6);
+  EXPECT_GT(error(16) / error(256), 3.6);
+}
+
 }  // namespace
 }  // namespace mjsense::render

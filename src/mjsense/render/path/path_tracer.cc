@@ -2,39 +2,20 @@
 #include "mjsense/render/path/path_tracer.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
-#include "mjsense/render/light/tone_map.h"
 #include "mjsense/render/path/path_wave.h"
 
 namespace mjsense::render {
 namespace {
 
-// As ToneCurve.
-double tone_curve(const float* table, double x) {
-  const float y =
-      static_cast<float>(std::clamp<double>(x, 0, ToneCurve::kEnd)) + ToneCurve::kOffset;
-  const auto at = std::bit_cast<std::uint32_t>(y);
-  const float* value = table + (at >> ToneCurve::kShift) - ToneCurve::kFirst;
-  const double part =
-      static_cast<double>(at & ((1u << ToneCurve::kShift) - 1)) / (1u << ToneCurve::kShift);
-  return std::lerp<double>(value[0], value[1], part);
-}
+void put(const PathPixel& pixel, float* out) { std::copy_n(pixel.rgb, 3, out); }
 
-void put(const View&, const Rgb64& radiance, float* out) {
-  for (int c = 0; c < 3; ++c) out[c] = static_cast<float>(radiance[c]);
-}
-
-void put(const View& view, const Rgb64& radiance, std::uint8_t* out) {
-  const PhysicalView& p = view.physical;
-  const Rgb64 shown =
-      p.tone_mapping == ToneMapping::kNeutral ? render::neutral(radiance) : radiance;
+void put(const PathPixel& pixel, std::uint8_t* out) {
   for (int c = 0; c < 3; ++c)
-    out[c] = static_cast<std::uint8_t>(
-        std::lround(255 * std::clamp(tone_curve(p.tone_curve, shown[c]), 0.0, 1.0)));
+    out[c] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(pixel.rgb[c], 0.0f, 1.0f)));
 }
 
 }  // namespace
@@ -56,11 +37,14 @@ void PathTracer::render_rows(int first, int last, Value* image) const {
       const int x1 = std::min(x0 + kTileSize, width);
       sum.assign(3 * static_cast<std::size_t>((x1 - x0) * (y1 - y0)), 0);
       for (int s = 0; s < samples_; ++s) wave.add_sample(x0, x1, y0, y1, s, sum);
-      const double* from = sum.data();
+      std::vector<PathPixel> pixels(sum.size() / 3);
+      for (std::size_t i = 0; i < sum.size(); ++i)
+        pixels[i / 3].rgb[i % 3] = static_cast<float>(sum[i] / samples_);
+      if (std::is_same_v<Value, std::uint8_t>) map_to_display(view, pixels);
+      const PathPixel* from = pixels.data();
       for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < x1; ++x, from += 3)
-          put(view, {from[0] / samples_, from[1] / samples_, from[2] / samples_},
-              image + 3 * (static_cast<std::size_t>(y) * width + x));
+        for (int x = x0; x < x1; ++x, ++from)
+          put(*from, image + 3 * (static_cast<std::size_t>(y) * width + x));
     }
   }
 }

@@ -10,8 +10,8 @@
 // are weighted by multiple importance sampling. After a few reflections, paths end at random
 // (Russian roulette). Random numbers depend on the pixel and the number of the sample only.
 //
-// Differences from images of the kernels besides light: transparent geoms let light through, where it is
-// not shadowed by them completely; geoms seen from behind reflect and cast shadows.
+// Differences from images of the kernels besides light: transparent geoms let light through; planes seen from
+// behind are not shown as a veil.
 
 #include <cstdint>
 #include <memory>

@@ -277,7 +277,7 @@ void PathWave::trace_shadows() {
       }
       const bool found =
           hit.geom == s.geom && std::abs(hit.t - s.distance) <= 1e-3 * s.distance + 1e-4;
-      if (!found && !scene_.view().geoms[hit.geom].transparent) continue;
+      if (!found && !lets_light_through(scene_.view().geoms[hit.geom])) continue;
       const Vec3 point = advanced(s.o, hit.t, s.d);
       PathSurface surface;
       find_surfaces(scene_.view(), {&hit, 1}, {&point, 1}, {&surface, 1});

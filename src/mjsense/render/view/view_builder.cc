@@ -10,6 +10,8 @@
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
+#include "mjsense/render/light/material.h"
+#include "mjsense/render/light/tone_map.h"
 #include "mjsense/render/view/fixed_layer.h"
 #include "mjsense/render/view/frustum.h"
 #include "mjsense/render/view/image_window.h"
@@ -88,7 +90,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
-  view_.skybox = options.textures ? assets.skybox() : nullptr;
+  view_.skybox = options.textures && !options.physical.hides_skybox ? assets.skybox() : nullptr;
   if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;
     flat.reflections = flat.shadows = flat.layered = false;
@@ -262,7 +264,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   view_.near = scene.near;
   view_.far = scene.far;
   view_.shadows = scene.shadows;
-  view_.skybox = scene.skybox;
+  view_.skybox = scene.physical && scene.physical->hides_skybox ? nullptr : scene.skybox;
   view_.physical.shows_environment = !view_.skybox;
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
@@ -431,7 +433,8 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   s = {};
   std::copy_n(rgba, 4, s.rgba);
   const bool physical = view_.physical.on;
-  for (int i = 0; i < 3; ++i) s.rgba[i] = physical ? linear_of_srgb(rgba[i]) : rgba[i] * tint_;
+  for (int i = 0; i < 3; ++i)
+    s.rgba[i] = physical ? static_cast<float>(srgb_decode(rgba[i])) : rgba[i] * tint_;
   if (g.shows_back) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.shows_back;
   s.specular = 0.5f;
@@ -439,11 +442,10 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   s.highlight_threshold = highlight_threshold_of(s.exponent);
   if (material) s.specular = material->specular;
   if (physical) {
-    s.specular = std::min(0.16f * s.specular * s.specular, 1.0f);  // Filament 4.8.3.2
-    s.metallic = material ? std::clamp(material->metallic, 0.0f, 1.0f) : 0;
-    s.roughness = material ? material->roughness : -1;
-    if (s.roughness < 0) s.roughness = 1 - (material ? material->shininess : 0.5f);
-    s.roughness = std::clamp(s.roughness, 0.0f, 1.0f);
+    s.specular = static_cast<float>(dielectric_f0(s.specular));
+    s.metallic = static_cast<float>(metallic_of(material ? material->metallic : -1));
+    s.roughness = static_cast<float>(
+        material ? roughness_of(material->roughness, material->shininess) : roughness_of(-1, 0.5));
   }
   if (!material) return;
   s.emission = material->emission;
@@ -492,7 +494,7 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
 
 // A colour of the sky as the kernels need it: radiance, if the view is physically based.
 float ViewBuilder::shown(float color) const {
-  return view_.physical.on ? linear_of_srgb(color) * view_.physical.unit : color;
+  return view_.physical.on ? static_cast<float>(srgb_decode(color)) * view_.physical.unit : color;
 }
 
 // The sky's cylinder and the haze are at least (1 - width) times the cylinder's radius away; the

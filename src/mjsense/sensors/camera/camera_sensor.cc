@@ -193,7 +193,7 @@ void CameraSensor::allocate_workspace(const SensorInit& init) {
   workspace_->making.resize(slots);
   render::ViewOptions options = view_options(cfg_, near_, far_);
   options.markers = max_markers();
-  if (wants("rgb")) options.physical = physical_options(cfg_);
+  if (wants("rgb")) options.physical = physical_options(cfg_, model_);
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
   if (options.physical.path_samples > 0) {
