@@ -147,8 +147,10 @@ bool PathWave::leave(Path& path, const PathHit& hit) {
   const bool reflected = path.reflections > 0;
   if (!reflected) return hit.geom < 0;
   const double end = hit.geom < 0 ? INFINITY : hit.t;
-  Rgb64 light =
-      lights_.balls(path.from, path.o, path.d, end, path.o == path.from, path.density, path.total);
+  Rgb64 light{};
+  if (path.density > 0)  // a mirror does not show them either
+    light = lights_.balls(path.from, path.o, path.d, end, path.o == path.from, path.density,
+                          path.total);
   if (hit.geom < 0) {
     const Rgb64 around = lights_.surroundings(path.d, path.density, path.total);
     for (int c = 0; c < 3; ++c) light[c] += around[c];
@@ -189,10 +191,11 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
     if (path.random.uniform() >= going) return false;
     for (double& c : path.throughput) c /= going;
   }
-  ++path.reflections;
+  const bool seen = path.reflections++ == 0;
   const Vec3 start = advanced(point, clearance(point, hit.t), face);
   const Vec3 to_viewer{-path.d[0], -path.d[1], -path.d[2]};
-  if (is_mirror(view, hit) && path.random.uniform() < view.physical.reflectance) {
+  // A mirror is one for the camera only: light that it throws onto other surfaces would be found by chance.
+  if (seen && is_mirror(view, hit) && path.random.uniform() < view.physical.reflectance) {
     const double twice = 2 * dot(to_viewer, face);
     path.d = unit({twice * face[0] - to_viewer[0], twice * face[1] - to_viewer[1],
                    twice * face[2] - to_viewer[2]});
