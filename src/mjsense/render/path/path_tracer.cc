@@ -11,6 +11,9 @@
 namespace mjsense::render {
 namespace {
 
+// Samples of a tile that are traced together. More of them have more similar rays in a packet.
+constexpr int kTogether = 4;
+
 void put(const PathPixel& pixel, float* out) { std::copy_n(pixel.rgb, 3, out); }
 
 void put(const PathPixel& pixel, std::uint8_t* out) {
@@ -36,7 +39,8 @@ void PathTracer::render_rows(int first, int last, Value* image) const {
     for (int x0 = 0; x0 < width; x0 += kTileSize) {
       const int x1 = std::min(x0 + kTileSize, width);
       sum.assign(3 * static_cast<std::size_t>((x1 - x0) * (y1 - y0)), 0);
-      for (int s = 0; s < samples_; ++s) wave.add_sample(x0, x1, y0, y1, s, sum);
+      for (int s = 0; s < samples_; s += kTogether)
+        wave.add_samples(x0, x1, y0, y1, s, std::min(s + kTogether, samples_), sum);
       std::vector<PathPixel> pixels(sum.size() / 3);
       for (std::size_t i = 0; i < sum.size(); ++i)
         pixels[i / 3].rgb[i % 3] = static_cast<float>(sum[i] / samples_);

@@ -61,12 +61,9 @@ bool is_mirror(const View& view, const PathHit& hit) {
 void PathWave::start(int x0, int x1, int y0, int y1, int sample) {
   const PixelGrid& grid = scene_.view().grid;
   const double near = scene_.view().near;
-  paths_.clear();
-  pixels_.clear();
-  active_.clear();
   for (int y = y0; y < y1; ++y)
     for (int x = x0; x < x1; ++x) {
-      const int pixel = static_cast<int>(paths_.size());
+      active_.push_back(static_cast<int>(paths_.size()));
       Path& path = paths_.emplace_back();
       path.random = PathRandom(static_cast<std::uint32_t>(y * grid.width + x), sample);
       const auto [right, down] = path.random.square();
@@ -109,8 +106,6 @@ void PathWave::start(int x0, int x1, int y0, int y1, int sample) {
       path.density = path.total = 0;
       path.throughput = {1, 1, 1};
       path.radiance = {};
-      path.pixel = pixel;
-      active_.push_back(pixel);
     }
 }
 
@@ -175,7 +170,7 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
     return true;
   }
   if (path.reflections == 0) {
-    PathPixel& pixel = pixels_[path.pixel];
+    PathPixel& pixel = pixels_[index];
     pixel.geom = hit.geom;
     pixel.t = static_cast<float>(-point[2]);
   }
@@ -303,8 +298,12 @@ void PathWave::trace_shadows() {
   }
 }
 
-void PathWave::add_sample(int x0, int x1, int y0, int y1, int sample, std::vector<double>& sum) {
-  start(x0, x1, y0, y1, sample);
+void PathWave::add_samples(int x0, int x1, int y0, int y1, int first, int last,
+                           std::vector<double>& sum) {
+  paths_.clear();
+  pixels_.clear();
+  active_.clear();
+  for (int sample = first; sample < last; ++sample) start(x0, x1, y0, y1, sample);
   // Paths from the camera see fewer geoms than reflected ones; they are traced on their own.
   std::vector<int> reflected;
   for (bool camera = true; !active_.empty();) {
@@ -319,11 +318,11 @@ void PathWave::add_sample(int x0, int x1, int y0, int y1, int sample, std::vecto
     active_ = std::move(reflected);
     camera = false;
   }
-  for (const Path& path : paths_)
-    for (int c = 0; c < 3; ++c) pixels_[path.pixel].rgb[c] = static_cast<float>(path.radiance[c]);
+  for (std::size_t i = 0; i < paths_.size(); ++i)
+    for (int c = 0; c < 3; ++c) pixels_[i].rgb[c] = static_cast<float>(paths_[i].radiance[c]);
   add_background(scene_.view(), pixels_);
-  for (std::size_t i = 0; i < pixels_.size(); ++i)
-    for (int c = 0; c < 3; ++c) sum[3 * i + c] += pixels_[i].rgb[c];
+  for (std::size_t i = 0; i < 3 * pixels_.size(); ++i)
+    sum[i % sum.size()] += pixels_[i / 3].rgb[i % 3];
 }
 
 }  // namespace mjsense::render

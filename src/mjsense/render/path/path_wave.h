@@ -15,9 +15,9 @@ class PathWave {
  public:
   PathWave(const PathScene& scene, const PathLights& lights) : scene_(scene), lights_(lights) {}
 
-  // Traces one path for each pixel of [x0, x1) x [y0, y1), and adds its radiance to sum [pixels, 3], row
-  // by row.
-  void add_sample(int x0, int x1, int y0, int y1, int sample, std::vector<double>& sum);
+  // Traces the paths of the samples [first, last) of each pixel of [x0, x1) x [y0, y1), and adds their radiance
+  // to sum [pixels, 3], row by row.
+  void add_samples(int x0, int x1, int y0, int y1, int first, int last, std::vector<double>& sum);
 
  private:
   struct Path {
@@ -27,7 +27,6 @@ class PathWave {
     double total;    // PathLights::total(from)
     Rgb64 throughput, radiance;
     PathRandom random;
-    int pixel;
     int surfaces = 0, reflections = 0;
   };
   // Light that reaches a path unless something is in between.
@@ -48,8 +47,8 @@ class PathWave {
   const PathScene& scene_;
   const PathLights& lights_;
   std::vector<Path> paths_;
-  std::vector<PathPixel> pixels_;
-  std::vector<int> active_;  // paths
+  std::vector<PathPixel> pixels_;  // by path
+  std::vector<int> active_;        // paths
   std::vector<Shadow> shadows_;
   // Working memory.
   std::vector<PathRay> rays_;

@@ -18,7 +18,7 @@ class Scatter {
   Scatter(const Substance& substance, const Vec3& v) : v_(v), reflectance_(substance, v[2]) {
     const auto sum = [](const Rgb64& c) { return c[0] + c[1] + c[2]; };
     const double lobe = sum(reflectance_.lobe), matte = sum(reflectance_.matte);
-    gloss_ = matte == 0 ? 1 : lobe == 0 ? 0 : std::clamp(lobe / (lobe + matte), 0.1, 0.9);
+    gloss_ = matte == 0 ? 1 : lobe == 0 ? 0 : std::clamp(lobe / (lobe + matte), 0.25, 0.9);
   }
 
   // For uniform numbers in [0, 1). The direction may be below the surface: it reflects nothing.
