@@ -48,7 +48,17 @@ def images(model: mujoco.MjModel, data: mujoco.MjData, samples: int) -> np.ndarr
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "data")
-        mjs.record(VIEW.task, VIEW.robot, scene=VIEW.scene, out=out, episodes=1, num_worlds=1, horizon=VIEW.steps, keep_failures=True, seed=VIEW.seed)
+        mjs.record(
+            VIEW.task,
+            VIEW.robot,
+            scene=VIEW.scene,
+            out=out,
+            episodes=1,
+            num_worlds=1,
+            horizon=VIEW.steps,
+            keep_failures=True,
+            seed=VIEW.seed,
+        )
         episode = mjs.Dataset(out).episodes[0]
         model = episode.model()
         data = mujoco.MjData(model)

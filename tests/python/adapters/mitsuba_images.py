@@ -213,9 +213,9 @@ def register_material(mi, dr):
             high = (1 - m) * plain90 + m * metal * min(1, 16.5 * self.mean)
             return under * self.base, low0, high
 
-        def value(self, v, l):
-            n_v, n_l, a2 = dr.maximum(v.z, 1e-4), l.z, self.alpha**2
-            h = dr.normalize(v + l)
+        def value(self, v, to_light):
+            n_v, n_l, a2 = dr.maximum(v.z, 1e-4), to_light.z, self.alpha**2
+            h = dr.normalize(v + to_light)
             t = h.z * h.z * (a2 - 1) + 1
             d = a2 / (dr.pi * t * t)
             smith = 0.5 / (n_l * dr.sqrt(n_v * n_v * (1 - a2) + a2) + n_v * dr.sqrt(n_l * n_l * (1 - a2) + a2))
@@ -223,18 +223,18 @@ def register_material(mi, dr):
             fresnel = (1 - dr.clip(dr.dot(v, h), 0, 1)) ** 5
             masking = 2 * n_v / (n_v + dr.sqrt(n_v * n_v * (1 - a2) + a2))
             pdf = 0.5 * n_l / dr.pi + 0.5 * masking * d / (4 * n_v)
-            good = (v.z > 0) & (l.z > 0)
+            good = (v.z > 0) & (to_light.z > 0)
             color = (matte / dr.pi + d * smith * (low + (high - low) * fresnel)) * n_l
-            return good & True, dr.select(good, color, 0), dr.select(good, pdf, 0)
+            return good, dr.select(good, color, 0), dr.select(good, pdf, 0)
 
         def sample(self, ctx, si, sample1, sample2, active):
             v = si.wi
             normal = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, True).sample(v, sample2)[0]
             mirrored = mi.reflect(v, normal)
-            l = dr.select(sample1 < 0.5, mirrored, mi.warp.square_to_cosine_hemisphere(sample2))
-            good, color, pdf = self.value(v, l)
+            to_light = dr.select(sample1 < 0.5, mirrored, mi.warp.square_to_cosine_hemisphere(sample2))
+            good, color, pdf = self.value(v, to_light)
             bs = mi.BSDFSample3f()
-            bs.wo, bs.pdf, bs.eta = l, pdf, 1.0
+            bs.wo, bs.pdf, bs.eta = to_light, pdf, 1.0
             bs.sampled_type, bs.sampled_component = mi.UInt32(+self.m_flags), mi.UInt32(0)
             return bs, dr.select(active & good & (pdf > 0), color / pdf, 0)
 

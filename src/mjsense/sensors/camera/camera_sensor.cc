@@ -197,8 +197,8 @@ void CameraSensor::allocate_workspace(const SensorInit& init) {
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
   if (options.physical.path_samples > 0) {
-    const auto around = std::make_shared<const render::EnvironmentSampler>(
-        options.physical.environment->light);
+    const auto around =
+        std::make_shared<const render::EnvironmentSampler>(options.physical.environment->light);
     for (int i = 0; i < slots; ++i)
       workspace_->paths.emplace_back(options.physical.path_samples, around);
   }

@@ -13,9 +13,7 @@
 namespace mjsense::sensors {
 
 enum class Shading { kClassic, kPbr, kPath };
-constexpr std::array<std::string_view, 3> enum_names(Shading) {
-  return {"classic", "pbr", "path"};
-}
+constexpr std::array<std::string_view, 3> enum_names(Shading) { return {"classic", "pbr", "path"}; }
 
 // As render::ToneMapping.
 enum class ToneMap { kNeutral, kFilmic, kLinear, kAgx };
