@@ -279,8 +279,8 @@ Texture texture_levels(const mjModel* model, int id) {
   texture.alpha = channels == 4;
   texture.grey = channels == 1;
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
-  const int space = color_space(model, id);
-  texture.linear = space == mjCOLORSPACE_LINEAR || (space == mjCOLORSPACE_SRGB && !texture.cube);
+  // MuJoCo marks PNG files without a colour space as linear, though their colours are encoded.
+  texture.linear = color_space(model, id) == mjCOLORSPACE_SRGB && !texture.cube;
   // A cube texture with a square image repeats that image on all faces.
   texture.same_faces = texture.cube && model->tex_width[id] == model->tex_height[id];
   int width = model->tex_width[id], height = texture.cube ? width : model->tex_height[id];

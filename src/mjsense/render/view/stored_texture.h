@@ -30,7 +30,7 @@ struct Texture {
   bool cube = false;
   bool alpha = false;       // it has an alpha channel
   bool grey = false;        // it has one channel, so that it is no texture of colours
-  bool linear = false;      // its colours are not encoded with sRGB's curve
+  bool linear = false;      // its colours were decoded from sRGB when they were stored
   bool same_faces = false;  // a cube map with one image for all faces, which is stored once
   int levels = 0;           // of the mipmap; 0: the texture cannot be drawn
   int finest = 0;           // the finest level that is stored
