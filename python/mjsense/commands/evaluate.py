@@ -17,7 +17,7 @@ EXAMPLES = [
         "mjsense evaluate pick --policy net.py:Network --episodes 100 --out results",
         "Evaluate a policy written in Python on 100 episodes.",
     ),
-    ("mjsense evaluate bench --policy planner --out results", "Evaluate the planner on a benchmark."),
+    ("mjsense evaluate benchmark:pick --policy planner --out results", "Evaluate the planner on a benchmark of the package."),
 ]
 _NOT_OFFERED = (
     "noise",
@@ -35,7 +35,15 @@ _POLICIES = "planner, random, replay:DIR, python:MODULE:CLASS, FILE.py:CLASS"
 
 
 def add_arguments(parser: Parser) -> None:
-    add_name(parser, "task", "tasks", "Name of the task, or folder of a benchmark.", nargs="?", default="pick", metavar="TASK")
+    add_name(
+        parser,
+        "task",
+        "tasks",
+        "Name of the task, or a benchmark: its folder, or benchmark:pick and similar.",
+        nargs="?",
+        default="pick",
+        metavar="TASK",
+    )
     action = parser.add_argument(
         "--policy", default="planner", metavar="TEXT", help=f"The policy: {_POLICIES}, or the name of another one."
     )
@@ -52,7 +60,7 @@ def add_arguments(parser: Parser) -> None:
         "--episodes",
         metavar="N",
         dest="numbers",
-        help="Number of episodes, those from 0 on; or their numbers: 3,7,12. A benchmark states its episodes. (default: 50)",
+        help="Number of episodes, those from 0 on; or their numbers: 3,7,12. By default 50. A benchmark states its episodes.",
     )
     parser.add_argument(
         "--execution-horizon",
