@@ -51,6 +51,14 @@ def test_other_images_are_those_of_classic_shading() -> None:
         np.testing.assert_array_equal(classic[name], path[name])
 
 
+def test_hdr_is_the_radiance_of_the_image() -> None:
+    both = images(kinds=("rgb", "hdr"), tone_mapping="linear")
+    linear = np.clip(both["hdr"] / (1.2 * 2**8), 0, 1)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(both["rgb"], 255 * encoded, atol=1.5)
+    np.testing.assert_array_equal(images(kinds=("hdr",), threads=2)["hdr"], both["hdr"])
+
+
 def test_pbr_is_near_the_reference() -> None:
     path = images(samples_per_pixel=256)["rgb"].astype(float)
     decibels = {

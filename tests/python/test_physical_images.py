@@ -102,6 +102,21 @@ def test_surroundings_light_colour_and_turn(tmp_path: Path) -> None:
     assert warm[0] / warm[2] > 1.2 > 0.8 > cold[0] / cold[2]
 
 
+def test_hdr_is_the_radiance_of_the_image() -> None:
+    """Exposure 8 shows 1.2 * 2^8 cd/m^2 as white. The radiance does not depend on how it is shown, and the colours not on hdr."""
+    options = {"shading": "pbr", "tone_mapping": "linear", "samples": 4}
+    both = images(2, 1, 2, ("rgb", "hdr"), **options)
+    alone = images(2, 2, 2, ("hdr", "depth"), **options)["hdr"]
+    np.testing.assert_array_equal(alone, both["hdr"])
+    np.testing.assert_array_equal(images(2, 1, 2, ("rgb",), **options)["rgb"], both["rgb"])
+    shown = images(2, 1, 2, ("hdr",), **{**options, "exposure": 12, "tone_mapping": "agx", "white_balance": 4000})["hdr"]
+    np.testing.assert_allclose(shown, alone, rtol=1e-5)
+    radiance = images(1, 1, 1, ("rgb", "hdr"), **{**options, "samples": 1})
+    linear = np.clip(radiance["hdr"] / (1.2 * 2**8), 0, 1)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    assert np.abs(255 * encoded - radiance["rgb"]).max() <= 0.6
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -302,7 +302,7 @@ class CameraSensorCfg(SensorCfg):
     height: int = 120
     """Height of the image; the resolution in the MJCF is not used. [pixels]"""
     data_types: Sequence[Literal[
-            "rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow"
+            "rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow", "hdr"
         ]] = ("rgb",)
     """The image types to compute."""
     use_textures: bool = True

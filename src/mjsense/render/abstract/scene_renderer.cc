@@ -151,8 +151,12 @@ void SceneRenderer::trace_paths(const View& view, std::uint8_t* rgb) {
   for (int i = 0; i < view.num_geoms; ++i) {
     const ViewGeom& g = view.geoms[i];
     if (g.mesh_on_demand) g.mesh_on_demand->prepare_surface(g.surface.uses_mesh_uvs);
-    for (const Texture* texture : {g.surface.texture, view.skybox})
+    const auto prepare = [](const Texture* texture) {
       if (texture && texture->on_demand) texture->on_demand->add_level(0);
+    };
+    prepare(g.surface.texture);
+    for (const Texture* map : g.surface.maps) prepare(map);
+    prepare(view.skybox);
   }
   if (around_ != physical_.environment) {
     sampler_ = std::make_shared<const EnvironmentSampler>(physical_.environment->light);
@@ -161,7 +165,7 @@ void SceneRenderer::trace_paths(const View& view, std::uint8_t* rgb) {
   PathTracer paths(physical_.path_samples, sampler_);
   paths.build(view);
   ThreadPool(0).run((view.grid.height + kTileSize - 1) / kTileSize,
-                    [&](int row, int) { paths.render(row, row + 1, rgb); });
+                    [&](int row, int) { paths.render(row, row + 1, {.rgb = rgb}); });
 }
 
 // `all`: include geoms without segmentation id, which depth and segmentation do not show.
@@ -222,6 +226,13 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       out.material.uniform = model_->mat_texuniform[geom.matid] != 0;
     }
     if (colored) out.texture = assets_.texture(texture);
+    if (colored && physical_.on) {
+      out.material.textures = textures_of(model_.get(), geom.matid);
+      if (texture < 0) out.texture = assets_.texture(out.material.textures[mjTEXROLE_RGBA]);
+      for (int i = 0; i < kNumTextureMaps; ++i)
+        out.maps[i] =
+            assets_.texture(texture_of(out.material.textures, static_cast<TextureMap>(i)));
+    }
     if (model_->mat_metallic) out.material.metallic = model_->mat_metallic[geom.matid];
     if (model_->mat_roughness) out.material.roughness = model_->mat_roughness[geom.matid];
   }

@@ -9,13 +9,6 @@ namespace {
 
 inline Float float_of(Int a) { return {(decltype(Float::v))a.v}; }
 
-// sRGB's curve from a colour in [0, 1] to linear light; the error is below 3e-4.
-inline Float srgb_to_linear(Float x) {
-  const Float a = fma(x, splat(0.2157905f), splat(-0.6573604f));
-  const Float b = fma(x, a, splat(1.0077318f));
-  return x * fma(x, fma(x, b, splat(0.3785078f)), splat(0.0553303f));
-}
-
 // Tone curve and sRGB's curve, see ToneCurve.
 inline Float tone_curve(const float* table, Float x) {
   // max() also removes NaN.

@@ -53,6 +53,7 @@ void PathLights::add_emitter(int index) {
   const double light =
       luminance(times(s.rgba, s.emission * static_cast<double>(view_->physical.unit)));
   if (!(light > 0) || !g.casts_shadows) return;
+  // Estimated without textures.
   Emitter out{index, vec3(g.center), 0, 0};
   const double x = g.size[0], y = g.size[1], z = g.size[2];
   switch (g.type) {

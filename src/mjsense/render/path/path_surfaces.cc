@@ -31,19 +31,18 @@ void find_surfaces(const View& view, std::span<const PathHit> hits, std::span<co
     }
     gather_at_points(view, pixels, at, (2u << (count - 1)) - 1, true, s);
     for (int k = 0; k < kLanes; k += kWidth)
-      for (int c = 0; c < 3; ++c)
-        store(s.rgb[c] + k, load(s.rgb[c] + k) * srgb_to_linear(load(s.texture[c] + k)));
+      for (int c = 0; c < 3; ++c) store(s.rgb[c] + k, load(s.rgb[c] + k) * load(s.texture[c] + k));
     for (int i = 0; i < count; ++i) {
       PathSurface& o = out[first + i];
       for (int k = 0; k < 3; ++k) {
         o.substance.base[k] = s.rgb[k][i];
         o.normal[k] = s.n[k][i];
+        o.glow[k] = static_cast<double>(s.glow[k][i]) * view.physical.unit;
       }
       o.substance.metallic = s.metallic[i];
       o.substance.roughness = s.roughness[i];
       o.substance.f0 = s.specular[i];
       o.alpha = lets_light_through(view.geoms[at.geom[i]]) ? s.alpha[i] : 1.0;
-      o.emission = static_cast<double>(s.emission[i]) * view.physical.unit;
     }
   }
 }

@@ -13,9 +13,9 @@ namespace mjsense::render {
 
 struct PathSurface {
   Substance substance;
-  Vec3 normal;      // unit, by which it is shaded
-  double alpha;     // 1: opaque
-  double emission;  // radiance is `emission` times the base colour
+  Vec3 normal;   // unit, by which it is shaded
+  double alpha;  // 1: opaque
+  Rgb64 glow;    // radiance that it emits
 };
 
 // Planes seen from behind, which images show as a veil, are opaque for light on their front.

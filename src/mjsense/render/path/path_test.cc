@@ -49,7 +49,10 @@ Traced trace(TestRenderer& s, int samples, std::array<double, 3> at, int size, d
       samples, std::make_shared<const EnvironmentSampler>(s.options.physical.environment->light));
   tracer.build(view);
   Traced out{size, std::vector<float>(3 * size * size), view.physical.radiance_scale};
-  tracer.render(0, (size + kTileSize - 1) / kTileSize, out.radiance.data());
+  ImageTargets targets;
+  targets.hdr = out.radiance.data();
+  tracer.render(0, (size + kTileSize - 1) / kTileSize, targets);
+  for (float& x : out.radiance) x /= view.physical.white_radiance;
   return out;
 }
 

@@ -28,15 +28,11 @@ class PathTracer {
 
   // As for PathScene::build(). Several threads may then render different rows.
   void build(const View& view);
-  // Renders rows of tiles [first, last) of an image, [H, W, 3], in the colours of a display or in the units
-  // of PhysicalView.
-  void render(int first, int last, std::uint8_t* rgb) const;
-  void render(int first, int last, float* radiance) const;
+  // Renders rows of tiles [first, last) of an image into the targets rgb and hdr, of those that are not
+  // null.
+  void render(int first, int last, const ImageTargets& targets) const;
 
  private:
-  template <class Value>
-  void render_rows(int first, int last, Value* image) const;
-
   int samples_;
   PathScene scene_;
   PathLights lights_;

@@ -174,12 +174,10 @@ bool PathWave::reflect(int index, const PathHit& hit, const PathSurface& surface
     pixel.geom = hit.geom;
     pixel.t = static_cast<float>(-point[2]);
   }
-  if (surface.emission > 0 && !back) {
+  if (std::ranges::max(surface.glow) > 0 && !back) {
     const double weight = lights_.emitter_weight(hit.geom, path.from, point, -dot(face, path.d),
                                                  path.density, path.total);
-    for (int c = 0; c < 3; ++c)
-      path.radiance[c] +=
-          path.throughput[c] * weight * surface.emission * surface.substance.base[c];
+    for (int c = 0; c < 3; ++c) path.radiance[c] += path.throughput[c] * weight * surface.glow[c];
   }
   if (path.reflections >= kSurvivors) {
     const double going = std::min(0.95, std::ranges::max(path.throughput));
@@ -280,8 +278,7 @@ void PathWave::trace_shadows() {
       PathSurface surface;
       find_surfaces(scene_.view(), {&hit, 1}, {&point, 1}, {&surface, 1});
       if (found) {
-        for (int c = 0; c < 3; ++c)
-          path.radiance[c] += s.light[c] * surface.emission * surface.substance.base[c];
+        for (int c = 0; c < 3; ++c) path.radiance[c] += s.light[c] * surface.glow[c];
         continue;
       }
       if (dot(vec3(hit.n), s.d) < 0)

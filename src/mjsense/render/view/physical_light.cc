@@ -107,7 +107,9 @@ void set_physical(const PhysicalOptions& options, const double rotation[9], Phys
   out.on = true;
   set_curves(options.tone_mapping, out);
   out.specular_table = specular_table.data();
-  out.unit = static_cast<float>(kClassicRadiance / maximum_radiance(options.exposure));
+  const double white = maximum_radiance(options.exposure);
+  out.white_radiance = static_cast<float>(white);
+  out.unit = static_cast<float>(kClassicRadiance / white);
   out.occlusion_reach = options.occlusion_reach;
   out.all_geoms = options.path_samples > 0;
   const Rgb64 gains = white_balance(options.white_balance);

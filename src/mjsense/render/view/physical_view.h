@@ -46,6 +46,7 @@ struct PhysicalView {
   float radiance_scale = 0;
   float r_ec[9] = {};              // R_EC, row-major, E: frame of `radiance`
   bool shows_environment = false;  // as the background, instead of a skybox
+  float white_radiance = 1;        // cd/m^2 of a radiance of 1
   float unit = 1;         // radiance of a colour of 1 of the skybox, haze, fog and emission
   float reflectance = 0;  // of the mirror
   // The view has all geoms, including those that neither the image nor its shadows show, for path tracing.

@@ -102,7 +102,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
 template <class SetShape>
 void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rgba,
                             const Material* material, const double position[3],
-                            const double rotation[9], SetShape shape) {
+                            const double rotation[9], SetShape shape, const Texture* const* maps) {
   const int index = static_cast<int>(order_.size());
   ViewGeom& g = unsorted_[index];
   g.id = id;
@@ -113,7 +113,7 @@ void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rg
   if (!sight && !view_.shadows && !(view_.physical.occlusion_reach > 0) &&
       !view_.physical.all_geoms)
     return;
-  set_surface(source, rgba, material, texture, g);
+  set_surface(source, rgba, material, texture, maps, g);
   Order order{sight ? g.transparent : 2, g.min_depth, index};
   if (order.rank == 1) {
     const float* p = g.pos;
@@ -157,7 +157,8 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
   const auto texture_of = [&](const Material& material) {
-    return assets_->texture(material.texture);
+    const bool whole = options_.physical.on && material.texture < 0;
+    return assets_->texture(whole ? material.textures[mjTEXROLE_RGBA] : material.texture);
   };
   const auto add = [&](const rays::RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
@@ -274,19 +275,23 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     if (!endless && shape.type == mjGEOM_PLANE && shape.size[0] == 0 && shape.size[1] == 0)
       endless = &shape;
     if (id++ == excluded_geom_) continue;
-    add_shape(shape, id - 1, geom.rgba, &geom.material, position, rotation, [&](ViewGeom& g) {
-      set_primitive(shape.type, geom.object_type, geom.object_id, g);
-      if (geom.bvh || geom.mesh_on_demand) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
-      g.casts_shadows = geom.casts_shadows;
-      g.bvh = geom.bvh;
-      g.clusters = geom.clusters;
-      g.horizons = geom.horizons;
-      g.mesh = geom.mesh;
-      g.mesh_on_demand = geom.mesh_on_demand;
-      g.height_field = geom.height_field;
-      g.deforms = geom.bvh && !geom.height_field;  // a flex, a skin or a decoration
-      return geom.texture;
-    });
+    add_shape(
+        shape, id - 1, geom.rgba, &geom.material, position, rotation,
+        [&](ViewGeom& g) {
+          set_primitive(shape.type, geom.object_type, geom.object_id, g);
+          if (geom.bvh || geom.mesh_on_demand)
+            g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
+          g.casts_shadows = geom.casts_shadows;
+          g.bvh = geom.bvh;
+          g.clusters = geom.clusters;
+          g.horizons = geom.horizons;
+          g.mesh = geom.mesh;
+          g.mesh_on_demand = geom.mesh_on_demand;
+          g.height_field = geom.height_field;
+          g.deforms = geom.bvh && !geom.height_field;  // a flex, a skin or a decoration
+          return geom.texture;
+        },
+        geom.maps);
   }
   sort_geoms(rotation);
   view_.num_lights = static_cast<int>(scene.lights.size());
@@ -428,7 +433,8 @@ const MeshSurface* ViewBuilder::soft_surface(int index, const MeshSurface& share
 }
 
 void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
-                              const Material* material, const Texture* texture, ViewGeom& g) const {
+                              const Material* material, const Texture* texture,
+                              const Texture* const* maps, ViewGeom& g) const {
   Surface& s = g.surface;
   s = {};
   std::copy_n(rgba, 4, s.rgba);
@@ -450,14 +456,17 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   if (!material) return;
   s.emission = material->emission;
   if (!options_.textures) return;
-  s.texture = texture && texture->levels > 0 ? texture : nullptr;
-  if (!s.texture) return;
+  s.texture = texture && texture->levels > 0 && !texture->grey ? texture : nullptr;
+  if (physical) set_maps(*material, maps, s);
+  if (s.maps[kOpacityMap]) g.transparent = true;
+  if (!s.texture && !s.mapped) return;
   const bool uniform = material->uniform;
   const bool coordinates = g.mesh_on_demand ? g.mesh_on_demand->has_uvs() : g.mesh && g.mesh->uvs;
-  s.uses_mesh_uvs = coordinates && !s.texture->cube;
+  s.uses_mesh_uvs = coordinates && (s.mapped || !s.texture->cube);
   // MuJoCo textures flexes by their own coordinates only.
   if (g.object_type == mjOBJ_FLEX && !s.uses_mesh_uvs) {
     s.texture = nullptr;
+    s.mapped = false;
     return;
   }
   const bool soft = g.object_type == mjOBJ_FLEX || g.object_type == mjOBJ_SKIN;
@@ -490,6 +499,21 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
       s.cube_scale[i] = uniform || extent[i] <= 0 ? 1.0f : 1.0f / extent[i];
     }
   }
+}
+
+void ViewBuilder::set_maps(const Material& material, const Texture* const* maps, Surface& s) const {
+  for (int i = 0; i < kNumTextureMaps; ++i) {
+    const Texture* map =
+        maps ? maps[i]
+             : assets_->texture(texture_of(material.textures, static_cast<TextureMap>(i)));
+    if (!map || map->levels == 0 || map->cube) continue;
+    s.maps[i] = map;
+    s.mapped = true;
+  }
+  const auto is_in = [&](TextureMap map) { return s.maps[map] || s.maps[kOrmMap]; };
+  if (is_in(kRoughnessMap) && material.roughness < 0) s.roughness = 1;
+  if (is_in(kMetallicMap) && material.metallic < 0) s.metallic = 1;
+  if (s.maps[kEmissiveMap] && s.emission == 0) s.emission = 1;
 }
 
 // A colour of the sky as the kernels need it: radiance, if the view is physically based.

@@ -2,6 +2,7 @@
 #include "mjsense/sensors/camera/physical_options.h"
 
 #include "mjsense/render/light/environment_source.h"
+#include "mjsense/render/view/texture_maps.h"
 
 namespace mjsense::sensors {
 
@@ -9,6 +10,7 @@ render::PhysicalOptions physical_options(const RgbCfg& cfg, const mjModel* model
   render::PhysicalOptions out;
   out.on = cfg.shading != Shading::kClassic;
   if (!out.on) return out;
+  render::check_texture_maps(model);
   out.exposure = cfg.exposure;
   out.tone_mapping = static_cast<render::ToneMapping>(static_cast<ToneMap>(cfg.tone_mapping));
   out.white_balance = cfg.white_balance;
