@@ -22,6 +22,7 @@ VIEW = VIEWS["scene_kitchen"]
 
 def camera() -> mujoco.MjvCamera:
     out = mujoco.MjvCamera()
+    assert VIEW.pos is not None
     offset = np.subtract(VIEW.target, VIEW.pos)
     out.lookat[:] = VIEW.target
     out.distance = np.linalg.norm(offset)
