@@ -72,6 +72,8 @@ class Commanded:
 
     key: str = ACTIONS
     numbers: Numbers = field(default_factory=Numbers)
+    targets: bool = False
+    """Whether the commands are joint targets. A controller that takes other commands is then refused."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,13 @@ class Adapter:
             if group not in groups:
                 raise ValueError(
                     f"adapter '{self.name}': there is no move group '{group}'{did_you_mean(group, groups, 'there are')}"
+                )
+            if one.targets and not _takes_targets(
+                specs.get(f"actions/joint_pos/{group}"), low[groups[group]], high[groups[group]]
+            ):
+                raise ValueError(
+                    f"adapter '{self.name}': the commands of the move group '{group}' are joint targets, and its controller takes other "
+                    "commands (arm_controller)"
                 )
             width, columns, to = groups[group].stop - groups[group].start, one.numbers.columns, one.numbers.target
             if columns is not None and len(columns) != width:
@@ -164,6 +173,14 @@ class Adapter:
 def is_image_spec(spec: Any) -> bool:
     """Whether a stream is a colour or grey image."""
     return is_image(spec.dtype, spec.shape)
+
+
+def _takes_targets(spec: Any, low: np.ndarray, high: np.ndarray) -> bool:
+    """Whether commands with these limits are the joint targets of this stream, whose bounds are those of the controls."""
+    if spec is None or spec.shape != low.shape:
+        return False
+    bounded = np.isfinite([spec.low, spec.high]).all()
+    return not bounded or bool(np.allclose([spec.low, spec.high], [low.min(), high.max()], rtol=1e-6))
 
 
 def _value(one: Observed, key: str, rows: Mapping[str, np.ndarray], world: int) -> np.ndarray:

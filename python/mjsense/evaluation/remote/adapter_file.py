@@ -69,8 +69,11 @@ class _Reader:
         return Observed(tuple(streams), self._numbers(), size, layout, dtype)
 
     def commanded(self) -> Commanded:
-        key = self.take("key", str, ACTIONS)
-        return Commanded(key, self._numbers())
+        key, targets = self.take("key", str, ACTIONS), self._table.pop("targets", False)
+        self._known.append("targets")
+        if not isinstance(targets, bool):
+            raise ValueError(f"{self.place}: targets is {targets!r:.80}: must be true or false")
+        return Commanded(key, self._numbers(), targets)
 
     def _size(self) -> tuple[int, int] | None:
         text = self.take("size", str)

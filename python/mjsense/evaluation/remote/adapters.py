@@ -37,6 +37,7 @@ to = [0.0, 1.0]
 [actions.arm]
 key = "actions"
 columns = [0, 1, 2, 3, 4, 5, 6]
+targets = true
 
 [actions.gripper]
 key = "actions"
@@ -107,11 +108,7 @@ def _of_features(specs: Mapping[str, Any], groups: Mapping[str, slice]) -> Adapt
     first = 0
     for group in [*targets, *(group for group in moved if group not in targets)]:
         width = groups[group].stop - groups[group].start
-        if group in targets and specs[f"actions/joint_pos/{group}"].shape != (width,):
-            raise ValueError(
-                f"adapter 'features': the action of an export has the joint targets of the move group '{group}', and its controller "
-                "takes other commands"
-            )
-        actions[group] = Commanded("action", Numbers(tuple(range(first, first + width))))
+        columns = tuple(range(first, first + width))
+        actions[group] = Commanded("action", Numbers(columns), targets=group in targets)
         first += width
     return Adapter("features", observation, actions)

@@ -40,13 +40,17 @@ class RemotePolicy(Policy):
         if adapter:
             check_name(adapter)
         self._made: Connections | None = None
-        metadata = self._connections.metadata()
-        known = metadata.get(MJSENSE) if isinstance(metadata, dict) else None
-        self._server: dict[str, Any] = known if isinstance(known, dict) else {}
-        if not adapter and not self._server:
-            raise ValueError(
-                f"policy '{url}': the server is not mjsense serve: name an adapter, droid, features or FILE.toml (--adapter)"
-            )
+        try:
+            metadata = self._connections.metadata()
+            known = metadata.get(MJSENSE) if isinstance(metadata, dict) else None
+            self._server: dict[str, Any] = known if isinstance(known, dict) else {}
+            if not adapter and not self._server:
+                raise ValueError(
+                    f"policy '{url}': the server is not mjsense serve: name an adapter, droid, features or FILE.toml (--adapter)"
+                )
+        except BaseException:
+            self._connections.close()
+            raise
         self._adapter_name = adapter or "streams"
         self.name = _text(self._server.get("name")) or "remote"
         horizon = self._server.get("execution_horizon")
