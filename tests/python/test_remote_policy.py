@@ -14,6 +14,7 @@ import tracemalloc
 import urllib.request
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from mjsense.evaluation import PolicyServer, RemotePolicy, evaluate
 from mjsense.evaluation.policies import RandomPolicy
 from mjsense.evaluation.remote import adapter, adapters, client, messages, server
 from mjsense.evaluation.remote.served import layout_of
+from mjsense.exporting.mapping import Source
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = {"cameras": [], "progress": False, "horizon": 7, "episodes": 4}
@@ -387,13 +389,33 @@ def test_the_connections_of_a_policy_end_with_it(file):
     assert not [thread for thread in set(threading.enumerate()) - before if thread.name == "mjsense remote policy"]
 
 
+def test_features_are_those_of_an_export(tmp_path):
+    seen = {}
+
+    def rule(observation, state):
+        state.setdefault("rows", seen.setdefault(observation["prompt"], [])).append(observation)
+        assert observation["observation.images.wrist_camera"].shape == (24, 32, 3)
+        return {"action": [0.01 * len(state["rows"]), -0.7, 0, -2.3, 0, 1.6, 0, 40 + len(state["rows"])]}
+
+    options = {**SMALL, "cameras": ["wrist_camera"], "width": 32, "height": 24, "episodes": 2}
+    with serving(rule) as url:
+        evaluate("pick", policy=url, policy_options={"adapter": "features"}, out=tmp_path / "out", num_worlds=2, **options)
+    source = Source(tmp_path / "out")
+    for episode in source.episodes:
+        rows, messages = source.rows(episode), seen[episode.task]
+        np.testing.assert_array_equal([message["observation.state"] for message in messages], rows["state"][:-1])
+        steps = np.arange(1, len(messages) + 1)
+        np.testing.assert_allclose(rows["action"][:, [0, 7]], np.stack([0.01 * steps, 40 + steps], 1))
+    assert len(source.episodes) == len(seen) == 2
+
+
 # Our server
 
 
 QUESTION = {"qpos/arm": np.zeros(7, np.float32), "prompt": "Pick up the mug"}
 
 
-def ask(url, message):
+def ask(url, message) -> Any:
     with connect(url, compression=None) as link:
         link.recv()
         link.send(message if isinstance(message, (bytes, str)) else packed(message))
