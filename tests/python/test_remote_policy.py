@@ -2,6 +2,7 @@
 """Policies behind openpi's protocol, and our server of policies. MJSENSE_TEST_OPENPI=1 makes an environment with openpi's own client."""
 
 import os
+import pickle
 import re
 import signal
 import socket
@@ -30,7 +31,6 @@ import mjsense as mjs
 from mjsense.evaluation import PolicyServer, RemotePolicy, evaluate
 from mjsense.evaluation.policies import RandomPolicy
 from mjsense.evaluation.remote import adapter, adapters, client, messages, server
-from mjsense.evaluation.remote.served import layout_of
 from mjsense.exporting.mapping import Source
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -233,13 +233,14 @@ def test_the_episodes_are_those_of_the_policy_itself(file, tmp_path):
     """Each world and episode has a connection of its own: the servers' policies count the calls in theirs."""
     evaluate("pick", policy=Joints, out=tmp_path / "direct", num_worlds=4, **SMALL)
     with serving(answer) as theirs, PolicyServer(Joints, port=0) as ours:
-        for name, options in (("theirs", {"policy": theirs, "policy_options": {"adapter": file}}), ("ours", {"policy": ours.url})):
-            for worlds in (1, 4):
-                evaluate("pick", out=tmp_path / f"{name}_{worlds}", num_worlds=worlds, **options, **SMALL)
-    same(*(tmp_path / name for name in ("direct", "theirs_1", "theirs_4", "ours_1", "ours_4")))
+        for name, worlds, options in (
+            ("a", 1, {"policy": theirs, "policy_options": {"adapter": file}}), ("b", 4, {"policy": theirs, "policy_options": {"adapter": file}}), ("c", 4, {"policy": ours.url}),
+        ):  # fmt: skip
+            evaluate("pick", out=tmp_path / name, num_worlds=worlds, **options, **SMALL)
+    same(*(tmp_path / name for name in ("direct", "a", "b", "c")))
 
 
-LAYOUT = layout_of("pick", None, "")
+LAYOUT = [("arm", [-3.0] * 7, [3.0] * 7), ("gripper", [0.0], [255.0])]
 
 
 def bound(url, file, **options):
@@ -326,6 +327,8 @@ def test_a_server_that_cannot_be_used(file, capsys):
     with pytest.raises(ConnectionError, match=f"no policy server answers at {url}, which was tried for 0.2 s: .*Connect"):
         RemotePolicy(url, adapter=file, patience=0.2)
     assert f"Waiting for the policy server at {url}" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(TimeoutError, match="has not accepted a connection within 0"):
+        RemotePolicy(f"ws://127.0.0.1:{silent.getsockname()[1]}", adapter=file, timeout=0.1)
     with serving(answer) as url, pytest.raises(ValueError, match=r"not mjsense serve: name an adapter, droid, features or FILE.toml \(--adapter\)"):
         RemotePolicy(url)
     with serving(answer, greeting="the model is broken") as url, pytest.raises(RuntimeError, match="reports an error:\nthe model is broken"):
@@ -371,9 +374,10 @@ def test_actions_that_are_not_finite_fail_their_episode_only(file, tmp_path):
 
 
 def test_the_connections_of_a_policy_end_with_it(file):
-    links, before = [], set(threading.enumerate())
+    links, before, together = [], set(threading.enumerate()), threading.Barrier(2)
 
     def watched(observation, state):
+        together.wait(5)  # both worlds are asked at once
         links.append(state["link"])
         return stateless(observation, state)
 
@@ -424,7 +428,7 @@ def ask(url, message) -> Any:
 
 @pytest.mark.parametrize("message, expected", [
     (b"\xc1", "not a valid message"), ("hello", "a message of text"), ([1], "a message is a list"), ({"prompt": "x"}, "no 'qpos', which the policy needs; it has none"),
-    ({**QUESTION, "prompt": 3}, "'prompt' is a int"), ({**QUESTION, "qpos/arm/x": 1}, "has 'arm'"), ({**QUESTION, "qpos": {"arm": 1}}, "'qpos' twice"), ({**QUESTION, "qpos/arm": "x"}, "must be an array of numbers"),
+    ({**QUESTION, "prompt": 3}, "'prompt' is a int"), ({**QUESTION, "qpos/arm/x": 1}, "has 'qpos/arm' and 'qpos/arm/x'"), ({**QUESTION, "qpos": {"arm": 1}}, "'qpos/arm' twice"), ({**QUESTION, "qpos/arm": "x"}, "must be an array of numbers"),
     ({**QUESTION, "mjsense/seed": -1}, "'mjsense/seed' is -1"), (array_of(dtype="|O"), "must be a number"), ({"qpos/hand": np.zeros(3)}, "Traceback"),
 ], ids=range(11))  # fmt: skip
 def test_bad_requests_are_answered_by_text(message, expected):
@@ -471,7 +475,7 @@ def ask_metadata(url):
 
 def test_which_policies_can_be_served():
     for policy, options, message in (
-        ("planner", {}, "policy 'planner' is computed together with its episode"), ("random", {}, r"knows the robot: name a task.*\(--task, --robot\)"), (Joints, {"robot": "franka"}, "belong to a task"),
+        ("planner", {}, "policy 'planner' is computed together with its episode"), ("random", {}, r"knows the robot: name a task.*\(--task, --robot\)"), (Joints, {"task_options": {"robot": "franka"}}, "robot belongs to a task"),
         (Joints, {"host": ""}, "host is empty"), (Joints, {"port": 70000}, "port is 70000"), (Joints, {"connections": 0}, "connections is 0"), (Joints, {"host": "no.such.host.invalid"}, "cannot listen at no.such"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=message):
@@ -489,22 +493,29 @@ class Grouped(mjs.Policy):
     observation = ("qpos",)
 
     def act(self, obs):
-        assert obs["qpos"]["arm"].shape == (self.num_worlds, 7)
-        actions = {"gripper": np.full((self.num_worlds, 2, 1), 5.0), "arm": np.repeat(obs["qpos"]["arm"][:, None], 2, 1)}
-        return {**actions, "done": self.wanted & (obs["qpos"]["arm"][:, 0] > 1)}
+        gripper, arm = obs["qpos"]["gripper"][:, None, 1:], obs["qpos"]["arm"][:, None]
+        return {"gripper": np.repeat(gripper, 2, 1), "arm": np.repeat(arm, 2, 1), "done": self.wanted & (arm[:, 0, 0] > 1)}
 
 
-def test_policies_of_mjsense_are_served():
+def test_policies_of_mjsense_are_served(tmp_path):
+    question = {"qpos/arm": np.arange(7) / 10, "qpos/gripper": [0, 0.5]}
     with PolicyServer("random", task="pick", port=0) as served:  # its numbers depend on the episode
-        remote, local = bound(served.url, ""), bind(RandomPolicy())
+        local, remote = RandomPolicy(), pickle.loads(pickle.dumps(RemotePolicy(served.url)))
+        local._mjs_bind(SimpleNamespace(num_worlds=2), [], served._served._env._rollout.action_layout())
+        local._mjs_reset([0, 1], [4, 7], 0, ["", ""])
+        local.wanted[:] = True
+        bind(remote)
         for _ in range(2):
             expected, found = local.act({}), remote.act({})
             np.testing.assert_array_equal(np.concatenate([found["arm"][:, 0], found["gripper"][:, 0]], -1), expected)
     with PolicyServer(Peeking, task="pick", port=0) as served:
-        assert "reads sim.time, and a served policy has observations only" in ask(served.url, QUESTION)
-    with PolicyServer(Grouped, task="pick", port=0) as served:
-        np.testing.assert_array_equal(unpacked(ask(served.url, {"qpos/arm": np.arange(7) / 10}))["actions"], [[*np.arange(7) / 10, 5]] * 2)
-        assert "returned 'done', and openpi's protocol has actions only" in ask(served.url, {"qpos/arm": np.full(7, 2.0)})
+        assert "reads sim.time, and a served policy has observations only" in ask(served.url, question)
+    with PolicyServer(Grouped, task="pick", task_options={"width": 32, "height": 24}, port=0) as served:
+        assert unpacked(ask_metadata(served.url))["mjsense"]["observation"] == ["qpos/arm", "qpos/gripper"]
+        np.testing.assert_array_equal(unpacked(ask(served.url, question))["actions"], [[*(np.arange(7) / 10).astype(np.float32), 0.5]] * 2)
+        assert "returned 'done', and openpi's protocol has actions only" in ask(served.url, {**question, "qpos/arm": np.full(7, 2.0)})
+        assert ask(served.url, {**question, "qpos/arm": np.zeros(3)}) == "'qpos/arm' is float64 (3,): must be float32 (7,)"
+        assert "no 'qpos/gripper', which the policy needs" in ask(served.url, {"qpos/arm": np.zeros(7)})
     with PolicyServer(lambda obs: np.concatenate([obs["q"], obs["q"]], -1), port=0) as served:
         np.testing.assert_array_equal(unpacked(ask(served.url, {"q": np.arange(3)}))["actions"], [[0, 1, 2, 0, 1, 2]])
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 import argparse
 
 from mjsense.commands._policy import add_policy_options, policy_options
+from mjsense.commands.fields import read_size
 from mjsense.commands.parser import Parser, complete
-from mjsense.commands.table import NAMES
+from mjsense.commands.table import FIELDS, NAMES
 
 EXAMPLES = [
     ("mjsense serve net.py:Network", "Offer a policy on this computer, at ws://127.0.0.1:8000."),
@@ -22,15 +23,18 @@ def add_arguments(parser: Parser) -> None:
     )
     add_policy_options(parser)
     action = parser.add_argument(
-        "--task", default="", metavar="TEXT", help="Task whose robot the policy controls. Only a mjsense.Policy needs it."
+        "--task",
+        default="",
+        metavar="TEXT",
+        help="Task whose streams and robot the policy knows. Only a mjsense.Policy needs it.",
     )
     complete(action, NAMES["tasks"])
     complete(
         parser.add_argument("--robot", metavar="TEXT", help="Name or .toml of the robot; by default the task's."), NAMES["robots"]
     )
-    parser.add_argument(
-        "--arm-controller", default="", metavar="TEXT", help="Controller of the robot's arms, as in mjsense record."
-    )
+    parser.add_argument("--camera-system", metavar="TEXT", help="Camera system of the task, as in mjsense record.")
+    parser.add_argument("--size", metavar="WxH", help="Width and height of the images.")
+    parser.add_argument("--arm-controller", metavar="TEXT", help="Controller of the robot's arms, as in mjsense record.")
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -48,9 +52,14 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.commands.output import tell
     from mjsense.evaluation import PolicyServer
 
-    names = ("task", "robot", "arm_controller", "host", "port", "connections")
-    options = {name: getattr(arguments, name) for name in names}
-    with PolicyServer(arguments.policy, policy_options=policy_options(arguments.policy_options), log=tell, **options) as server:
+    names = ("robot", "camera_system", "arm_controller")
+    task = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
+    if arguments.size is not None:
+        task |= read_size(FIELDS["ImageCfg"], arguments.size)
+    place = {name: getattr(arguments, name) for name in ("task", "host", "port", "connections")}
+    with PolicyServer(
+        arguments.policy, task_options=task, policy_options=policy_options(arguments.policy_options), log=tell, **place
+    ) as server:
         if not arguments.quiet:
             print(f"Policy '{server.name}' is served at {server.url}. Ctrl-C ends it.", flush=True)
         threading.Event().wait()

@@ -73,7 +73,7 @@ class RemotePolicy(Policy):
         return {**self.__dict__, "_made": None}
 
     def fingerprint(self) -> str:
-        return f"{self.url} {_text(self._server.get('fingerprint'))} {fingerprint_of(self._adapter_name)}"
+        return f"{_text(self._server.get('fingerprint')) or self.url} {fingerprint_of(self._adapter_name)}"
 
     def _mjs_bind(self, sim: Any, streams: list[Any], layout: list[Any]) -> tuple[dict[str, Any], np.ndarray]:
         groups = group_slices(layout)

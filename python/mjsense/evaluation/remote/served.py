@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,9 @@ from mjsense.core.errors import did_you_mean
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.protocol import BatchedPolicy, as_numbers
 from mjsense.evaluation.remote.adapter import EPISODE, PROMPT, SEED
-from mjsense.tasks.policy import FunctionPolicy, Policy
+from mjsense.sensors.nested_streams import choose_streams, nest
+from mjsense.tasks.policy import FunctionPolicy
 from mjsense.tasks.vector import make_vec
-
-Layout = list[tuple[str, list[float], list[float]]]
-"""Name of each move group, and the limits of its commands."""
 
 
 class BadRequest(ValueError):
@@ -31,31 +28,40 @@ class ServedPolicy:
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`.
         options: Arguments of the policy.
-        layout: Move groups of the robot; a :class:`mjsense.Policy` needs them.
+        task: Task and further arguments of :func:`mjsense.make_vec`, whose streams and move groups a :class:`mjsense.Policy` needs; empty: none.
         connections: Maximum number of connections.
     """
 
-    def __init__(self, policy: Any, options: Mapping[str, Any], layout: Layout | None, connections: int) -> None:
+    def __init__(self, policy: Any, options: Mapping[str, Any], task: Mapping[str, Any], connections: int) -> None:
         made = policy_from(policy, **options)
         if isinstance(made, str):
             raise ValueError(
                 f"policy '{made}' is computed together with its episode: only policies that need observations alone can be served"
             )
-        self.policy, self.layout = made, layout
+        self.policy, self._name = made, made._mjs_name()
         self._alone = isinstance(made, (BatchedPolicy, FunctionPolicy))
         """Whether the policy receives the rows of one connection, and not of all worlds."""
-        if not self._alone:
-            if layout is None:
-                raise ValueError(
-                    f"policy '{made._mjs_name()}' is a mjsense.Policy, which knows the robot: name a task, and the robot if it is not the task's (--task, --robot)"
-                )
-            simulation: Any = _NoSimulation(made._mjs_name(), connections)
-            made._mjs_bind(simulation, _streams_of(made), layout)
+        self.observation: list[str] | None = None if made.observation is None else list(made.observation)
+        """Sensors or streams that the policy receives; None: all of a message."""
+        if self._alone:
+            return
+        if not task:
+            raise ValueError(
+                f"policy '{self._name}' is a mjsense.Policy, which knows the robot: name a task, and the robot if it is not the task's "
+                "(--task, --robot)"
+            )
+        self._env = make_vec(**task, num_envs=1)
+        streams = [(sensor, spec, _rows_of(spec, connections)) for sensor, spec, _ in self._env._rollout.streams()]
+        layout = self._env._rollout.action_layout()
+        simulation: Any = _NoSimulation(self._name, connections)
+        self._observed, _ = made._mjs_bind(simulation, streams, layout)
+        self._groups = [group for group, low, _ in layout if low]
+        self.observation = choose_streams(made.observation, {spec.name: (sensor, spec, rows) for sensor, spec, rows in streams})
+        self._rows: dict[str, np.ndarray] = {spec.name: rows for _, spec, rows in streams}
 
-    @property
-    def observation(self) -> list[str] | None:
-        """Sensors or streams that the policy receives; None: all."""
-        return None if self.policy.observation is None else list(self.policy.observation)
+    def close(self) -> None:
+        if not self._alone:
+            self._env.close()
 
     def begin(self, world: int, message: Mapping[str, Any], default_episode: int) -> None:
         """An episode begins on this connection, with its first message."""
@@ -71,57 +77,53 @@ class ServedPolicy:
         Raises:
             BadRequest: The message is wrong.
         """
-        prompt = _prompt(message)
-        observation = _rows({key: value for key, value in message.items() if key not in (PROMPT, SEED, EPISODE)})
-        if self.observation is not None:
-            observation = _chosen(observation, self.observation)
-        policy = self.policy
-        if isinstance(policy, BatchedPolicy):
-            given = policy.model.act({**observation, "world_ids": np.array([world]), "instructions": [prompt]})
-        elif self._alone:
-            given = policy.act(observation)
-        else:
+        prompt, policy = _prompt(message), self.policy
+        numbers = _numbers({key: value for key, value in message.items() if key not in (PROMPT, SEED, EPISODE)})
+        if not self._alone:
+            self._write(world, numbers)
             policy.instructions[world] = prompt
             policy.wanted[:] = False
             policy.wanted[world] = True
-            given = policy.act(_repeated(observation, policy.num_worlds))
-        return self._actions(given, 0 if self._alone else world)
+            return self._actions(policy.act(self._observed), world)
+        observation = _nested(numbers, self.observation)
+        if isinstance(policy, BatchedPolicy):
+            return self._actions(policy.model.act({**observation, "world_ids": np.array([world]), "instructions": [prompt]}), 0)
+        return self._actions(policy.act(observation), 0)
+
+    def _write(self, world: int, numbers: Mapping[str, np.ndarray]) -> None:
+        """Writes an observation into the rows that the policy sees."""
+        for name in self.observation or ():
+            if name not in numbers:
+                raise _missing(name, numbers)
+            row, given = self._rows[name][world], numbers[name]
+            if given.shape != row.shape or not np.can_cast(given.dtype, row.dtype, "same_kind"):
+                raise BadRequest(f"'{name}' is {given.dtype} {given.shape}: must be {row.dtype} {row.shape}")
+            row[...] = given
 
     def _actions(self, given: Any, row: int) -> np.ndarray:
-        name = self.policy._mjs_name()
         if isinstance(given, Mapping):
-            given = self._joined(dict(given))
+            given = self._joined(dict(given), row)
         actions = as_numbers(given)
         if actions.ndim not in (2, 3) or len(actions) <= row or 0 in actions.shape:
             raise ValueError(
-                f"policy '{name}': act() returned actions of shape {actions.shape}; expected (rows, n) or (rows, H, n)"
+                f"policy '{self._name}': act() returned actions of shape {actions.shape}; expected (rows, n) or (rows, H, n)"
             )
         return actions[row].reshape(-1, actions.shape[-1])
 
-    def _joined(self, given: dict[str, Any]) -> Any:
+    def _joined(self, given: dict[str, Any], row: int) -> Any:
         """Actions of all move groups, of those of each."""
-        name = self.policy._mjs_name()
         for flag in ("done", "hold"):
-            if np.any(given.pop(flag, False)):
-                raise ValueError(f"policy '{name}': act() returned '{flag}', and openpi's protocol has actions only")
+            if np.any(np.asarray(given.pop(flag, [False] * (row + 1)))[row]):
+                raise ValueError(f"policy '{self._name}': act() returned '{flag}', and openpi's protocol has actions only")
         given.pop("success", None)
         if given.keys() == {"action"}:
             return given["action"]
-        groups = [group for group, low, _ in self.layout or () if low]
-        if given.keys() != set(groups):
+        groups = [] if self._alone else self._groups
+        if not groups or given.keys() != set(groups):
             raise ValueError(
-                f"policy '{name}': act() returned commands for {', '.join(given) or 'no group'}; expected {', '.join(groups) or 'an array'}"
+                f"policy '{self._name}': act() returned commands for {', '.join(given) or 'no group'}; expected {', '.join(groups) or 'an array'}"
             )
         return np.concatenate([as_numbers(given[group]) for group in groups], -1)
-
-
-def layout_of(task: str, robot: str | None, arm_controller: str) -> Layout:
-    """Move groups of the robot of a task."""
-    env = make_vec(task, robot, num_envs=1, cameras=[], arm_controller=arm_controller)
-    try:
-        return env._rollout.action_layout()
-    finally:
-        env.close()
 
 
 class _NoSimulation:
@@ -135,9 +137,8 @@ class _NoSimulation:
         raise AttributeError(f"policy '{self._policy}' reads sim.{name}, and a served policy has observations only")
 
 
-def _streams_of(policy: Policy) -> list[Any]:
-    """Stand-ins of the streams that a policy observes, which :meth:`mjsense.Policy._mjs_bind` looks up."""
-    return [(name, SimpleNamespace(name=name, shape=(1,), is_dict=False), np.zeros(1)) for name in policy.observation or ()]
+def _rows_of(spec: Any, count: int) -> np.ndarray:
+    return np.zeros((count, *spec.shape), np.uint8 if spec.is_dict else spec.dtype)
 
 
 def _prompt(message: Mapping[str, Any]) -> str:
@@ -154,53 +155,41 @@ def _integer(message: Mapping[str, Any], key: str, default: int) -> int:
     return value
 
 
-def _rows(message: Mapping[str, Any]) -> dict[str, Any]:
-    """Rows ``[1, ...]`` nested by the parts of their names."""
-    nested: dict[str, Any] = {}
+def _numbers(message: Mapping[str, Any], place: str = "") -> dict[str, np.ndarray]:
+    """Arrays by name: the keys of nested maps are joined by ``/``."""
+    found: dict[str, np.ndarray] = {}
     for key, value in message.items():
-        *parents, last = key.split("/")
-        inner = nested
-        for part in parents:
-            inner = inner.setdefault(part, {})
-            if not isinstance(inner, dict):
-                raise BadRequest(f"the observation has '{part}' and '{key}'")
-        if last in inner:
-            raise BadRequest(f"the observation has '{key}' twice")
-        inner[last] = _rows(value) if isinstance(value, dict) else _row(key, value)
-    return nested
+        name = place + key
+        inner = _numbers(value, f"{name}/") if isinstance(value, dict) else {name: _array(name, value)}
+        if twice := found.keys() & inner.keys():
+            raise BadRequest(f"the observation has '{min(twice)}' twice")
+        found |= inner
+    return found
 
 
-def _row(key: str, value: Any) -> np.ndarray:
+def _array(name: str, value: Any) -> np.ndarray:
     try:
-        row = np.array(value)  # a copy that can be written to
+        array = np.array(value)  # a copy that can be written to
     except ValueError:
-        raise BadRequest(f"'{key}' has lists of different lengths") from None
-    if row.dtype.kind not in "biuf":
-        raise BadRequest(f"'{key}' is a {type(value).__name__}: must be an array of numbers")
-    return row[None]
+        raise BadRequest(f"'{name}' has lists of different lengths") from None
+    if array.dtype.kind not in "biuf":
+        raise BadRequest(f"'{name}' is a {type(value).__name__}: must be an array of numbers")
+    return array
 
 
-def _chosen(observation: dict[str, Any], names: list[str]) -> dict[str, Any]:
-    """The sensors or streams of these names."""
-    chosen: dict[str, Any] = {}
-    for name in names:
-        *parents, last = name.split("/")
-        source: Any = observation
-        target = chosen
-        for part in parents:
-            source = source.get(part) if isinstance(source, dict) else None
-            target = target.setdefault(part, {})
-        if not isinstance(source, dict) or last not in source:
-            raise BadRequest(
-                f"the observation has no '{name}', which the policy needs{did_you_mean(name, observation, 'it has')}"
-            )
-        target[last] = source[last]
-    return chosen
+def _nested(numbers: Mapping[str, np.ndarray], names: list[str] | None) -> dict[str, Any]:
+    """Rows ``[1, ...]`` of the sensors or streams of these names, nested by the parts of their names; None: all."""
+    chosen = dict(numbers) if names is None else {}
+    for name in names or ():
+        inside = {one: array for one, array in numbers.items() if one == name or one.startswith(f"{name}/")}
+        if not inside:
+            raise _missing(name, numbers)
+        chosen |= inside
+    for name in chosen:
+        if parent := next((one for one in chosen if name.startswith(f"{one}/")), None):
+            raise BadRequest(f"the observation has '{parent}' and '{name}'")
+    return nest({name: tuple(name.split("/")) for name in chosen}, {name: array[None] for name, array in chosen.items()})
 
 
-def _repeated(observation: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """The same row for all worlds."""
-    return {
-        name: _repeated(value, count) if isinstance(value, Mapping) else np.broadcast_to(value, (count, *value.shape[1:]))
-        for name, value in observation.items()
-    }
+def _missing(name: str, numbers: Mapping[str, np.ndarray]) -> BadRequest:
+    return BadRequest(f"the observation has no '{name}', which the policy needs{did_you_mean(name, numbers, 'it has')}")

@@ -19,7 +19,7 @@ from mjsense.core.representations import plain
 from mjsense.evaluation.playing import fingerprint
 from mjsense.evaluation.remote.adapter import ACTIONS, MJSENSE
 from mjsense.evaluation.remote.messages import MAX_BYTES, pack, unpack
-from mjsense.evaluation.remote.served import BadRequest, ServedPolicy, layout_of
+from mjsense.evaluation.remote.served import BadRequest, ServedPolicy
 
 _INTERNAL_ERROR, _TRY_AGAIN_LATER = 1011, 1013  # codes of closed connections
 
@@ -36,9 +36,8 @@ class PolicyServer:
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`. Policies that are computed together with their episode, such as ``planner``, cannot
             be served.
-        task: Task whose robot the policy controls; only a :class:`mjsense.Policy` needs it.
-        robot: The robot, if it is not the task's.
-        arm_controller: Controller of the robot's arms, as in :func:`mjsense.record`.
+        task: Task whose streams and robot the policy knows; only a :class:`mjsense.Policy` needs it.
+        task_options: Further arguments of :func:`mjsense.make_vec`, such as ``robot``, ``camera_system``, ``width`` and ``height``.
         policy_options: Arguments of the policy.
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
@@ -51,8 +50,7 @@ class PolicyServer:
         policy: Any,
         *,
         task: str = "",
-        robot: str | None = None,
-        arm_controller: str = "",
+        task_options: Mapping[str, Any] | None = None,
         policy_options: Mapping[str, Any] | None = None,
         host: str = "127.0.0.1",
         port: int = 8000,
@@ -67,12 +65,12 @@ class PolicyServer:
             raise ValueError(f"port is {port}: must be in [0, 65535]; 0 takes any free port")
         if connections < 1:
             raise ValueError(f"connections is {connections}: must be at least 1")
-        if not task and (robot or arm_controller):
-            raise ValueError("robot and arm_controller belong to a task, which is missing")
+        if not task and task_options:
+            raise ValueError(f"{min(task_options)} belongs to a task, which is missing")
         self._library: Any = optional("websockets.asyncio.server", "evaluate", "a policy server")
         self._closed_error: Any = optional("websockets.exceptions", "evaluate", "a policy server").ConnectionClosed
-        layout = layout_of(task, robot, arm_controller) if task else None
-        self._served = ServedPolicy(policy, policy_options or {}, layout, connections)
+        of_task = {"task": task, **(task_options or {})} if task else {}
+        self._served = ServedPolicy(policy, policy_options or {}, of_task, connections)
         self._log = log or (lambda line: None)
         self._free = list(range(connections))
         self._episodes = 0
@@ -116,6 +114,7 @@ class PolicyServer:
         self._thread.join()
         self._loop.close()
         self._worker.shutdown()
+        self._served.close()
 
     async def _listen(self, host: str, port: int) -> Any:
         return await self._library.serve(
