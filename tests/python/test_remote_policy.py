@@ -191,6 +191,8 @@ def test_the_adapter_of_an_exports_features(rows):
     commands = made.commands({"action": [*range(8)]}, GROUPS)  # arm, then gripper, as in an export
     np.testing.assert_array_equal(commands["arm"], [np.arange(7)])
     np.testing.assert_array_equal(commands["gripper"], [[7]])
+    with pytest.raises(ValueError, match=r"'action' of shape \(1, 9\): must be \(H, 8\)"):
+        made.commands({"action": [*range(9)]}, GROUPS)
     for name in ("features", "droid"):  # of a controller that takes displacements
         with pytest.raises(ValueError, match="commands of the move group 'arm' are joint targets, and its controller takes other commands"):
             check(adapters.adapter_of(name, STREAMS, GROUPS), 2 * LOW, np.array([255.0] + [6.0] * 7))
@@ -213,11 +215,11 @@ def test_the_adapter_of_a_file(tmp_path, rows):
     (("streams =", "stream ="), "streams must be the name"), (('"qpos/arm"', '"qpos/amr"'), "no stream 'qpos/amr' for 'observation/joint_position'; did you mean 'qpos/arm'"),
     (("actions.arm", "actions.arms"), "no move group 'arms'; did you mean 'arm'"), (("[0, 1, 2, 3, 4, 5, 6]", "[0, 1]"), "2 columns for the move group 'arm', which takes 7"),
     (("[7]", '["7"]'), "columns is"), (("[7]", "[7]\nfrm = [0, 1]"), "actions.gripper: unknown key 'frm'; did you mean 'from'"), (("[7]", "[7]\nfrom = [0, 1]"), "from and to belong together"),
-    (("[7]", "[7]\nfrom = [1, 1]\nto = [0, 1]"), "two different numbers"), (("[7]", "[7]\nfrom = [0, 1]\nto = [0, 256]"), "from 0 to 256; it takes 0 to 255"), (("[7]", "[7]\nthreshold = true"), "threshold is True"),
+    (("[7]", "[7]\nfrom = [1, 1]\nto = [0, 1]"), "two different numbers"), (("[7]", "[7]\nfrom = [0, 1]\nto = [0, 256]"), "from 0 to 256; it takes 0 to 255"), (("[7]", "[7]\nthreshold = true"), "threshold is True"), (("[7]", "[7]\nwidth = 0"), "width is 0"),
     (('"qpos/arm"', '"qpos/arm"\nsize = "9x9"'), "not an image"), (('"qpos/arm"', '"wrist_camera"\nsize = "99999x9"'), "size is '99999x9'"), (('"qpos/arm"', '"wrist_camera"\nlayout = "cwh"'), "layout is 'cwh'"),
     (('"qpos/arm"', '["qpos/arm", "wrist_camera"]'), "contains 'wrist_camera' of shape"), (("[actions.", "[action."), "unknown key 'action'; did you mean 'actions'"), (('[observation."', 'arrays = "pickle"\n[observation."'), "arrays is 'pickle'"),
     (('"observation/joint_position"', '"prompt"'), "that of the instruction and of an observation"),
-], ids=range(17))  # fmt: skip
+], ids=range(18))  # fmt: skip
 def test_mistakes_in_an_adapter(file, change, message):
     text = ADAPTER.replace(*change)
     assert text != ADAPTER
@@ -343,6 +345,14 @@ def test_a_server_that_cannot_be_used(file, capsys):
 
     with serving(answer, process_request=elsewhere) as url, pytest.raises(ConnectionError, match="with the HTTP status 302"):
         RemotePolicy(url, adapter=file)
+
+
+def test_a_server_that_offers_another_policy_after_a_restart_is_refused():
+    with PolicyServer(Joints, port=0) as first:
+        made = bound(first.url, "")
+        made.act({})
+    with PolicyServer(Joints(False), port=first.port), pytest.raises(RuntimeError, match=r"episode 4: .* offers another policy than at the start"):
+        made.act({})
 
 
 @pytest.mark.parametrize("url", ["ws://", "ws://host:x", "ws://host:0", "ws://me:secret@host", "ws://ho st", "ws:host"])

@@ -71,6 +71,8 @@ class Commanded:
     """Where an answer has the commands of a move group."""
 
     key: str = ACTIONS
+    width: int | None = None
+    """Number of columns that the answer must have; None: any."""
     numbers: Numbers = field(default_factory=Numbers)
     targets: bool = False
     """Whether the commands are joint targets. A controller that takes other commands is then refused."""
@@ -157,7 +159,10 @@ class Adapter:
         for group, one in self.actions.items():
             if one.key not in answer:
                 raise ValueError(f"the server's answer has no '{one.key}'{did_you_mean(one.key, answer, 'it has')}")
-            values = one.numbers.of(_chunk(answer[one.key], one.key), f"'{one.key}' of the answer")
+            values = _chunk(answer[one.key], one.key)
+            if one.width is not None and values.shape[1] != one.width:
+                raise ValueError(f"the server's answer has '{one.key}' of shape {values.shape}: must be (H, {one.width})")
+            values = one.numbers.of(values, f"'{one.key}' of the answer")
             width = groups[group].stop - groups[group].start
             if values.shape[1] != width:
                 raise ValueError(

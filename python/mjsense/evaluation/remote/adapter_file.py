@@ -39,7 +39,7 @@ class _Reader:
         self._known.append(key)
         value = self._table.pop(key, default)
         if value is not default and (not isinstance(value, kind) or isinstance(value, bool)):
-            words = {str: "a text", float: "a number", list: "a list", dict: "a table"}
+            words = {str: "a text", int: "a whole number", list: "a list", dict: "a table"}
             raise ValueError(f"{self.place}: {key} is {value!r:.80}: must be {words[kind]}")
         return value
 
@@ -73,7 +73,10 @@ class _Reader:
         self._known.append("targets")
         if not isinstance(targets, bool):
             raise ValueError(f"{self.place}: targets is {targets!r:.80}: must be true or false")
-        return Commanded(key, self._numbers(), targets)
+        width = self.take("width", int)
+        if width is not None and width < 1:
+            raise ValueError(f"{self.place}: width is {width}: must be at least 1")
+        return Commanded(key, width, self._numbers(), targets)
 
     def _size(self) -> tuple[int, int] | None:
         text = self.take("size", str)

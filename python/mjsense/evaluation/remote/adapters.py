@@ -36,11 +36,13 @@ to = [0.0, 1.0]
 
 [actions.arm]
 key = "actions"
+width = 8
 columns = [0, 1, 2, 3, 4, 5, 6]
 targets = true
 
 [actions.gripper]
 key = "actions"
+width = 8
 columns = [7]
 threshold = 0.5
 from = [0.0, 1.0]
@@ -87,11 +89,12 @@ def fingerprint_of(name: str) -> str:
 
 
 def _of_streams(names: Iterable[str], groups: Mapping[str, slice]) -> Adapter:
-    """Streams and commands as they are, as :func:`mjsense.evaluation.serve` takes them."""
+    """Streams and commands as they are, as :class:`mjsense.evaluation.PolicyServer` takes them."""
     actions: dict[str, Commanded] = {}
+    width = max((at.stop for at in groups.values()), default=0)
     for group, at in groups.items():
         if at.stop > at.start:
-            actions[group] = Commanded(ACTIONS, Numbers(tuple(range(at.start, at.stop))))
+            actions[group] = Commanded(ACTIONS, width, Numbers(tuple(range(at.start, at.stop))))
     return Adapter("streams", {name: Observed((name,)) for name in names}, actions)
 
 
@@ -105,10 +108,10 @@ def _of_features(specs: Mapping[str, Any], groups: Mapping[str, slice]) -> Adapt
     moved = sorted(group for group, at in groups.items() if at.stop > at.start)
     targets = [group for group in moved if f"actions/joint_pos/{group}" in specs]
     actions: dict[str, Commanded] = {}
-    first = 0
+    first, all_columns = 0, sum(groups[group].stop - groups[group].start for group in moved)
     for group in [*targets, *(group for group in moved if group not in targets)]:
         width = groups[group].stop - groups[group].start
         columns = tuple(range(first, first + width))
-        actions[group] = Commanded("action", Numbers(columns), targets=group in targets)
+        actions[group] = Commanded("action", all_columns, Numbers(columns), targets=group in targets)
         first += width
     return Adapter("features", observation, actions)

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 from mjsense.core.optional import optional
 from mjsense.core.representations import plain
+from mjsense.evaluation.remote.adapter import MJSENSE
 from mjsense.evaluation.remote.messages import MAX_BYTES, unpack
 
 _MAX_LOSSES = 3  # connections that are lost while the server computes one answer
@@ -41,13 +42,15 @@ class Connections:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="mjsense remote policy", daemon=True)
         self._thread.start()
+        self.fingerprint: Any = None
+        """What the server says about its policy's identity. Later connections must say the same."""
         self.lost: dict[int, int] = {}
         """Number of connections that were lost in the current episode, by world."""
         self.close = weakref.finalize(self, _end, self._loop, self._thread, self._links)
         """Closes all connections."""
 
-    def metadata(self) -> Any:
-        """The first message of the server, on a connection that is closed again."""
+    def server(self) -> dict[str, Any]:
+        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is closed again."""
         return self._run(self._greeting())
 
     def begin(self, worlds: Iterable[int]) -> None:
@@ -78,10 +81,11 @@ class Connections:
             _CLOSING.add(task := self._loop.create_task(link.close()))
             task.add_done_callback(_CLOSING.discard)
 
-    async def _greeting(self) -> Any:
-        link, metadata = await self._persistent(self._connected)
+    async def _greeting(self) -> dict[str, Any]:
+        link, server = await self._persistent(self._connected)
         await link.close()
-        return metadata
+        self.fingerprint = server.get("fingerprint")
+        return server
 
     async def _ask_all(self, questions: list[tuple[int, bytes]]) -> list[Any]:
         return await asyncio.gather(*(self._ask(*question) for question in questions), return_exceptions=True)
@@ -89,7 +93,10 @@ class Connections:
     async def _ask(self, world: int, question: bytes) -> Any:
         for _ in range(_MAX_LOSSES):
             if world not in self._links:
-                self._links[world], _ = await self._persistent(self._connected)
+                self._links[world], server = await self._persistent(self._connected)
+                if server.get("fingerprint") != self.fingerprint:
+                    self._drop(world)
+                    raise RuntimeError(f"{self.url} offers another policy than at the start")
             link = self._links[world]
             try:
                 return await self._within(self._answer(link, question), "answered a message")
@@ -107,8 +114,8 @@ class Connections:
         await link.send(question)
         return self._read(await link.recv())
 
-    async def _connected(self) -> tuple[Any, Any]:
-        """A connection, and the server's metadata."""
+    async def _connected(self) -> tuple[Any, dict[str, Any]]:
+        """A connection, and what ``mjsense serve`` says about its policy."""
         link = await self._without_redirects()(
             self.url,
             compression=None,
@@ -120,7 +127,9 @@ class Connections:
             logger=_SILENT,
         )
         try:
-            return link, self._read(await link.recv())
+            metadata = self._read(await link.recv())
+            known = metadata.get(MJSENSE) if isinstance(metadata, dict) else None
+            return link, known if isinstance(known, dict) else {}
         except BaseException as error:
             _CLOSING.add(task := self._loop.create_task(link.close()))
             task.add_done_callback(_CLOSING.discard)
@@ -208,8 +217,9 @@ def _end(loop: asyncio.AbstractEventLoop, thread: threading.Thread, links: dict[
             await asyncio.wait_for(asyncio.gather(*(link.close() for link in links.values()), return_exceptions=True), 1)
         loop.stop()
 
+    kept: list[Any] = []
     if thread.is_alive():
-        loop.call_soon_threadsafe(lambda: _CLOSING.add(loop.create_task(end())))
+        loop.call_soon_threadsafe(lambda: kept.append(loop.create_task(end())))
         thread.join(2)
     if not thread.is_alive():
         loop.close()

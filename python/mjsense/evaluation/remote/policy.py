@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.evaluation.remote.adapter import EPISODE, MJSENSE, SEED, Adapter
+from mjsense.evaluation.remote.adapter import EPISODE, SEED, Adapter
 from mjsense.evaluation.remote.adapters import adapter_of, check_name, fingerprint_of
 from mjsense.evaluation.remote.client import Connections, checked_url
 from mjsense.evaluation.remote.messages import pack
@@ -40,10 +40,9 @@ class RemotePolicy(Policy):
         if adapter:
             check_name(adapter)
         self._made: Connections | None = None
+        self._server: dict[str, Any] = {}
         try:
-            metadata = self._connections.metadata()
-            known = metadata.get(MJSENSE) if isinstance(metadata, dict) else None
-            self._server: dict[str, Any] = known if isinstance(known, dict) else {}
+            self._server = self._connections.server()
             if not adapter and not self._server:
                 raise ValueError(
                     f"policy '{url}': the server is not mjsense serve: name an adapter, droid, features or FILE.toml (--adapter)"
@@ -53,10 +52,11 @@ class RemotePolicy(Policy):
             raise
         self._adapter_name = adapter or "streams"
         self.name = _text(self._server.get("name")) or "remote"
-        horizon = self._server.get("execution_horizon")
-        if type(horizon) is int and horizon > 0:
-            self.execution_horizon: int = horizon
-            """Number of actions of a chunk that are executed, if the server states it."""
+        horizon, ensemble = self._server.get("execution_horizon"), self._server.get("ensemble")
+        self.execution_horizon: int | None = horizon if type(horizon) is int and horizon > 0 else None
+        """Number of actions of a chunk that are executed, if the server states it."""
+        self.ensemble: float | None = ensemble if isinstance(ensemble, float) and 0 <= ensemble < math.inf else None
+        """Weight of the temporal ensemble, if the server states it."""
 
     # Set when the worlds are known.
     _adapter: Adapter
@@ -66,6 +66,7 @@ class RemotePolicy(Policy):
     def _connections(self) -> Connections:
         if self._made is None:
             self._made = Connections(self.url, timeout=self._timeout, patience=self._patience)
+            self._made.fingerprint = self._server.get("fingerprint")
         return self._made
 
     def __getstate__(self) -> dict[str, Any]:

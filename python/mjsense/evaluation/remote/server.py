@@ -76,7 +76,9 @@ class PolicyServer:
         self._episodes = 0
         made = self._served.policy
         about = {"version": _core.__version__, "name": made._mjs_name(), "fingerprint": fingerprint(made)}  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
-        about |= {"observation": self._served.observation, "execution_horizon": getattr(made, "execution_horizon", None)}
+        about |= {"observation": self._served.observation} | {
+            name: getattr(made, name, None) for name in ("execution_horizon", "ensemble")
+        }
         self._metadata = pack({MJSENSE: about})
         self._worker = ThreadPoolExecutor(1, "mjsense served policy")
         self._loop = asyncio.new_event_loop()
