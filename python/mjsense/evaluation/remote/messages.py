@@ -146,10 +146,7 @@ def _of_openpi(table: dict[Any, Any]) -> Any:
     if table.keys() == {b"__ndarray__", b"data", b"dtype", b"shape"} and table[b"__ndarray__"] is True:
         return _array(table[b"data"], table[b"dtype"], table[b"shape"])
     if table.keys() == {b"__npgeneric__", b"data", b"dtype"} and isinstance(table[b"data"], (bool, int, float)):
-        try:
-            return _dtype(table[b"dtype"]).type(table[b"data"])
-        except OverflowError as error:
-            raise ValueError(f"a number of a message does not fit its type: {error}") from None
+        return _number(table[b"data"], _dtype(table[b"dtype"]))
     raise ValueError("an array of a message does not have the keys of openpi's arrays")
 
 
@@ -163,6 +160,18 @@ def _of_msgpack_numpy(table: dict[Any, Any]) -> Any:
     if table.keys() == {b"nd", b"type", b"data"} and table[b"nd"] is False:
         return _array(table[b"data"], table[b"type"], [])[()]
     raise ValueError("an array of a message does not have the keys of msgpack-numpy's numeric arrays")
+
+
+def _number(value: float, dtype: np.dtype[Any]) -> np.generic:
+    number: Any = None
+    try:
+        with np.errstate(all="ignore"):
+            number = np.array(value, dtype)[()]
+    except (OverflowError, ValueError):
+        pass
+    if number is None or (number.item() != value and value == value):
+        raise ValueError(f"a number of a message is {value!r:.80}, which does not fit its type {dtype.str}")
+    return number
 
 
 def _dtype(name: Any) -> np.dtype[Any]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.errors import printable
 from mjsense.evaluation.remote.adapter import EPISODE, SEED, Adapter
 from mjsense.evaluation.remote.adapters import adapter_of, check_name, fingerprint_of
 from mjsense.evaluation.remote.client import Connections, checked_url
@@ -131,7 +132,7 @@ class RemotePolicy(Policy):
             return self._adapter.commands(answer, self.action_groups)
         except (ValueError, OSError, RuntimeError) as error:
             kind = type(error) if type(error) in (ValueError, TimeoutError, ConnectionError) else RuntimeError
-            raise kind(f"{self._place(world)}: {error}") from error.__cause__
+            raise kind(printable(f"{self._place(world)}: {error}")) from error.__cause__
 
     def _place(self, world: int) -> str:
         return f"policy '{self.name}', episode {self._mjs_episodes[world]}"

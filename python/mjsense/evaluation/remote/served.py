@@ -98,7 +98,8 @@ class ServedPolicy:
             row, given = self._rows[name][world], numbers[name]
             if given.shape != row.shape or not np.can_cast(given.dtype, row.dtype, "same_kind"):
                 raise BadRequest(f"'{name}' is {given.dtype} {given.shape}: must be {row.dtype} {row.shape}")
-            row[...] = given
+            with np.errstate(over="ignore"):
+                row[...] = given
 
     def _actions(self, given: Any, row: int) -> np.ndarray:
         if isinstance(given, Mapping):
