@@ -33,7 +33,7 @@ class RemotePolicy(Policy):
         patience: Time for which a server that cannot be reached is tried again. [s]
     """
 
-    def __init__(self, url: str, *, adapter: str = "", timeout: float = 120.0, patience: float = 30.0) -> None:
+    def __init__(self, url: str, *, adapter: str = "", timeout: float = 120.0, patience: float = 120.0) -> None:
         for name, value in (("timeout", timeout), ("patience", patience)):
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
                 raise ValueError(f"policy '{url}': {name} is {value!r}: must be a positive number of seconds")
