@@ -23,9 +23,9 @@ def main() -> None:
     for name in [v for v in VIEWS if v in sys.argv] or VIEWS:
         view = camera_scenes.VIEWS[name]
         shots = [
-            Shot(size, shading=shading, ambient_occlusion=open_sky)
+            shot
             for size in SIZES
-            for shading, open_sky in (("classic", True), ("pbr", True), ("pbr", False))
+            for shot in (Shot(size), Shot(size, shading="pbr"), Shot(size, shading="pbr", ambient_occlusion=False))
         ]
         ours = Ours(view, shots, worlds=8, threads=1)
         for index, (width, height) in enumerate(SIZES):

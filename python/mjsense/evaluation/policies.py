@@ -19,6 +19,8 @@ from mjsense.tasks.policy import Policy, policy_names, policy_of
 PREFIXES = {
     "replay": "mjsense.evaluation.replayed:policy_of",
     "python": "mjsense.evaluation.policies:of_module",
+    "ws": "mjsense.evaluation.remote.policy:policy_of",
+    "wss": "mjsense.evaluation.remote.policy:policy_of",
 }
 """Prefix -> the function ``f(text, **options) -> Policy`` that makes the policy of a text with this prefix."""
 
@@ -45,7 +47,7 @@ def policy_from(policy: Any, **options: Any) -> Policy | str:
         return _of_object(RandomPolicy, options)
     known = policy_names()
     if policy not in known:
-        forms = "replay:DIR, python:MODULE:CLASS or FILE.py:CLASS"
+        forms = "replay:DIR, python:MODULE:CLASS, FILE.py:CLASS or ws://HOST:PORT"
         raise ValueError(
             f"policy '{policy}' is neither a name nor {forms}{did_you_mean(policy, ['random', *known], 'names are')}"
         )
