@@ -205,6 +205,8 @@ def play(
         noise = bool(made.settings.get("action_noise", False))
     if execution_horizon is None:
         execution_horizon = getattr(made, "execution_horizon", None)
+    if ensemble is None:
+        ensemble = getattr(made, "ensemble", None)
     timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
     if any(value is not None for value in timing.values()):
         if not isinstance(made, Policy):
