@@ -43,7 +43,7 @@ def test_enum_values_are_types_and_are_shown_by_help():
 def test_options_and_defaults_are_the_same_everywhere():
     record, make_vec = inspect.signature(mjs.record).parameters, inspect.signature(mjs.make_vec).parameters
     assert {"crf", "preset", "ffmpeg", "molmospaces_depth", "num_worlds", "action_noise"} <= set(record)
-    for name in set(record) & set(make_vec) - {"policy", "action_noise", "out", "seed"}:
+    for name in set(record) & set(make_vec) - {"policy", "action_noise", "out", "seed", "episodes"}:
         assert record[name].default == make_vec[name].default, name
     for function in (mjs.Recorder, mjs.RecordEpisodes.__init__, mjs.play, mjs.import_robomimic, mjs.import_lerobot):
         parameters = inspect.signature(function).parameters

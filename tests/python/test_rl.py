@@ -30,7 +30,8 @@ def test_registered():
     np.testing.assert_array_equal(observation["qpos"]["arm"], other.reset(seed=5)[0]["qpos"]["arm"])
     for _ in range(3):
         observation, _, terminated, truncated, info = env.step(env.action_space.sample())
-    assert truncated and not terminated and info == {"success": False}
+    assert truncated and not terminated and info["success"] is False
+    assert info["episode_info"]["seed"] == 5 and info["episode_info"]["number"] == 0
     env.close()
     other.close()
     worlds = gymnasium.make_vec("mjsense/Pick-v0", num_envs=2, vectorization_mode="vector_entry_point", **OPTIONS)

@@ -52,7 +52,7 @@ def add_arguments(parser: Parser) -> None:
         "--episodes",
         metavar="N",
         dest="numbers",
-        help="Number of episodes, those from 0 on; or their numbers: 3,7,12. A benchmark states its episodes. (default: 50)",
+        help="Number of episodes, those from 0 on; or their numbers: 3,7,12. By default 50. A benchmark states its episodes.",
     )
     parser.add_argument(
         "--execution-horizon",

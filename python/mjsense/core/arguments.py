@@ -66,6 +66,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Callable": (callable, "a function"),
     "OutputArray": (lambda value: isinstance(value, np.ndarray), "a numpy array"),
     "Sequence[str]": (_is_list_of_str, "a sequence of str"),
+    "Sequence[int]": (_is_list, "a sequence of int"),
     "Iterable[str]": (_is_iterable_of_str, "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),
@@ -90,7 +91,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Mapping": (lambda value: hasattr(value, "keys") or _is_a(value, "Mapping"), "a mapping"),
     "dict": (lambda value: isinstance(value, dict), "a dict"),
 }
-_ANYTHING = {"Any", "np.ndarray", "Sequence[int]"}  # world ids are checked elsewhere, because masks are valid too
+_ANYTHING = {"Any", "np.ndarray", "Sequence[int] | None"}  # the last are worlds: checked elsewhere, because masks are valid too
 
 
 def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
@@ -107,7 +108,7 @@ def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
 
 def _check_of(context: str, name: str, annotation: Any) -> Callable[[Any], None] | None:
     """A function that raises for values that the annotation does not allow; None if it allows every value."""
-    if not isinstance(annotation, str):
+    if not isinstance(annotation, str) or annotation in _ANYTHING:
         return None
     kinds = [_kind(word.strip()) for word in re.split(r"\|(?![^\[]*\])", annotation)]
     known = [kind for kind in kinds if kind is not None]

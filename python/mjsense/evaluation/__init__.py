@@ -5,7 +5,19 @@ are used."""
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mjsense.evaluation.benchmarks import Benchmark as Benchmark
+    from mjsense.evaluation.benchmarks import create_benchmark as create_benchmark
+    from mjsense.evaluation.comparison import Comparison as Comparison
+    from mjsense.evaluation.comparison import compare as compare
+    from mjsense.evaluation.playing import evaluate as evaluate
+    from mjsense.evaluation.policies import policy_from as policy_from
+    from mjsense.evaluation.protocol import BatchedPolicy as BatchedPolicy
+    from mjsense.evaluation.report import Results as Results
+    from mjsense.evaluation.report import results as results
+    from mjsense.evaluation.timing import Timed as Timed
 
 _PLACES: dict[str, str] = {
     "Benchmark": "benchmarks",
