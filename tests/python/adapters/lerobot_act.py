@@ -23,7 +23,7 @@ root, out, kind, steps = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], int(
 SMALL = {
     "act": {"chunk_size": 12, "n_action_steps": 8, "dim_model": 64, "n_heads": 2, "dim_feedforward": 128, "n_encoder_layers": 1,
             "n_vae_encoder_layers": 1, "pretrained_backbone_weights": None},
-    "diffusion": {"horizon": 8, "n_action_steps": 4, "down_dims": (16, 32), "num_train_timesteps": 4, "num_inference_steps": 2,
+    "diffusion": {"noise_scheduler_type": "DDIM", "horizon": 8, "n_action_steps": 4, "down_dims": (16, 32), "num_train_timesteps": 4, "num_inference_steps": 2,
                   "crop_shape": None, "pretrained_backbone_weights": None, "spatial_softmax_num_keypoints": 4},
 }  # fmt: skip
 torch.manual_seed(0)
