@@ -24,12 +24,14 @@ _PLACES: dict[str, str] = {
     "BatchedPolicy": "protocol",
     "Comparison": "comparison",
     "Results": "report",
+    "Sensitivity": "varied",
     "Timed": "timing",
     "compare": "comparison",
     "create_benchmark": "benchmarks",
     "evaluate": "playing",
     "policy_from": "policies",
     "results": "report",
+    "sensitivity": "varied",
 }
 """Module of each public name."""
 __all__ = [
@@ -37,12 +39,14 @@ __all__ = [
     "Benchmark",
     "Comparison",
     "Results",
+    "Sensitivity",
     "Timed",
     "compare",
     "create_benchmark",
     "evaluate",
     "policy_from",
     "results",
+    "sensitivity",
 ]
 
 
