@@ -51,14 +51,34 @@ def main() -> None:
         cpu_seconds(ROOT / "tests/python/adapters/lerobot_act.py", folder / "out", folder / "act", "act", 1)
 
         def ours(worlds: int, count: int) -> float:
-            options = ["--worlds", worlds, "--episodes", count, "--seed", SEED, "--width", 64, "--height", 64, "--no-shadows", "--quiet"]
+            options = [
+                "--worlds",
+                worlds,
+                "--episodes",
+                count,
+                "--seed",
+                SEED,
+                "--width",
+                64,
+                "--height",
+                64,
+                "--no-shadows",
+                "--quiet",
+            ]
             return cpu_seconds(
                 *("-m", "mjsense", "evaluate", "pick", "--policy", f"lerobot:{folder / 'act'}", "--horizon", STEPS),
                 *("--threads", 1, "--out", folder / "results", "--overwrite", *options),
             )
 
         def theirs(worlds: int, count: int) -> float:
-            env = {"task": "pick", "env_seed": SEED, "width": 64, "height": 64, "horizon": STEPS, "options": "{shadows: false, threads: 1}"}
+            env = {
+                "task": "pick",
+                "env_seed": SEED,
+                "width": 64,
+                "height": 64,
+                "horizon": STEPS,
+                "options": "{shadows: false, threads: 1}",
+            }
             return cpu_seconds(
                 *("-m", "lerobot.scripts.lerobot_eval", "--env.type=mjsense", "--policy.device=cpu", "--seed=0"),
                 *(f"--env.{option}={value}" for option, value in env.items()),

@@ -111,7 +111,7 @@ def test_checkpoints_that_are_refused(tmp_path, monkeypatch):
         LeRobotPolicy(str(checkpoint(tmp_path / "code", code)))
     assert not (tmp_path / "ran").exists()
     (tmp_path / "run/checkpoints/last/pretrained_model/policy_postprocessor.json").unlink()
-    with pytest.raises(FileNotFoundError, match="has no policy_postprocessor.json; checkpoints of LeRobot before 0.4"):
+    with pytest.raises(FileNotFoundError, match=r"has no policy_postprocessor\.json; checkpoints of LeRobot before 0\.4"):
         LeRobotPolicy(str(tmp_path / "run/checkpoints/last/pretrained_model"))
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(ModuleNotFoundError, match=r"needs the package torch \(LeRobot 0.4.4 or newer, pip install lerobot\)"):

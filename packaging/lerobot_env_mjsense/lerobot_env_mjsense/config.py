@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
-from mjsense.evaluation import Benchmark
-from mjsense.evaluation.lerobot_features import IMAGES, STATE
-
 from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE
+
 from lerobot_env_mjsense.environments import AGENT_POS, PIXELS, LeRobotVectorEnv
+from mjsense.evaluation import Benchmark
+from mjsense.evaluation.lerobot_features import IMAGES, STATE
 
 _ID = "mjsense/lerobot-v0"
 _NAMED = ("robot", "scene", "split", "arm_controller", "cameras", "width", "height", "horizon", "policy_dt_ms")
@@ -68,7 +68,12 @@ class MjsenseEnvConfig(EnvConfig):
 
     def _given(self) -> dict[str, Any]:
         named = {name: getattr(self, name) for name in _NAMED}
-        return {"task": self.task or "pick", "seed": self.env_seed, **{k: v for k, v in named.items() if v not in (None, "")}, **self.options}
+        return {
+            "task": self.task or "pick",
+            "seed": self.env_seed,
+            **{k: v for k, v in named.items() if v not in (None, "")},
+            **self.options,
+        }
 
     def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, gymnasium.vector.VectorEnv]]:
         """One environment whose worlds run in parallel, with or without ``use_async_envs``."""

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
-import mjsense as mjs
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+
+import mjsense as mjs
 from mjsense.evaluation.lerobot_features import IMAGES, OTHERS, STATE, Features
 
 PIXELS, AGENT_POS = "pixels", "agent_pos"
@@ -39,7 +40,9 @@ class LeRobotVectorEnv(VectorEnv):
         self._env = mjs.make_vec(**given, num_envs=num_envs, autoreset_mode="disabled", render_mode=view)
         self._features = Features(self._env.specs, self._env.action_groups, map)
         if self._features.held:
-            raise ValueError(f"the action of the map has no command of the move group '{self._features.held[0]}'; add its stream to the map")
+            raise ValueError(
+                f"the action of the map has no command of the move group '{self._features.held[0]}'; add its stream to the map"
+            )
         self._task, self._episodes = str(options["task"]), episodes
         self._next_seed = 0
         self._playing = np.zeros(num_envs, bool)
@@ -97,7 +100,9 @@ class LeRobotVectorEnv(VectorEnv):
             return (self.horizon,) * self.num_envs
         if name == "render":
             return self.render()
-        raise AttributeError(f"the environment has no attribute '{name}'; it has task_description, task, _max_episode_steps, render")
+        raise AttributeError(
+            f"the environment has no attribute '{name}'; it has task_description, task, _max_episode_steps, render"
+        )
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """See :meth:`call`."""

@@ -43,7 +43,9 @@ class Features:
         """Streams of the suite by feature of an observation. A camera may be one that is not rendered."""
         self.action = self._action(mapping)
         """Columns of a command that are the numbers of an action, int ``[n]``."""
-        commanded = [name for name, columns in groups.items() if np.isin(np.arange(columns.start, columns.stop), self.action).any()]
+        commanded = [
+            name for name, columns in groups.items() if np.isin(np.arange(columns.start, columns.stop), self.action).any()
+        ]
         self.held: tuple[str, ...] = tuple(name for name in groups if name not in commanded)
         """Move groups without a number in the action: they hold their position."""
 
@@ -60,7 +62,9 @@ class Features:
                 raise ValueError(f"{owner} needs the feature '{feature}'{rest}. The map of the export names others (map=FILE)")
             if (camera := self.streams[feature][0]) not in self._specs:
                 cameras = [name for name, spec in self._specs.items() if _is_colour(spec)]
-                raise ValueError(f"{owner} needs '{feature}' of the camera '{camera}'{did_you_mean(camera, cameras, 'the cameras here are')}")
+                raise ValueError(
+                    f"{owner} needs '{feature}' of the camera '{camera}'{did_you_mean(camera, cameras, 'the cameras here are')}"
+                )
 
     def rows(self, feature: str, rows: Table[str, np.ndarray], worlds: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Rows of a feature: images uint8 ``[k, height, width, 3]``, numbers float32 ``[k, size]``.
@@ -92,7 +96,9 @@ class Features:
             inner = [short] if short in self._specs else sorted(one for one in self._specs if one.startswith(f"{short}/"))
             inner = [one for one in inner if "/given/" not in one and 0 not in self._specs[one].shape]
             if not inner:
-                raise ValueError(f"feature '{feature}': there is no stream '{name}' here{did_you_mean(short, self._specs, 'there are')}")
+                raise ValueError(
+                    f"feature '{feature}': there is no stream '{name}' here{did_you_mean(short, self._specs, 'there are')}"
+                )
             found += inner
         return tuple(dict.fromkeys(found))
 

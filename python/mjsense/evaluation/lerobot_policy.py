@@ -100,7 +100,9 @@ class LeRobotPolicy(Policy):
                 )
             if not feature.startswith(IMAGES) and here != shape:
                 streams_here = ", ".join(self._features.streams[feature])
-                raise ValueError(f"{self._owner} needs {shape[0]} numbers as '{feature}', and here they are {here[0]}: {streams_here}")
+                raise ValueError(
+                    f"{self._owner} needs {shape[0]} numbers as '{feature}', and here they are {here[0]}: {streams_here}"
+                )
         if len(self._features.action) != self._size:
             raise ValueError(
                 f"{self._owner} has {self._size} numbers as 'action', and here they are {len(self._features.action)}: "
@@ -147,7 +149,7 @@ class LeRobotPolicy(Policy):
 
     @contextlib.contextmanager
     def _inference(self, worlds: np.ndarray) -> Any:
-        """Without gradients, and with random numbers that depend on the episodes that are asked."""
+        """Without gradients, and with random numbers that depend on the episodes that are due."""
         torch = self._torch
         kind = torch.device(self.device).type
         with torch.inference_mode(), torch.autocast(kind) if self._use_amp else contextlib.nullcontext():
@@ -156,7 +158,7 @@ class LeRobotPolicy(Policy):
                 yield
 
     def _of_queues(self, batch: dict[str, Any], worlds: np.ndarray) -> np.ndarray:
-        """Actions ``[k, n]``. Worlds whose queues have the same lengths are asked together."""
+        """Actions ``[k, n]``. Worlds whose queues have the same lengths are computed together."""
         alike: dict[tuple[int, ...], list[int]] = {}
         for row, world in enumerate(worlds.tolist()):
             if self._queues[world] is None:
@@ -174,7 +176,8 @@ class LeRobotPolicy(Policy):
             actions[rows] = self._numbers(self._model.select_action(some))
             for i, row in enumerate(rows):
                 self._queues[worlds[row]] = {
-                    name: deque((inner[i : i + 1] for inner in queue), queue.maxlen) for name, queue in self._model._queues.items()
+                    name: deque((inner[i : i + 1] for inner in queue), queue.maxlen)
+                    for name, queue in self._model._queues.items()
                 }
         return actions
 
@@ -186,7 +189,9 @@ class LeRobotPolicy(Policy):
         """Raises an error if a file is missing, or if a processor has steps that are not registered in LeRobot."""
         if not (self._folder / "config.json").is_file():
             inside = sorted(path.parent for path in self._folder.glob("**/pretrained_model/config.json"))
-            near = f"; did you mean '{inside[-1]}'?" if inside else "; expected a folder such as checkpoints/last/pretrained_model"
+            near = (
+                f"; did you mean '{inside[-1]}'?" if inside else "; expected a folder such as checkpoints/last/pretrained_model"
+            )
             raise FileNotFoundError(f"{self._owner} has no config.json{near}")
         for name in _PROCESSORS:
             path = self._folder / name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a policy is sensitive to: the same episodes, in which one factor differs at a time."""
+"""Sensitivity of a policy: the same episodes, in which one factor differs at a time."""
 
 from __future__ import annotations
 
@@ -165,7 +165,9 @@ def _check(base: Mapping[str, Any], cases: Mapping[str, tuple[dict[str, Any], di
             continue
         varied = _starts({**base, **changed})
         if name in _SAME_START and not all(np.array_equal(a, b) for a, b in zip(starts[0], varied[0])):
-            raise ValueError(f"vary: '{name}' changes the states in which the episodes of this task start, and not only the {name}")
+            raise ValueError(
+                f"vary: '{name}' changes the states in which the episodes of this task start, and not only the {name}"
+            )
         if all(np.array_equal(a, b) for a, b in zip(starts[0], varied[0])) and starts[1] == varied[1]:
             raise ValueError(f"vary: '{name}' changes nothing in this task ({FACTORS[name]}); leave it out")
 
@@ -185,14 +187,27 @@ def _starts(options: Mapping[str, Any]) -> tuple[list[np.ndarray], list[str]]:
         env.close()
 
 
-_STARTS = ("task", "robot", "scene", "split", "arm_controller", "camera_system", "cameras", "policy_dt_ms", "perturb", "instructions")
+_STARTS = (
+    "task",
+    "robot",
+    "scene",
+    "split",
+    "arm_controller",
+    "camera_system",
+    "cameras",
+    "policy_dt_ms",
+    "perturb",
+    "instructions",
+)
 """Options on which the start of an episode depends."""
 
 
 def _digest(model: Any) -> str:
     total = hashlib.sha256()
     for name in dir(model):
-        if name.startswith(("light_", "mat_", "geom_", "cam_", "body_")) and isinstance(values := getattr(model, name), np.ndarray):
+        if name.startswith(("light_", "mat_", "geom_", "cam_", "body_")) and isinstance(
+            values := getattr(model, name), np.ndarray
+        ):
             total.update(np.ascontiguousarray(values).tobytes())
     return total.hexdigest()
 
