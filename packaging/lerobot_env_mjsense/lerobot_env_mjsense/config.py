@@ -12,9 +12,9 @@ from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE
 
-from lerobot_env_mjsense.environments import AGENT_POS, PIXELS, LeRobotVectorEnv
+from lerobot_env_mjsense.environments import PIXELS, LeRobotVectorEnv, key_of
 from mjsense.evaluation import Benchmark
-from mjsense.evaluation.lerobot_features import IMAGES, STATE
+from mjsense.evaluation.lerobot_features import IMAGES
 
 _ID = "mjsense/lerobot-v0"
 _NAMED = ("robot", "scene", "split", "arm_controller", "cameras", "width", "height", "horizon", "policy_dt_ms")
@@ -55,15 +55,13 @@ class MjsenseEnvConfig(EnvConfig):
         self._options = self._given() if benchmark is None else dict(benchmark.recipe)
         made = LeRobotVectorEnv(self._options, map=self.map)
         self.fps = round(made.metadata["render_fps"])
-        spaces = made.single_observation_space.spaces
         self.features = {ACTION: PolicyFeature(type=FeatureType.ACTION, shape=made.single_action_space.shape)}
         self.features_map = {ACTION: ACTION}
-        for name, space in {**{f"{PIXELS}/{name}": box for name, box in spaces.get(PIXELS, {}).items()}, **spaces}.items():
-            if name == PIXELS:
-                continue
-            key = STATE if name == AGENT_POS else name.replace(f"{PIXELS}/", IMAGES) if "/" in name else f"observation.{name}"
-            kind = FeatureType.VISUAL if "/" in name else FeatureType.ENV if key == OBS_ENV_STATE else FeatureType.STATE
-            self.features[name], self.features_map[name] = PolicyFeature(type=kind, shape=space.shape), key
+        for feature, shape in made.shapes.items():
+            image = feature.startswith(IMAGES)
+            kind = FeatureType.VISUAL if image else FeatureType.ENV if feature == OBS_ENV_STATE else FeatureType.STATE
+            name = f"{PIXELS}/{feature.removeprefix(IMAGES)}" if image else key_of(feature)
+            self.features[name], self.features_map[name] = PolicyFeature(type=kind, shape=shape), feature
         made.close()
 
     def _given(self) -> dict[str, Any]:

@@ -32,7 +32,7 @@ class LeRobotVectorEnv(VectorEnv):
     """
 
     def __init__(
-        self, options: dict[str, Any], num_envs: int = 1, episodes: Sequence[int] | None = None, map: str | None = None
+        self, options: dict[str, Any], num_envs: int = 1, episodes: Sequence[int] | None = None, map: Any = None
     ) -> None:
         view = None if options.get("cameras") != [] else "rgb_array"
         # As in `mjsense evaluate`, an episode ends at its first success.
@@ -50,9 +50,10 @@ class LeRobotVectorEnv(VectorEnv):
         rate = round(self._env.metadata["render_fps"])  # LeRobot writes videos with it, whose rates are whole numbers
         self.metadata = {**self._env.metadata, "render_fps": rate, "autoreset_mode": AutoresetMode.DISABLED}
         self.render_mode = "rgb_array"
+        self.shapes: dict[str, tuple[int, ...]] = {name: self._features.shape(name) for name in self._features.streams}
+        """Shape of each feature of LeRobot; images are (height, width, 3)."""
         spaces: dict[str, Any] = {}
-        for feature in self._features.streams:
-            shape = self._features.shape(feature)
+        for feature, shape in self.shapes.items():
             if feature.startswith(IMAGES):
                 inner = spaces.setdefault(PIXELS, gymnasium.spaces.Dict())
                 inner[feature.removeprefix(IMAGES)] = gymnasium.spaces.Box(0, 255, shape, np.uint8)

@@ -202,7 +202,8 @@ class LeRobotPolicy(Policy):
                 )
             with open(path, "rb") as file:
                 table = bounded_json.parse_object(file.read(_FILE_BYTES + 1), str(path), _FILE_BYTES)
-            for step in table.get("steps") if isinstance(table.get("steps"), list) else [None]:
+            steps = table.get("steps")
+            for step in steps if isinstance(steps, list) else [steps]:
                 if not isinstance(step, dict) or not isinstance(step.get("registry_name"), str):
                     raise ValueError(
                         f"{path}: a step of the processor is {str(step)[:200]}; expected one with a registry_name: steps by the name of a "
