@@ -57,7 +57,8 @@ endif()
 set_target_properties(mjsense_python PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_DIR}
                                                 MJSENSE_MUJOCO_LATER ON INSTALL_RPATH "$ORIGIN/_lib" BUILD_WITH_INSTALL_RPATH ON)
 file(GLOB_RECURSE MJSENSE_PY_FILES CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/python/mjsense
-     ${PROJECT_SOURCE_DIR}/python/mjsense/*.py ${PROJECT_SOURCE_DIR}/python/mjsense/py.typed)
+     ${PROJECT_SOURCE_DIR}/python/mjsense/*.py ${PROJECT_SOURCE_DIR}/python/mjsense/*.json
+     ${PROJECT_SOURCE_DIR}/python/mjsense/py.typed)
 # Links and folders of files that have moved or gone since the last configuration would still be importable.
 file(GLOB MJSENSE_PY_OLD RELATIVE ${MJSENSE_PY_DIR} ${MJSENSE_PY_DIR}/*)
 foreach(old IN LISTS MJSENSE_PY_OLD)

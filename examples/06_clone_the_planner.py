@@ -4,10 +4,13 @@
 Minutes on two cores, without a picture: it sees the joints, and where its object is in the frame of its tool. The scene is the plain
 table, and grasps come from above: what is easiest to learn.
 
-    pip install "mjsense[torch,dataset]"
+    pip install "mjsense[torch,dataset,evaluate]"
     python examples/06_clone_the_planner.py [--out clone] [--recorded 200] [--judged 200] [--passes 120]
 
-The folder keeps the recordings of the demonstrations and of the judged episodes, and the network.
+The folder keeps the recordings of the demonstrations and of the judged episodes, with a report of each, and the network, which the program
+evaluates too:
+
+    mjsense evaluate pick --scene table --policy examples/06_clone_the_planner.py:ClonePolicy --policy-option net=clone/network.pt --out results
 """
 
 import argparse
@@ -120,12 +123,15 @@ def train(x, moves, closed, passes, seed=0):
 
 
 class ClonePolicy(mjs.Policy):
-    """The network as a policy of mjsense's: one call for all worlds."""
+    """The network as a policy of mjsense's: one call for all worlds.
+
+    net: a network, or the path of one.
+    """
 
     observation = ("qpos", "qvel", "tcp_pose", "obj_start", "env_states")
 
     def __init__(self, net):
-        self.net = net
+        self.net = net if isinstance(net, Clone) else loaded(net)
 
     def initialize(self):
         self.target = np.full(self.num_worlds, -1)
@@ -145,31 +151,28 @@ class ClonePolicy(mjs.Policy):
         return {"arm": arm + moves, "gripper": np.where(out[:, 7:].numpy() > 0, CLOSED, 0.0)}
 
 
-def successes(policy, episodes, out):
-    """In how many unseen episodes the object was lifted at the last step or before."""
-    return mjs.record(
+def loaded(path):
+    """The network of a file."""
+    weights = torch.load(path, weights_only=True)
+    net = Clone(torch.zeros(2, len(weights["mean"])), torch.zeros(2, 7))
+    net.load_state_dict(weights)
+    return net.eval()
+
+
+def evaluated(policy, episodes, out):
+    """Results of unseen episodes: success means that the object was lifted at the last step or before."""
+    return mjs.evaluate(
         "pick",
         scene="table",
         policy=policy,
         out=out,
         overwrite=True,
-        num_attempts=episodes,
+        episodes=episodes,
         num_worlds=50,
         seed=10_000,
         horizon=STEPS,
         cameras=[],
-        action_noise=False,
-        terminate_upon_success=True,
-        keep_failures=True,
-    ).succeeded
-
-
-def wilson(successes, episodes, z=1.96):
-    """Interval that contains the true success rate with 95 % probability: (low, high)."""
-    share, n = successes / episodes, episodes + z * z
-    middle = (successes + z * z / 2) / n
-    half = z / n * np.sqrt(episodes * share * (1 - share) + z * z / 4)
-    return middle - half, middle + half
+    )
 
 
 def main(out, recorded=200, judged=200, passes=120):
@@ -188,12 +191,12 @@ def main(out, recorded=200, judged=200, passes=120):
     x, moves, closed = demonstrations(made.path)
     begun = time.perf_counter()
     net = train(x, moves, closed, passes)
-    torch.save(net, out / "network.pt")
+    torch.save(net.state_dict(), out / "network.pt")
     print(f"trained on {len(x)} steps in {time.perf_counter() - begun:.0f} s", flush=True)
     for name, network in {"untrained": Clone(torch.as_tensor(x), torch.as_tensor(moves)), "trained": net}.items():
-        count = successes(ClonePolicy(network), judged, out / name)
-        low, high = wilson(count, judged)
-        print(f"{name}: {count} of {judged} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
+        found = evaluated(ClonePolicy(network), judged, out / name).success
+        low, high = found.interval
+        print(f"{name}: {found.successes} of {judged} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
 
 
 if __name__ == "__main__":

@@ -6,15 +6,19 @@ the gripper, and the words of the instruction. It receives no pose of an object.
 steps, relative to the present one, and whether the gripper closes. Two auxiliary losses use what recordings contain: where in the images
 the objects are, and at which pose of the tool the demonstration closed the gripper.
 
-    pip install "mjsense[torch,dataset]"
+    pip install "mjsense[torch,dataset,evaluate]"
     python examples/07_learn_from_pictures.py [--episodes 200] [--steps 3500] [--judged 200]
+
+The program evaluates the network too:
+
+    mjsense evaluate pick --policy examples/07_learn_from_pictures.py:Follower --policy-option network=pictures/network.pt --out results \\
+        --robot franka --size 128x96 --camera-system close_up --arm-controller "{ kind = 'ee_delta_pose', frame = 'tool', reference = 'measured', max_translation = 0.15, max_rotation = 1.0 }"
 """
 
 import argparse
 import tempfile
 import time
 from collections import deque
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +27,7 @@ from torch import nn  # pyright: ignore[reportMissingImports]
 from torch.nn import functional as F  # pyright: ignore[reportMissingImports]
 
 import mjsense as mjs
+from mjsense.evaluation.intervals import wilson
 
 CAMERAS = ("exo_camera_1", "wrist_camera")
 MODELS = Path(__file__).resolve().parents[1] / "models/robots/franka"
@@ -300,65 +305,72 @@ def train(network, data, steps, batch=64):
 
 
 class Follower:
-    """Runs a network in many worlds. Each step it follows the mean of the last predictions for this step."""
+    """A network, or that of a file, as a policy. Each step it follows the mean of the last predictions for this step."""
 
-    def __init__(self, network, instructions):
-        self.network = network
-        self.words = torch.as_tensor(np.stack([bag(text, network.vocabulary) for text in instructions]))
-        self.plans = deque(maxlen=4)
+    observation = (*CAMERAS, "qpos", "tcp_pose")
 
-    def __call__(self, obs):
+    def __init__(self, network):
+        torch.set_num_threads(1)  # the networks are small
+        self.network = network if isinstance(network, Network) else loaded(network)
+        self.plans = {}  # world -> its last predictions, the newest first
+
+    def reset(self, world_ids):
+        self.plans |= {world: deque(maxlen=4) for world in world_ids}
+
+    def act(self, obs):
         images = {camera: torch.as_tensor(obs[camera]) for camera in CAMERAS}
+        words = torch.as_tensor(np.stack([bag(text, self.network.vocabulary) for text in obs["instructions"]]))
         tool = obs["tcp_pose"].astype(float)
         with torch.no_grad():
-            moves, close, _ = self.network(images, torch.as_tensor(state(tool, obs["qpos"]["gripper"][:, 0])), self.words)
+            moves, close, _ = self.network(images, torch.as_tensor(state(tool, obs["qpos"]["gripper"][:, 0])), words)
         moves = (moves * self.network.move_scale + self.network.move_mean)[:, :CHUNK].numpy()
-        self.plans.appendleft((moved(tool[:, None], moves), close.sigmoid().numpy()))
-        now = [difference(tool, targets[:, age]) for age, (targets, _) in enumerate(self.plans)]
-        shut = np.mean([close[:, age] for age, (_, close) in enumerate(self.plans)], 0) > 0.5
-        move = np.clip(np.mean(now, 0), -LIMITS, LIMITS)
-        return np.concatenate([move, np.where(shut, CLOSED, 0)[:, None]], 1).astype(np.float32)
+        targets, close = moved(tool[:, None], moves), close.sigmoid().numpy()
+        return np.stack([self.follow(world, tool[i], targets[i], close[i]) for i, world in enumerate(obs["world_ids"])])
+
+    def follow(self, world, tool, targets, close):
+        """The mean of the predictions for now: a move of the tool, and the command of the gripper."""
+        plans = self.plans[world]
+        plans.appendleft((targets, close))
+        move = np.mean([difference(tool, poses[age]) for age, (poses, _) in enumerate(plans)], 0)
+        shut = np.mean([shares[age] for age, (_, shares) in enumerate(plans)]) > 0.5
+        return np.append(np.clip(move, -LIMITS, LIMITS), CLOSED if shut else 0)
 
 
-def evaluate(network, episodes, scene="", seed=10_000, worlds=50):
-    """For each of some unseen episodes, whether the robot held the object above the table for HELD steps without a break, and whether the
-    training contained all words of the instruction: two bool arrays ``[episodes]``."""
-    won, known = [], []
-    with closing(
-        mjs.make_vec(
-            "pick",
-            "franka",
-            scene=scene,
-            num_envs=min(worlds, episodes),
-            arm_controller=CONTROLLER,
-            horizon=STEPS + 1,
-            width=WIDTH,
-            height=HEIGHT,
-            camera_system="close_up",
-            instructions="canonical",
-            action_noise=False,
-            observations=[*CAMERAS, "qpos", "tcp_pose"],
-        )
-    ) as env:
-        while len(won) < episodes:
-            obs, _ = env.reset(seed=seed + len(won))
-            follow, held = Follower(network, env.instructions), np.zeros(env.num_envs, int)
-            lifted = np.zeros(env.num_envs, bool)
-            for _ in range(STEPS):
-                obs, _, _, _, info = env.step(follow(obs))
-                held = np.where(info["success"], held + 1, 0)
-                lifted |= held >= HELD
-            won.extend(lifted)
-            known.extend(set(text.lower().split()) <= set(network.vocabulary) for text in env.instructions)
+def loaded(path):
+    """The network of a file."""
+    content = torch.load(path, weights_only=True)
+    weights, names = content["weights"], ("state", "move")
+    mean, scale = ({name: weights[f"{name}_{kind}"] for name in names} for kind in ("mean", "scale"))
+    network = Network(content["vocabulary"], mean, scale)
+    network.load_state_dict(weights)
+    return network.eval()
+
+
+def evaluate(network, episodes, out, scene="", seed=10_000, worlds=50):
+    """Results of some unseen episodes: ``[episodes]``, whether the robot held the object above the table for HELD steps without a break, and
+    whether the training contained all words of the instruction."""
+    results = mjs.evaluate(
+        "pick",
+        "franka",
+        Follower(network),
+        out=out,
+        overwrite=True,
+        episodes=episodes,
+        scene=scene,
+        seed=seed,
+        num_worlds=min(worlds, episodes),
+        arm_controller=CONTROLLER,
+        horizon=STEPS,
+        width=WIDTH,
+        height=HEIGHT,
+        camera_system="close_up",
+        instructions="canonical",
+        terminate_upon_success=False,
+    )
+    played = results.dataset.episodes
+    won = [np.convolve(episode["success"], np.ones(HELD)).max() >= HELD for episode in played]
+    known = [set(sentence(episode).split()) <= set(network.vocabulary) for episode in played]
     return np.array(won), np.array(known)
-
-
-def wilson(successes, episodes, z=1.96):
-    """Interval that contains the true success rate with 95 % probability: (low, high)."""
-    share, n = successes / episodes, episodes + z * z
-    middle = (successes + z * z / 2) / n
-    half = z / n * np.sqrt(episodes * share * (1 - share) + z * z / 4)
-    return middle - half, middle + half
 
 
 def main():
@@ -368,16 +380,12 @@ def main():
     arguments.add_argument("--judged", type=int, default=200, help="Number of unseen episodes.")
     arguments.add_argument("--scene", default="", help="Scene of the unseen episodes; by default the task's.")
     arguments.add_argument("--data", type=Path, help="Recording to read instead of a new one.")
-    arguments.add_argument("--network", type=Path, help="File of the trained network; if it exists, it is only evaluated.")
+    arguments.add_argument("--out", type=Path, default=Path("pictures"), help="Folder of the network and of the results.")
+    arguments.add_argument("--network", type=Path, help="File of a trained network, which is only evaluated.")
     chosen = arguments.parse_args()
     torch.set_num_threads(1)  # the networks are small
-    if chosen.network and chosen.network.exists():
-        network = torch.load(chosen.network, weights_only=False)
-    else:
-        network = trained(chosen)
-        if chosen.network:
-            torch.save(network, chosen.network)
-    won, known = evaluate(network, chosen.judged, chosen.scene)
+    network = loaded(chosen.network) if chosen.network else trained(chosen)
+    won, known = evaluate(network, chosen.judged, chosen.out / "trained", chosen.scene)
     low, high = wilson(won.sum(), len(won))
     print(f"trained: {won.sum()} of {len(won)} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
     if not known.all():
@@ -392,8 +400,11 @@ def trained(chosen):
         data = Demonstrations(chosen.data or record(out, chosen.episodes), chosen.episodes)
     print(f"{chosen.episodes} demonstrations, {len(data.state)} steps", flush=True)
     network = new_network(data)
-    print(f"untrained: {evaluate(network.eval(), min(50, chosen.judged), chosen.scene)[0].mean():.0%}", flush=True)
-    return train(network, data, chosen.steps)
+    won, _ = evaluate(network.eval(), min(50, chosen.judged), chosen.out / "untrained", chosen.scene)
+    print(f"untrained: {won.mean():.0%}", flush=True)
+    train(network, data, chosen.steps)
+    torch.save({"vocabulary": network.vocabulary, "weights": network.state_dict()}, chosen.out / "network.pt")
+    return network
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import pytest
 
 import mjsense as mjs
 from mjsense.evaluation import Benchmark, create_benchmark, evaluate
+from mjsense.evaluation.benchmarks import benchmark_names
 from mjsense.evaluation.policies import policy_from
 
 SMALL = {"cameras": [], "progress": False}
@@ -244,3 +245,19 @@ def test_files_of_a_benchmark_are_its_own(benchmark, tmp_path):
 def test_bad_options(tmp_path, options, message):
     with pytest.raises(ValueError, match=message):
         evaluate("pick", out=tmp_path, **{"episodes": 1, **options}, **SMALL)
+
+
+@pytest.mark.parametrize("name", benchmark_names())
+def test_benchmarks_of_the_package_start_as_when_they_were_made(name):
+    benchmark = Benchmark(name)
+    assert len(benchmark.episodes) == 50
+    del benchmark.episodes[2:]
+    benchmark.check_starts()
+    benchmark._digests["1"]["state"] = "0"
+    with pytest.raises(ValueError, match="episode 1 does not start as when the benchmark was made: the checksum of its state differs"):
+        benchmark.check_starts()
+
+
+def test_a_benchmark_of_the_package_is_named(tmp_path):
+    with pytest.raises(mjs.UnknownNameError, match=r"there is no 'benchmark:pik'; did you mean 'benchmark:pick'"):
+        evaluate("benchmark:pik", out=tmp_path)

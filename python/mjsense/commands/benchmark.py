@@ -46,7 +46,7 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "action", choices=("create", "check"), help="create: write a benchmark. check: compare its starts with the stored ones."
     )
-    add_name(parser, "task", "tasks", "create: name of the task. check: folder of the benchmark.", metavar="TASK")
+    add_name(parser, "task", "tasks", "create: name of the task. check: a benchmark.", metavar="TASK")
     parser.add_argument(
         "--no-terminate-upon-success",
         dest="terminate_upon_success",

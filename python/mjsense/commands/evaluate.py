@@ -17,7 +17,7 @@ EXAMPLES = [
         "mjsense evaluate pick --policy net.py:Network --episodes 100 --out results",
         "Evaluate a policy written in Python on 100 episodes.",
     ),
-    ("mjsense evaluate bench --policy planner --out results", "Evaluate the planner on a benchmark."),
+    ("mjsense evaluate benchmark:pick --policy planner --out results", "Evaluate the planner on a benchmark of the package."),
 ]
 _NOT_OFFERED = (
     "noise",
@@ -35,7 +35,15 @@ _POLICIES = "planner, random, replay:DIR, lerobot:DIR, python:MODULE:CLASS, FILE
 
 
 def add_arguments(parser: Parser) -> None:
-    add_name(parser, "task", "tasks", "Name of the task, or folder of a benchmark.", nargs="?", default="pick", metavar="TASK")
+    add_name(
+        parser,
+        "task",
+        "tasks",
+        "Name of the task, or a benchmark: its folder, or benchmark:pick and similar.",
+        nargs="?",
+        default="pick",
+        metavar="TASK",
+    )
     action = parser.add_argument(
         "--policy", default="planner", metavar="TEXT", help=f"The policy: {_POLICIES}, or the name of another one."
     )

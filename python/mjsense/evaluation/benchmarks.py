@@ -4,7 +4,8 @@
 ``benchmark.json`` states the options of the recording, the numbers of the episodes, and the checksums of all files. ``starts/`` is a
 recording of the first observations of these episodes: their states, models, instructions and images. The episodes are sampled again
 when the benchmark is played, and refused unless they are equal to the stored ones, bit for bit. A folder is only data: it names things that
-mjsense contains, neither files nor code.
+mjsense contains, neither files nor code. The benchmarks of the package, such as ``benchmark:pick``, are one file each, with checksums of
+the starts instead of their recording.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ from typing import Any
 import numpy as np
 
 from mjsense import _core
-from mjsense.core.errors import did_you_mean
+from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import Dataset, Episode, bounded_json
 from mjsense.dataset.places import is_plain_name
 from mjsense.tasks.recording import record
 from mjsense.tasks.vector import TaskVectorEnv, make_vec
 
 FILE, STARTS = "benchmark.json", "starts"
+PREFIX, _SHIPPED = "benchmark:", Path(__file__).parent / "shipped"
 _FORMAT = 1
 _FILE_BYTES = 1 << 24
 _MAX_EPISODES, _MAX_FILES, _MAX_DEPTH = 100_000, 1_000_000, 4
@@ -41,18 +43,28 @@ _NAME = re.compile(r"([A-Za-z0-9_+-]{1,100}(@[a-z]{1,20})?(:[0-9]{1,9})?)?")
 _CAMERA = re.compile(r"[A-Za-z0-9_-]{1,100}(/[A-Za-z0-9_-]{1,100}){0,9}")
 
 
-def is_folder(task: Any) -> bool:
-    """Whether this is a folder, and not the name of a task."""
-    return isinstance(task, Path) or (isinstance(task, str) and (os.sep in task or os.path.isdir(task)))
+def benchmark_names() -> list[str]:
+    """The benchmarks of the package: ``benchmark:pick``, ..."""
+    return sorted(PREFIX + path.stem for path in _SHIPPED.glob("*.json"))
+
+
+def is_benchmark(task: Any) -> bool:
+    """Whether this is a folder or one of :func:`benchmark_names`, and not the name of a task."""
+    if isinstance(task, str) and not task.startswith(PREFIX):
+        return os.sep in task or os.path.isdir(task)
+    return isinstance(task, (str, Path))
 
 
 class Benchmark:
-    """A benchmark that was read from its folder."""
+    """A benchmark that was read from its folder, or one of the package by its name: ``benchmark:pick``."""
 
     def __init__(self, folder: str | Path) -> None:
-        self.folder = Path(folder)
-        path = self.folder / FILE
-        if not path.is_file():
+        self.folder, path = Path(folder), Path(folder) / FILE
+        if isinstance(folder, str) and folder.startswith(PREFIX):
+            if folder not in benchmark_names():
+                raise UnknownNameError(f"there is no '{folder}'{did_you_mean(folder, benchmark_names(), 'there are')}")
+            path = _SHIPPED / f"{folder.removeprefix(PREFIX)}.json"
+        elif not path.is_file():
             raise FileNotFoundError(f"benchmark: '{self.folder}' has no {FILE}")
         with open(path, "rb") as file:
             text = file.read(_FILE_BYTES + 1)
@@ -69,7 +81,10 @@ class Benchmark:
         self.version = str(table.get("version", ""))
         """Version of mjsense that made it."""
         self.name = str(self.recipe["task"])
-        self._files: dict[str, str] = _files_of(table.get("files"), path)
+        self._digests: dict[str, Any] | None = table.get("digests")
+        self._files: dict[str, str] = {} if self._digests is not None else _files_of(table.get("files"), path)
+        if self._digests is not None and self._digests.keys() != set(map(str, self.episodes)):
+            raise ValueError(f"{path}: digests must be those of the episodes")
 
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """The options of a recording of this benchmark. Raises ValueError for given ones that it fixes."""
@@ -81,6 +96,8 @@ class Benchmark:
 
     def check_files(self) -> None:
         """Raises ValueError if a file of the benchmark is missing, was changed or was added."""
+        if self._digests is not None:
+            return
         found = dict(_checksums(self.folder / STARTS))
         for name in sorted(found.keys() ^ self._files.keys()):
             raise ValueError(
@@ -93,15 +110,18 @@ class Benchmark:
     def check_starts(self, num_worlds: int = 4) -> None:
         """Samples the starts of all episodes, and raises ValueError unless they are equal to the stored ones bit for bit."""
         self.check_files()
-        stored = {episode.number: episode for episode in Dataset(self.folder / STARTS).episodes}
+        stored: Mapping[int, Any] = {}
+        if self._digests is not None:
+            stored = {int(number): digests for number, digests in self._digests.items()}
+        else:
+            stored = {episode.number: episode for episode in Dataset(self.folder / STARTS).episodes}
         if missing := set(self.episodes) - stored.keys():
             raise ValueError(f"benchmark '{self.folder}': it has no start of episode {min(missing)}")
-        small = {"width": 16, "height": 16, "samples": 1, "shadow_samples": 1, "depth": False, "segmentation": False}
-        options = {name: value for name, value in self.recipe.items() if name not in ("task", "terminate_upon_success")}
-        env = make_vec(self.recipe["task"], **{**options, **small}, num_envs=min(num_worlds, len(self.episodes)))
+        compare = _difference if self._digests is None else _difference_of_digests
+        env = make_vec(**_env_options(self.recipe, min(num_worlds, len(self.episodes))))
         try:
             for world, number in _started(env, self.episodes):
-                if difference := _difference(env, world, stored[number]):
+                if difference := compare(env, world, stored[number]):
                     raise ValueError(
                         f"benchmark '{self.folder}': episode {number} does not start as when the benchmark was made: {difference}. It was "
                         f"made by mjsense {self.version}, and this is {_core.__version__}."  # pyright: ignore[reportAttributeAccessIssue]
@@ -191,8 +211,48 @@ def _leaves(obs: Mapping[str, Any]) -> Iterator[Any]:
         yield from _leaves(value) if isinstance(value, Mapping) else (value,)
 
 
-def _env_options(recipe: dict[str, Any]) -> dict[str, Any]:
-    return {**{name: value for name, value in recipe.items() if name != "terminate_upon_success"}, "num_envs": 1}
+def _env_options(recipe: dict[str, Any], num_envs: int = 1) -> dict[str, Any]:
+    small = {"width": 16, "height": 16, "samples": 1, "shadow_samples": 1, "depth": False, "segmentation": False}
+    options = {name: value for name, value in recipe.items() if name != "terminate_upon_success"}
+    return {**options, **small, "num_envs": num_envs}
+
+
+def digests_of(benchmark: Benchmark, num_worlds: int = 4) -> dict[str, Any]:
+    """Contents of ``benchmark.json`` with checksums of the starts instead of their recording."""
+    env = make_vec(**_env_options(benchmark.recipe, num_worlds))
+    try:
+        digests = {str(number): _digests(env, world) for world, number in _started(env, benchmark.episodes)}
+    finally:
+        env.close()
+    table = {
+        "format": _FORMAT,
+        "version": benchmark.version,
+        "recipe": benchmark.recipe,
+        "episodes": benchmark.episodes,
+        "digests": digests,
+    }
+    return {**table, "checksum": _checksum(table)}
+
+
+def _digests(env: TaskVectorEnv, world: int) -> dict[str, str]:
+    """Checksums of what an episode starts with: what the task says of it, the state, and the model."""
+    model = env.sim.model_of(world)
+    arrays = [(name, getattr(model, name)) for name in sorted(dir(model)) if not name.startswith("_")]
+    contents = {
+        "episode": [json.dumps(json.loads(env._rollout.obs_scene(world)), sort_keys=True).encode()],
+        "state": [env.sim.state[world].tobytes()],
+        "model": [part for name, value in arrays if isinstance(value, np.ndarray) for part in (name.encode(), value.tobytes())],
+    }
+    return {name: hashlib.sha256(b"".join(parts)).hexdigest()[:16] for name, parts in contents.items()}
+
+
+def _difference_of_digests(env: TaskVectorEnv, world: int, stored: Any) -> str:
+    """The first part whose checksum is not the stored one; empty: none."""
+    now = _digests(env, world)
+    return next(
+        (f"the checksum of its {name} differs" for name in now if not isinstance(stored, dict) or stored.get(name) != now[name]),
+        "",
+    )
 
 
 def _started(env: TaskVectorEnv, numbers: list[int]) -> Iterator[tuple[int, int]]:

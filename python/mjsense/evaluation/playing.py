@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from mjsense import _core
 from mjsense.core.arguments import Seed, checked
-from mjsense.evaluation.benchmarks import Benchmark, is_folder
+from mjsense.evaluation.benchmarks import Benchmark, is_benchmark
 from mjsense.evaluation.facts import FILE
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.replayed import ReplayedPolicy
@@ -92,8 +92,8 @@ def evaluate(
     function of its observations. An interrupted evaluation continues with ``resume=True``.
 
     Args:
-        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or the folder of a benchmark, which fixes all options that
-            affect the data.
+        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or a benchmark, which fixes all options that affect the
+            data: its folder, or ``benchmark:pick`` and similar, which the package contains.
         robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
         policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function ``obs -> actions``, or
             a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``python:MODULE:CLASS`` or ``FILE.py:CLASS``.
@@ -194,7 +194,7 @@ def play(
     """
     require_parquet()
     out, spec = Path(options["out"]), policy if isinstance(policy, str) else None
-    benchmark = Benchmark(options["task"]) if is_folder(options["task"]) else None
+    benchmark = Benchmark(options["task"]) if is_benchmark(options["task"]) else None
     numbers: int | Sequence[int] = options.pop("episodes", 50)
     if benchmark is not None:
         options, numbers = benchmark.options(options), benchmark.episodes

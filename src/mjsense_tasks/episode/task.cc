@@ -191,6 +191,7 @@ std::string Task::obs_scene(int world) const {
   scene["task_description"] = description(world);
   if (cfg_.instructions == Instructions::kVaried) scene["instruction"] = instruction(world);
   scene["policy_dt_ms"] = cfg_.policy_dt_ms;
+  if (const std::string name = light(world); !name.empty()) scene["light"] = name;
   auto& expressions = scene["referral_expressions"] = nlohmann::ordered_json::object();
   for (const auto& [role, referrals] : referrals(world)) {
     auto& list = expressions[role] = nlohmann::ordered_json::array();

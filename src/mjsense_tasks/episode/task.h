@@ -205,6 +205,8 @@ class Task {
   // in this world's episode. Absent bodies are held far away.
   virtual std::vector<int> absentees() const { return {}; }
   virtual bool present(int /*world*/, int /*body*/) const { return true; }
+  // Name of the light of the world's episode, stored in obs_scene(); empty if it does not vary.
+  virtual std::string light(int /*world*/) const { return {}; }
   using Referrals = std::vector<std::pair<std::string, std::vector<Referral>>>;  // by role
   virtual Referrals referrals(int world) const = 0;
   // Pose of the object with this role at the first observation, and its goal pose. Both throw

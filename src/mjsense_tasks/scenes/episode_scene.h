@@ -104,6 +104,8 @@ class EpisodeScene {
   // Varies lights, colours, furniture and object sizes; call it before sample(). Returns false if
   // nothing varies.
   bool vary(int world, std::uint64_t seed, std::uint64_t episode);
+  // Name of the mood of an episode's lights and colours; empty if the scene has none.
+  std::string mood(std::uint64_t seed, std::uint64_t episode) const;
   // Displacements (world frame) between which the random placement of furniture can move this geom,
   // itself or with a parent body. Empty if it does not move.
   std::vector<Pose> elsewhere(int geom) const;

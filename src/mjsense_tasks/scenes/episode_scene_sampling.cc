@@ -129,9 +129,19 @@ void EpisodeScene::set_target(int world, int target, const robots::StateRow& sta
     support_[world] = std::min(support_[world], (pose * point).z);
 }
 
+namespace {
+Rng look_rng(std::uint64_t seed, std::uint64_t episode) {
+  return {seed, 0, stream_of("scene/look"), episode};
+}
+}  // namespace
+
+std::string EpisodeScene::mood(std::uint64_t seed, std::uint64_t episode) const {
+  return variation_ ? variation_->mood(look_rng(seed, episode)) : std::string();
+}
+
 bool EpisodeScene::vary(int world, std::uint64_t seed, std::uint64_t episode) {
   if (variation_) {
-    Rng rng(seed, 0, stream_of("scene/look"), episode);
+    Rng rng = look_rng(seed, episode);
     variation_->vary(world, rng);
   }
   draw_sizes(world, seed, episode);

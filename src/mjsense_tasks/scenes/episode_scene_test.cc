@@ -387,6 +387,7 @@ TEST(EpisodeScene, AnEpisodeHasOneMoodWhoseTintsMultiplyTheOtherColours) {
     const float* top = row("mat_rgba", 4 * m->nmat, 4 * material);
     const bool dark = diffuse[0] == 0;
     seen.insert(dark);
+    EXPECT_EQ(played.scene.mood(3, episode), dark ? "dark" : "bright");
     for (int i = 0; i < 3; ++i) {
       const float factor = dark ? 0.0f : 2.0f * std::array{1.0f, .5f, .25f}[i];
       EXPECT_FLOAT_EQ(diffuse[i], factor * m->light_diffuse[3 * light + i]);

@@ -30,6 +30,10 @@ void SceneTask::vary_scene(int world) {
     simulation->worlds().model_changed();
 }
 
+std::string SceneTask::light(int world) const {
+  return scene_.mood(cfg().seed, static_cast<std::uint64_t>(episode(world)));
+}
+
 mjModel SceneTask::world_model(int world) const {
   const std::shared_ptr<sim::Simulation> simulation = simulation_.lock();
   return simulation ? simulation->worlds().model_of(world) : *model();

@@ -18,6 +18,7 @@ class SceneTask : public episode::Task {
   scene::SceneCfg scene_cfg() const override { return scene_.scene_cfg(robot_entity()); }
   void bind(const std::shared_ptr<sim::Simulation>& simulation) override;
   std::string start_error(const World& world) const override { return scene_.fault(world); }
+  std::string light(int world) const override;
   std::vector<int> absentees() const override { return scene_.absentees(); }
   bool present(int world, int body) const override { return scene_.body_present(world, body); }
 

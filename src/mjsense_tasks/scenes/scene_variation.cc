@@ -69,7 +69,8 @@ SceneVariation::SceneVariation(const SceneFileCfg& cfg, sim::Simulation& simulat
     : model_(simulation.model()) {
   mjBatch* batch = simulation.worlds().batch();
   for (const SceneMoodCfg& mood : cfg.moods)
-    moods_.push_back(parts_of(mood.vary, batch, fmt::format("{}, mood '{}'", context, mood.name)));
+    moods_.push_back(
+        {mood.name, parts_of(mood.vary, batch, fmt::format("{}, mood '{}'", context, mood.name))});
   parts_ = parts_of(cfg.vary, batch, std::string(context));
 }
 
@@ -186,11 +187,18 @@ void SceneVariation::apply(const Part& part, int world, Rng& rng) const {
   }
 }
 
+const SceneVariation::Mood& SceneVariation::drawn_mood(Rng& rng) const {
+  return moods_[rng.below(static_cast<std::uint32_t>(moods_.size()))];
+}
+
+std::string SceneVariation::mood(Rng rng) const {
+  return moods_.empty() ? std::string() : drawn_mood(rng).name;
+}
+
 void SceneVariation::vary(int world, Rng& rng) const {
   reset(world);
   if (!moods_.empty()) {
-    for (const Part& part : moods_[rng.below(static_cast<std::uint32_t>(moods_.size()))])
-      apply(part, world, rng);
+    for (const Part& part : drawn_mood(rng).parts) apply(part, world, rng);
   }
   for (const Part& part : parts_) apply(part, world, rng);
 }

@@ -4,6 +4,7 @@
 // world's own model fields, so that no recompilation is needed.
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "mjsense/core/rng.h"
@@ -23,12 +24,19 @@ class SceneVariation {
   const double* body_pos(int world) const;
   // Writes this world's rows of the model. Call Worlds::model_changed() and forward() afterwards.
   void vary(int world, Rng& rng) const;
+  // Name of the mood that vary() applies for the same random numbers; empty without moods.
+  std::string mood(Rng rng) const;
 
  private:
   struct Part {
     SceneVaryCfg cfg;
     std::vector<int> ids, textures;
   };
+  struct Mood {
+    std::string name;
+    std::vector<Part> parts;
+  };
+  const Mood& drawn_mood(Rng& rng) const;
   std::vector<Part> parts_of(const std::vector<SceneVaryCfg>& cfg, mjBatch* batch,
                              const std::string& context);
   // Gives this world's rows the model's values, except those of bodies.
@@ -38,7 +46,7 @@ class SceneVariation {
   void move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const;
 
   std::vector<Part> parts_;
-  std::vector<std::vector<Part>> moods_;
+  std::vector<Mood> moods_;
   const mjModel* model_;
   // Fields that do not vary are empty.
   WorldField<double> light_pos_, light_dir_, body_pos_, body_quat_;

@@ -47,6 +47,7 @@ class MultiTask : public episode::Task {
   std::string description(int world) const override;  // the children's, joined by " OR "
   std::vector<int> absentees() const override { return children_[0]->absentees(); }
   bool present(int world, int body) const override { return children_[0]->present(world, body); }
+  std::string light(int world) const override { return children_[0]->light(world); }
   Referrals referrals(int world) const override;
   Pose start_pose(int world, std::string_view role) const override;
   std::optional<Pose> goal_pose(int world, std::string_view role) const override;
