@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +12,7 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE
 
 from lerobot_env_mjsense.environments import PIXELS, LeRobotVectorEnv, key_of
-from mjsense.evaluation import Benchmark
+from mjsense.evaluation.benchmarks import Benchmark, is_benchmark
 from mjsense.evaluation.lerobot_features import IMAGES
 
 _ID = "mjsense/lerobot-v0"
@@ -27,7 +26,7 @@ class MjsenseEnvConfig(EnvConfig):
     """A task of mjsense. None and empty texts stand for mjsense's defaults."""
 
     task: str | None = "pick"
-    """Name of the task, or the folder of a benchmark (with a slash), which fixes all other options but ``map``."""
+    """Name of the task, or a benchmark, which fixes all other options but ``map``: its folder, or ``benchmark:pick`` and similar."""
     robot: str = ""
     scene: str = ""
     split: str = ""
@@ -48,8 +47,8 @@ class MjsenseEnvConfig(EnvConfig):
 
     def __post_init__(self) -> None:
         benchmark = None
-        if self.task and os.sep in self.task:
-            benchmark = Benchmark(self.task)
+        if is_benchmark(self.task):
+            benchmark = Benchmark(str(self.task))
             benchmark.check_starts()
             self.episodes = self.episodes or benchmark.episodes
         self._options = self._given() if benchmark is None else dict(benchmark.recipe)

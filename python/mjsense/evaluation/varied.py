@@ -13,7 +13,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.errors import did_you_mean, printable
-from mjsense.evaluation.benchmarks import Benchmark, is_folder
+from mjsense.evaluation.benchmarks import Benchmark, is_benchmark
 from mjsense.evaluation.comparison import Comparison
 from mjsense.evaluation.playing import play
 from mjsense.evaluation.report import Results
@@ -89,7 +89,7 @@ def sensitivity(vary: Iterable[str], **options: Any) -> Sensitivity:
 def play_varied(options: dict[str, Any], policy: Any, vary: list[str], **arguments: Any) -> Sensitivity:
     """See :func:`sensitivity`; the other arguments are those of :func:`mjsense.evaluation.playing.play`."""
     out = Path(options["out"])
-    benchmark = Benchmark(options["task"]) if is_folder(options["task"]) else None
+    benchmark = Benchmark(options["task"]) if is_benchmark(options["task"]) else None
     if benchmark is not None:
         benchmark.check_starts(int(options.get("num_worlds", 4)))
         options = {**benchmark.options(options), "episodes": benchmark.episodes}
