@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -155,22 +156,38 @@ class TestExport:
             export_on_ray(index, ours, format=format)
 
 
-def test_killed_workers(alone, tmp_path):
-    """Workers that are killed at random times lose nothing and add nothing."""
+@contextmanager
+def killed_workers(count):
+    """Kills workers at random times. The value is the list of those that were killed."""
     generator, ended, kills = random.Random(3), threading.Event(), []
 
     def kill_some():
-        while not ended.wait(generator.uniform(0.2, 0.8)) and len(kills) < 8:
+        while not ended.wait(generator.uniform(0.2, 0.8)) and len(kills) < count:
             kills.extend(pid for pid in workers_of(os.getpid())[:1] if kill(pid))
 
     thread = threading.Thread(target=kill_some)
     thread.start()
     try:
-        assert record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=EPISODES, shard_attempts=ATTEMPTS).enough
+        yield kills
     finally:
         ended.set()
         thread.join()
+
+
+def test_killed_workers(alone, tmp_path):
+    """Workers that are killed at random times lose nothing and add nothing."""
+    with killed_workers(8) as kills:
+        assert record_on_ray(Job(str(tmp_path / "out"), ARGUMENTS), episodes=EPISODES, shard_attempts=ATTEMPTS).enough
     assert kills and content(tmp_path / "out") == alone
+
+
+def test_an_evaluation_has_the_same_rows_on_ray(tmp_path):
+    options = {"episodes": [1, 2, 7, 11], "cameras": [], "horizon": 40, "num_worlds": 2, "progress": False}
+    with killed_workers(2) as kills:
+        there = mjs.evaluate("pick", out=tmp_path / "ray", ray="local", **options)
+    here = mjs.evaluate("pick", out=tmp_path / "here", **options)
+    assert len(kills) == 2 and [row.episode for row in here.rows] == [1, 2, 7, 11]
+    assert [repr(row) for row in there.rows] == [repr(row) for row in here.rows]
 
 
 def test_killed_driver(alone, tmp_path):

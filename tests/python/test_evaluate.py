@@ -34,6 +34,7 @@ def test_the_episodes_are_those_of_a_recording_without_noise(planned, tmp_path):
     for one, other in zip(mine, expected, strict=True):
         np.testing.assert_array_equal(one.states, other.states)
     assert [row["success"] for row in rows(results)] == [episode.success for episode in expected]
+    assert all(row["light"] for row in rows(results))
     about = json.loads((out / "evaluation.json").read_text())
     assert about["policy"]["spec"] == "planner" and about["episodes"] == 3
 

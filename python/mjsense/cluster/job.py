@@ -45,7 +45,7 @@ _FREE = _OF_RECORD | {
 
 @dataclass(frozen=True)
 class Shard:
-    """The attempts ``first`` to ``first + count - 1`` of a job."""
+    """The attempts ``first`` to ``first + count - 1`` of a job; of a job with a list of attempts, those at these positions."""
 
     number: int
     first: int
@@ -113,6 +113,8 @@ class Job:
     """Output directory: a path, or a URL of a file system that fsspec knows, such as ``s3://bucket/data``."""
     arguments: dict[str, Any]
     """Keyword arguments of :func:`mjsense.record`."""
+    attempts: tuple[int, ...] = ()
+    """Numbers of the attempts, in ascending order, instead of those from 0 on."""
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides which episodes the job contains, as JSON values."""
@@ -121,7 +123,10 @@ class Job:
         check_names(options.keys() - _OF_RECORD)
         code = parts_of(options, sensors)[4]
         decided = {name: value for name, value in options.items() if name not in _FREE}
-        return json.loads(json.dumps({"version": _core.__version__, "options": decided, "code": code}, default=str))  # pyright: ignore[reportAttributeAccessIssue]
+        found = {"version": _core.__version__, "options": decided, "code": code}  # pyright: ignore[reportAttributeAccessIssue]
+        if self.attempts:
+            found["attempts"] = self.attempts
+        return json.loads(json.dumps(found, default=str))
 
     def fingerprint(self) -> str:
         """Checksum of the settings."""
@@ -129,12 +134,16 @@ class Job:
 
     def about(self, shard: Shard) -> str:
         """What the shard contains, for messages."""
-        return f"attempts {shard.first} to {shard.first + shard.count - 1}"
+        played = self.attempts[shard.first :][: shard.count] or (shard.first, shard.first + shard.count - 1)
+        return f"attempts {played[0]} to {played[-1]}"
 
     def record(self, folder: Path, shard: Shard) -> dict[str, Any]:
         """Records the shard's attempts into an empty local folder. Returns the summary as ``mjsense record --json`` prints it."""
         options = {name: value for name, value in self.arguments.items() if name not in _OF_RECORD}
-        options = {"threads": 1, **options, "out": folder, "first_attempt": shard.first, "num_attempts": shard.count}
+        played: dict[str, Any] = {"first_attempt": shard.first, "num_attempts": shard.count}
+        if self.attempts:
+            played = {"attempts": self.attempts[shard.first :][: shard.count]}
+        options = {"threads": 1, **options, "out": folder, **played}
         summary = record_here(options, self.arguments.get("sensors", ()), progress=False)
         return {name: getattr(summary, name) for name in ("succeeded", "failed", "steps", "failures")}
 

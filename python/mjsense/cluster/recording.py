@@ -19,7 +19,12 @@ def record_from_options(
 ) -> RecordSummary:
     """``mjsense.record(..., ray=address)``."""
     own = {name: options.pop(name) for name in ("out", "episodes", "max_attempts", "resume")}
-    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts", "attempts"):
+    attempts = tuple(options.pop("attempts"))
+    if attempts:
+        if not options["keep_failures"]:
+            raise ValueError("record: attempts can be combined with ray only with keep_failures=True")
+        own["episodes"] = own["max_attempts"] = len(attempts)
+    for name in ("shard", "append", "overwrite", "first_attempt", "num_attempts"):
         del options[name]
     if not options["threads"]:
         del options["threads"]  # one per worker
@@ -47,7 +52,7 @@ def record_from_options(
             line.show(of_recording(about))
 
     made = record_on_ray(
-        Job(str(own["out"]), options),
+        Job(str(own["out"]), options, attempts),
         episodes=own["episodes"],
         max_attempts=own["max_attempts"],
         resume=own["resume"],

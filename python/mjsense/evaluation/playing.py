@@ -163,7 +163,7 @@ def evaluate(
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
         Others:
         sensors: Additional sensors, as in :func:`mjsense.record`.
-        ray: ``local``, ``auto`` or the address of a Ray cluster, as in :func:`mjsense.record`. ``episodes`` must be a number.
+        ray: ``local``, ``auto`` or the address of a Ray cluster, as in :func:`mjsense.record`.
         progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
             True where stderr is a terminal or a notebook.
     """
@@ -243,8 +243,6 @@ def _attempts(numbers: int | Sequence[int], ray: str | None) -> dict[str, Any]:
     listed = sorted(checked_episodes("evaluate", numbers))
     if listed == list(range(len(listed))):
         return _attempts(len(listed), ray)
-    if ray is not None:
-        raise ValueError("evaluate: on Ray, episodes must be a number: those from 0 on are played")
     return {"attempts": listed}
 
 

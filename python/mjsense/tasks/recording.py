@@ -187,7 +187,6 @@ def record(
                 "overwrite",
                 "first_attempt",
                 "num_attempts",
-                "attempts",
                 "map",
                 "trim_idle",
                 "keep_recording",
