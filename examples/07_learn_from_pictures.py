@@ -333,7 +333,7 @@ class Follower:
         plans.appendleft((targets, close))
         move = np.mean([difference(tool, poses[age]) for age, (poses, _) in enumerate(plans)], 0)
         shut = np.mean([shares[age] for age, (_, shares) in enumerate(plans)]) > 0.5
-        return np.append(np.clip(move, -LIMITS, LIMITS), CLOSED if shut else 0)
+        return np.append(np.clip(move, -LIMITS, LIMITS), CLOSED if shut else 0).astype(np.float32)
 
 
 def loaded(path):

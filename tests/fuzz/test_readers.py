@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-for module in ("hypothesis", "av", "pyarrow", "viser"):
+for module in ("hypothesis", "av", "pyarrow", "viser", "msgpack"):
     pytest.importorskip(module)
 sys.path.insert(0, str(Path(__file__).parent))
 import untrusted_readers as readers

@@ -32,6 +32,7 @@ from mjsense.core.errors import UnknownNameError
 from mjsense.dataset import archive, bounded_json, closed_model, import_lerobot, index, json_rows
 from mjsense.dataset.description import Description
 from mjsense.dataset.hdf5 import Group, open_h5
+from mjsense.evaluation.remote import messages
 
 SECONDS = 5  # of CPU time for one input
 _CLEAR = (ValueError, UnknownNameError, OSError, RuntimeError)
@@ -347,6 +348,17 @@ def read_messages(message: Any, folder: Path) -> None:
     checked = Messages(*_page())(raw)
     if checked is not None:
         assert all(abs(container[key]) < 1e10 for container, key in _places(msgspec.msgpack.decode(checked)) if isinstance(container[key], float))
+
+
+_ANSWER = {"actions": np.zeros((3, 8)), "state": {"flag": np.array([True]), "n": np.float32(0.5)}, "list": [1, -2.5, "x", None], "empty": np.zeros((0, 3), np.uint8)}
+_PACKED = [messages.pack(_ANSWER, arrays) for arrays in ("openpi", "msgpack_numpy")]
+
+
+@_reader(st.sampled_from(_PACKED).flatmap(changed_bytes) | st.binary(max_size=60))
+def read_policy_messages(message: bytes, folder: Path) -> None:
+    found = messages.unpack(message).value
+    for value in found.values() if isinstance(found, dict) else ():
+        assert not isinstance(value, np.ndarray) or (value.dtype.kind in "biuf" and value.nbytes <= len(message))
 
 
 # ------------------------------------------------------------------------------------------------------------------- runs

@@ -287,6 +287,8 @@ def test_help_describes_flags(mjsense):
 @pytest.mark.parametrize("words, expected", (
     (["re"], ["record", "repair", "replay", "render", "results"]),
     (["record", "door"], ["door_opening"]),
+    (["serve", "net.py:Net", "--task", "pi"], ["pick", "pick_and_place", "pick_and_place_next_to", "pick_and_place_color"]),
+    (["evaluate", "--adapter", ""], ["droid", "features", "streams"]),
     (["record", "--robot", "fra"], ["franka", "franka_hand"]),
     (["record", "--meshes", ""], ["auto", "shapes", "real"]),
     (["scan", "--ray-alignment", ""], ["base", "yaw", "world"]),

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from mjsense.commands._policy import add_policy_options, policy_options
 from mjsense.commands._ray import add_ray
 from mjsense.commands.parser import Parser, add_name, complete, field_values
 
@@ -31,7 +32,7 @@ _NOT_OFFERED = (
     "shard",
     "terminate_upon_success",
 )
-_POLICIES = "planner, random, replay:DIR, lerobot:DIR, python:MODULE:CLASS, FILE.py:CLASS"
+_POLICIES = "planner, random, replay:DIR, lerobot:DIR, python:MODULE:CLASS, FILE.py:CLASS, ws://HOST:PORT"
 
 
 def add_arguments(parser: Parser) -> None:
@@ -48,14 +49,13 @@ def add_arguments(parser: Parser) -> None:
         "--policy", default="planner", metavar="TEXT", help=f"The policy: {_POLICIES}, or the name of another one."
     )
     setattr(complete(action, ("planner", "random")), "shown_default", "planner")  # noqa: B010  # argparse declares no such attribute
-    parser.add_argument(
-        "--policy-option",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        dest="policy_options",
-        help="An argument of the policy's class. May be repeated.",
+    add_policy_options(parser)
+    action = parser.add_argument(
+        "--adapter",
+        metavar="TEXT",
+        help="Names and conventions of the messages to ws://HOST:PORT: droid, features, or a TOML file. Not needed if the server is mjsense serve.",
     )
+    complete(action, ("droid", "features", "streams"))
     parser.add_argument(
         "--episodes",
         metavar="N",
@@ -114,6 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.numbers is not None:
         options["episodes"] = _episodes(arguments.numbers)
     options.pop("policy")
+    adapter = {} if arguments.adapter is None else {"adapter": arguments.adapter}
     line = None if arguments.quiet else ProgressLine()
 
     def show(now: RecordProgress) -> None:
@@ -121,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
             line.show(of_recording(now), now.succeeded + now.failed)
 
     given: dict[str, Any] = {
-        "policy_options": dict(map(_option, arguments.policy_options)),
+        "policy_options": policy_options(arguments.policy_options) | adapter,
         "execution_horizon": arguments.execution_horizon,
         "ensemble": arguments.ensemble,
         "latency": "measured" if arguments.latency == "measured" else _seconds(arguments.latency),
@@ -163,16 +164,3 @@ def _seconds(text: str) -> float:
         return float(text)
     except ValueError:
         raise ValueError(f"--latency is '{text}': must be seconds, or measured") from None
-
-
-def _option(text: str) -> tuple[str, Any]:
-    """``NAME=VALUE``; the value is a number, true or false, or a text."""
-    import tomllib
-
-    name, equals, value = text.partition("=")
-    if not equals or not name:
-        raise ValueError(f"--policy-option {text}: expected NAME=VALUE")
-    try:
-        return name, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return name, value

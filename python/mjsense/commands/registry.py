@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "record": "Record episodes of a task.",
     "evaluate": "Evaluate a policy: play episodes, record them, count successes.",
+    "serve": "Offer a policy to programs that speak openpi's protocol.",
     "benchmark": "Fix the episodes of an evaluation in a folder, or check them.",
     "sensors": "List the sensors of a scene or task: shapes, units, frames and cost.",
     "scan": "Write the point cloud that a lidar measures in a scene.",

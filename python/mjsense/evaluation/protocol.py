@@ -40,7 +40,7 @@ class BatchedPolicy(Policy):
     def act(self, obs: dict[str, Any]) -> np.ndarray:
         worlds = np.flatnonzero(self.wanted)
         given = {**_rows(obs, worlds), "world_ids": worlds, "instructions": [self.instructions[world] for world in worlds]}
-        actions = _array(self.model.act(given))
+        actions = as_numbers(self.model.act(given))
         n = len(self.action_low)
         if actions.ndim not in (2, 3) or actions.shape[0] != len(worlds) or actions.shape[-1] != n or 0 in actions.shape:
             groups = ", ".join(f"{name} {at.stop - at.start}" for name, at in self.action_groups.items())
@@ -58,7 +58,8 @@ def _rows(obs: Mapping[str, Any], worlds: np.ndarray) -> dict[str, Any]:
     return {name: _rows(value, worlds) if isinstance(value, Mapping) else value[worlds] for name, value in obs.items()}
 
 
-def _array(actions: Any) -> np.ndarray:
+def as_numbers(actions: Any) -> np.ndarray:
+    """Actions that a model returned, as float64."""
     if hasattr(actions, "detach"):
         actions = actions.detach().cpu()
         if str(actions.dtype) == "torch.bfloat16":  # NumPy has no such type
