@@ -28,6 +28,7 @@ class Shot:
     kinds: tuple[Any, ...] = ("rgb",)
     shadows: bool = True
     shading: Literal["classic", "pbr"] = "classic"
+    ambient_occlusion: bool = True
 
 
 class Ours:
@@ -44,6 +45,7 @@ class Ours:
                 data_types=shot.kinds,
                 use_shadows=shot.shadows,
                 shading=shot.shading,
+                ambient_occlusion=shot.ambient_occlusion,
             )
             for i, shot in enumerate(shots)
         ]

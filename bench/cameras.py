@@ -33,22 +33,17 @@ def main() -> None:
     for name in views:
         view = VIEWS[name]
         print(f"{name}: {camera_scenes.describe(camera_scenes.compiled(view.scene))}", file=sys.stderr)
-        shots = [
-            shot
-            for size in sizes
-            for shot in (Shot(size), Shot(size, shadows=False), Shot(size, ("depth",), False), Shot(size, shading="pbr"))
-        ]
+        shots = [shot for size in sizes for shot in (Shot(size), Shot(size, shadows=False), Shot(size, ("depth",), False))]
         ours = Ours(view, shots, WORLDS, threads=1)
         for index, size in enumerate(sizes):
             case = f"{view.label}, {size[0]}x{size[1]}"
-            shadows, plain, depth, physical = (ours.rate(4 * index + kind) for kind in range(4))
+            shadows, plain, depth = (ours.rate(3 * index + kind) for kind in range(3))
             peer = run_peer(None, "classic_cameras", name, *map(str, size))
             unit = "images/CPU s"
             rows += [Row(f"{case}, rgb with shadows", shadows, unit, peer[k], label) for k, label in MAPS.items()]
             rows.append(Row(f"{case}, rgb without shadows", plain, unit, peer["plain"], "classic without shadows"))
             rows.append(Row(f"{case}, depth", depth, unit, peer["depth"], "classic without shadows"))
-            rows.append(Row(f"{case}, physically based rgb with shadows", physical, unit, shadows, "classic shading of mjsense"))
-            for row in rows[-5:]:
+            for row in rows[-4:]:
                 print(f"{row.case}: {row.ours:.1f} against {row.peer:.2f} ({row.peer_name})", file=sys.stderr)
     report("Cameras", rows)
 

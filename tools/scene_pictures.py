@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -95,8 +95,8 @@ def write_jpeg(path: Path, pixels: np.ndarray) -> None:
     )
 
 
-def picture(view: View) -> np.ndarray:
-    """Two episodes side by side, [H, 2 W, 3]."""
+def picture(view: View, num_envs: int = 2, **images: Any) -> np.ndarray:
+    """Episodes side by side, [H, num_envs * W, 3]. `images`: options of images."""
     where = 'mount = "mjcf"\ncamera = "head_camera"\n'
     if view.pos is not None:
         where = f'mount = "fixed"\npos = {list(view.pos)}\ntarget = {list(view.target)}\nfovy = 62\n'
@@ -107,10 +107,10 @@ def picture(view: View) -> np.ndarray:
             view.task,
             view.robot,
             scene=view.scene,
-            num_envs=2,
+            num_envs=num_envs,
             camera_system=str(cameras),
             observations=["view_camera"],
-            samples=4,
+            **{"samples": 4, **images},
             seed=view.seed,
             policy="planner",
         )

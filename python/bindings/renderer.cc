@@ -172,10 +172,12 @@ void bind_renderer(nb::module_& m) {
       .def(nb::init<nb::dict, nb::dict, nb::dict, nb::dict, nb::dict>())
       .def("render", &BoundRenderer::render)
       .def("set_shading",
-           [](BoundRenderer& r, const std::string& word) {
+           [](BoundRenderer& r, const std::string& word, const std::string& environment) {
              sensors::RgbCfg cfg;
              cfg.shading = from_word<sensors::Shading>(word, "Renderer", "shading");
-             r.renderer.set_physical(sensors::physical_options(cfg));
+             cfg.environment = environment;
+             r.renderer.check_indices();
+             r.renderer.set_physical(sensors::physical_options(cfg, r.renderer.model()));
            })
       .def("check_indices", [](const BoundRenderer& r) { r.renderer.check_indices(); })
       .def("reload",

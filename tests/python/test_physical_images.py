@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images with shading="pbr": the same bits for any number of threads and worlds, other outputs as with classic shading, bad options."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -79,18 +81,59 @@ def test_exposure_halves_light() -> None:
     np.testing.assert_allclose(dark[shown] / bright[shown], 0.5, atol=0.03)
 
 
+def test_surroundings_light_colour_and_turn(tmp_path: Path) -> None:
+    pixels = np.full((8, 16, 4), (40, 40, 40, 128), np.uint8)
+    pixels[:, :8] = (200, 20, 20, 130)  # red towards +y
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n" + pixels.tobytes())
+
+    def seen(**options: object) -> np.ndarray:
+        return images(1, 1, 1, ("rgb",), shading="pbr", **options)["rgb"][0].astype(int)
+
+    model = seen()
+    np.testing.assert_array_equal(seen(environment="studio"), model)  # without an image light
+    np.testing.assert_array_equal(seen(environment="auto"), model)  # nor a skybox
+    red, turned = seen(environment=str(path)), seen(environment=str(path), environment_rotation=180)
+    top = np.s_[:4]  # the background: the camera looks along +y
+    assert (red[top, :, 0] > red[top, :, 2] + 50).all()
+    assert (turned[top, :, 0] < turned[top, :, 2] + 10).all()
+    np.testing.assert_array_equal(seen(environment=str(path), environment_rotation=360), red)
+    warm, cold = (seen(white_balance=kelvin).mean((0, 1)) for kelvin in (10000, 3500))
+    assert warm[0] / warm[2] > 1.2 > 0.8 > cold[0] / cold[2]
+
+
+def test_hdr_is_the_radiance_of_the_image() -> None:
+    """Exposure 8 shows 1.2 * 2^8 cd/m^2 as white. The radiance does not depend on how it is shown, and the colours not on hdr."""
+    options = {"shading": "pbr", "tone_mapping": "linear", "samples": 4}
+    both = images(2, 1, 2, ("rgb", "hdr"), **options)
+    alone = images(2, 2, 2, ("hdr", "depth"), **options)["hdr"]
+    np.testing.assert_array_equal(alone, both["hdr"])
+    np.testing.assert_array_equal(images(2, 1, 2, ("rgb",), **options)["rgb"], both["rgb"])
+    shown = images(2, 1, 2, ("hdr",), **{**options, "exposure": 12, "tone_mapping": "agx", "white_balance": 4000})["hdr"]
+    np.testing.assert_allclose(shown, alone, rtol=1e-5)
+    radiance = images(1, 1, 1, ("rgb", "hdr"), **{**options, "samples": 1})
+    linear = np.clip(radiance["hdr"] / (1.2 * 2**8), 0, 1)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    assert np.abs(255 * encoded - radiance["rgb"]).max() <= 0.6
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"shading": "pbrr"}, "shading is 'pbrr': must be one of classic, pbr"),
         ({"exposure": 99}, "exposure"),
         ({"environment_intensity": -1}, "environment_intensity"),
-        ({"tone_mapping": "aces"}, "must be one of neutral, filmic, linear"),
+        ({"tone_mapping": "aces"}, "must be one of neutral, filmic, linear, agx"),
+        ({"white_balance": 1000}, "white_balance"),
+        ({"shading": "pbr", "environment": "studo"}, "environment: no surroundings named 'studo'; did you mean 'studio'"),
+        ({"shading": "pbr", "environment": "skybox"}, "the model has no skybox texture"),
+        ({"shading": "pbr", "environment": "x.exr"}, "only Radiance pictures"),
+        ({"shading": "pbr", "environment": "none.hdr"}, "environment 'none.hdr': no such file"),
         ({"shading": "pbr", "renderer": "opengl"}, "classic shading only"),
     ],
 )
 def test_bad_options(options: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((ValueError, KeyError), match=message):
         images(1, 1, moves=1, kinds=("rgb",), **options)
 
 
@@ -104,6 +147,10 @@ def test_renderer_has_the_shading_of_cameras() -> None:
         renderer.shading = "pbr"
         physical = renderer.render().copy()
         assert np.mean(classic != physical) > 0.5
+        renderer.environment = "auto"  # there is neither an image light nor a skybox
+        np.testing.assert_array_equal(renderer.render(), physical)
+        with pytest.raises(KeyError, match="did you mean 'studio'"):
+            renderer.environment = "stdio"
         with pytest.raises(ValueError, match="must be one of classic, pbr"):
             renderer.shading = "path"
         renderer.shading = "classic"

@@ -70,12 +70,24 @@ CASES = [  # field, where, value, part of the XML, in which this becomes that
     ("cam_intrinsic", CHIP, (0.002, 0.0025, 0.0002, 0.0001), "chip",
      'focal=".003 .003" principal="0 0"', 'focal=".002 .0025" principal=".0002 .0001"'),
 ]  # fmt: skip
+PHYSICAL = [
+    ("light_diffuse", 0, (1, 0.2, 0.2), "light", "pos", 'diffuse="1 .2 .2" pos'),
+    ("light_intensity", 0, 2000, "light", "pos", 'intensity="2000" pos'),
+    ("light_type", 0, mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, "light", "spot", "directional"),
+    ("mat_rgba", 0, (0.5, 0.5, 1, 1), "material", "texture", 'rgba=".5 .5 1 1" texture'),
+    ("mat_emission", 0, 0.6, "material", "texture", 'emission=".6" texture'),
+    ("mat_metallic", 0, 0.9, "material", "texture", 'metallic=".9" texture'),
+    ("mat_roughness", 0, 0.05, "material", "texture", 'roughness=".05" texture'),
+    ("mat_reflectance", 2, 0.6, "floor", "rgba", 'reflectance=".6" rgba'),
+]
 
 
-def simulate(renderer, num_worlds, **changed):
+def simulate(renderer, num_worlds, shading="classic", **changed):
     types = ("rgb", "depth", "segmentation")
     cameras = [
-        mjs.CameraSensorCfg(f"{name}_image", camera_name=name, width=64, height=48, data_types=types, use_shadows=True, renderer=renderer)
+        mjs.CameraSensorCfg(
+            f"{name}_image", camera_name=name, width=64, height=48, data_types=types, use_shadows=True, renderer=renderer, shading=shading
+        )
         for name in ("eye", "chip")
     ]
     scene = mjs.Scene(mjs.SceneCfg(base=XML.format(**{**PARTS, **changed}), sensors=cameras))
@@ -91,10 +103,15 @@ def images(scene, world):
     return [array[world].copy() for name in ("eye_image", "chip_image") for array in scene[name].fields.values()]
 
 
+@pytest.mark.parametrize("field, where, value, part, old, new", PHYSICAL, ids=[f"{c[0]}-{c[5]}" for c in PHYSICAL])
+def test_randomized_world_with_physical_shading(field, where, value, part, old, new):
+    test_randomized_world("rays", field, where, value, part, old, new, "pbr")
+
+
 @pytest.mark.parametrize("renderer", ["rays", "opengl"])
 @pytest.mark.parametrize("field, where, value, part, old, new", CASES, ids=[f"{c[0]}-{c[5]}" for c in CASES])
-def test_randomized_world(renderer, field, where, value, part, old, new):
-    scene, sim = simulate(renderer, 3)
+def test_randomized_world(renderer, field, where, value, part, old, new, shading="classic"):
+    scene, sim = simulate(renderer, 3, shading)
     before = images(scene, 1)
     values = sim.model_field(field).copy()
     values[1][where] = value
@@ -104,7 +121,7 @@ def test_randomized_world(renderer, field, where, value, part, old, new):
     for world in (0, 2):
         assert all(map(np.array_equal, before, images(scene, world))), "another world changed"
     assert old in PARTS[part]
-    compiled, _keep = simulate(renderer, 1, **{part: PARTS[part].replace(old, new)})
+    compiled, _keep = simulate(renderer, 1, shading, **{part: PARTS[part].replace(old, new)})
     for got, want in zip(after, images(compiled, 0), strict=True):
         np.testing.assert_array_equal(got, want)
 

@@ -84,23 +84,50 @@ def test_image_options_are_those_of_cameras_and_of_render():
     assert set(given) <= inspect.signature(mjs.render).parameters.keys()
 
 
-PHYSICAL = ("exposure", "tone_mapping", "environment_intensity", "ambient_occlusion")
+PHYSICAL = ("exposure", "tone_mapping", "white_balance", "environment", "environment_intensity", "environment_rotation", "ambient_occlusion")
+VALUES = {"shading": "pbr", "tone_mapping": "agx", "environment": "auto", "white_balance": 4000}
+
+
+def write_sky(path):
+    """Surroundings with a bright quarter."""
+    pixels = np.full((8, 16, 4), (60, 70, 90, 128), np.uint8)
+    pixels[:4, :4] = (255, 240, 200, 131)
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n" + pixels.tobytes())
+    return str(path)
 
 
 @pytest.mark.parametrize("option", render_cameras.image_options())
 def test_every_image_option_is_kept(option, tmp_path):
     default = render_cameras.recorded_images({})[option]
-    value = {"shading": "pbr", "tone_mapping": "linear"}.get(option, not default if isinstance(default, bool) else 4)
+    value = VALUES.get(option, not default if isinstance(default, bool) else 4)
     made, physical = {}, {"shading": "pbr"} if option in PHYSICAL else {}
+    given = {"environment": write_sky(tmp_path / "sky.hdr")} if option == "environment_rotation" else {}
+    physical |= given
     for name, given in (("usual", physical), ("data", {**physical, option: value})):
         mjs.record("pick", out=tmp_path / name, **{**RECORDING, "episodes": 1, "horizon": 3, **given})
         made[name] = videos(tmp_path / name)
     assert made["data"] != made["usual"]
-    mjs.render(tmp_path / "data", tmp_path / "same", copy=False)
+    mjs.render(tmp_path / "data", tmp_path / "same", copy=False, **given)
     assert videos(tmp_path / "same") == made["data"]
     assert mjs.Dataset(tmp_path / "same").episodes[0].settings[option] == value
-    mjs.render(tmp_path / "data", tmp_path / "back", **{option: default})
+    mjs.render(tmp_path / "data", tmp_path / "back", **{**given, option: default})
     assert videos(tmp_path / "back") == made["usual"]
+
+
+def test_a_file_that_a_recording_names_is_not_opened(tmp_path):
+    path = tmp_path / "sky.hdr"
+    sky = write_sky(path)
+    options = {**RECORDING, "episodes": 1, "horizon": 3, "shading": "pbr"}
+    mjs.record("pick", out=tmp_path / "data", environment=sky, **options)
+    assert mjs.Dataset(tmp_path / "data").episodes[0].settings["environment"] == sky
+    with pytest.raises(ValueError, match="the recording names a file, and files are not taken from a recording"):
+        mjs.render(tmp_path / "data", tmp_path / "out", copy=False)
+    mjs.render(tmp_path / "data", tmp_path / "classic", copy=False, shading="classic")
+    report = mjs.check_replay(tmp_path / "data", states=True)
+    assert report and "environment" in str([episode.sensors.not_computed for episode in report.episodes])
+    path.write_bytes(path.read_bytes()[:-1] + b"\x83")
+    with pytest.raises(ValueError, match="environment_file"):
+        mjs.record("pick", out=tmp_path / "data", environment=sky, **options, resume=True)
 
 
 def test_options_of_files_are_as_recorded_unless_they_are_given(recorded, tmp_path):

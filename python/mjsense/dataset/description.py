@@ -42,7 +42,7 @@ _PROVENANCE = (
 # A name of something that mjsense contains; a path has a dot, or begins with a slash.
 _KNOWN_THING = re.compile(r"[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*(@[a-z]+)?(:[0-9]{1,9})?")
 _OF_RECORD = "terminate_upon_success"  # a setting that mjs.record always writes
-_THINGS = ("task", "robot", "scene", "arm_controller", "camera_system")
+_THINGS = ("task", "robot", "scene", "arm_controller", "camera_system", "environment")
 
 Check = Callable[[Any], bool]
 
@@ -74,10 +74,12 @@ _BOOL: tuple[Check, str] = (lambda v: isinstance(v, bool), "true or false")
 
 
 def _declared(option: dict[str, Any]) -> tuple[Check, str]:
-    """The rule of an option that is a number, a word, or true or false, from its declaration."""
+    """The rule of an option that is a number, a word, a text, or true or false, from its declaration."""
     kind, low, high = option["type"]["kind"], option.get("low", -1e300), option.get("high", 1e300)
     if kind == "bool":
         return _BOOL
+    if kind == "text":
+        return _TEXT
     if kind == "word":
         words: list[str] = option["type"]["words"]
         return (lambda v: isinstance(v, str) and v in words), f"one of {', '.join(words)}"
@@ -209,7 +211,7 @@ def image_size(width: Any, height: Any, what: str) -> tuple[int, int]:
 
 
 def is_known_thing(name: Any) -> bool:
-    """Whether a setting names a task, robot, scene, controller or camera system that mjsense contains, or may contain, and not a file."""
+    """Whether a setting names a task, robot, scene, controller, camera system or surroundings that mjsense contains, or may contain, and not a file."""
     return name is None or (isinstance(name, str) and (not name or _KNOWN_THING.fullmatch(name) is not None))
 
 

@@ -15,7 +15,7 @@ from mjsense.core import mujoco_names
 from mjsense.core.declared_fields import declared_fields
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.rotations import quaternions_of
-from mjsense.dataset.description import is_known_thing
+from mjsense.dataset.description import is_known_thing, printable
 from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.playback import where
 from mjsense.sensors.configs import CameraSensorCfg
@@ -37,9 +37,26 @@ def image_options() -> dict[str, str]:
     return {name: field for name in declared_fields("ImageCfg") for field in (name, f"use_{name}") if field in fields}
 
 
-def recorded_images(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of :func:`image_options` in a recording with these settings. One that is older than an option has its default."""
-    return {name: settings.get(name, declared_fields("ImageCfg")[name]["default"]) for name in image_options()}
+def recorded_images(settings: Mapping[str, Any], given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Values of :func:`image_options`: those of `given` that are not None, otherwise of a recording with these settings. One that is older
+    than an option has its default.
+
+    Raises:
+        ValueError: If the recording names a file as environment and `given` has none.
+    """
+    images = {name: settings.get(name, declared_fields("ImageCfg")[name]["default"]) for name in image_options()}
+    own = {name: given[name] for name in images if given and given.get(name) is not None}
+    if "environment" not in own and shows_file({**images, **own}):
+        raise ValueError(
+            f"environment '{printable(images['environment'][:100])}': the recording names a file, and files are not taken from a recording; "
+            "pass the option environment"
+        )
+    return {**images, **own}
+
+
+def shows_file(settings: Mapping[str, Any]) -> bool:
+    """Whether the images of a recording with these settings show surroundings that are read from a file."""
+    return settings.get("shading", "classic") != "classic" and not is_known_thing(settings.get("environment"))
 
 
 @dataclass(frozen=True)

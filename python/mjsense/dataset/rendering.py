@@ -109,8 +109,7 @@ class _House:
             **{key: options[key] for key in ("width", "height", "depth", "segmentation")},
         )
         settings = first._recording.settings
-        images = render_cameras.recorded_images(settings)
-        images |= {name: options[name] for name in images if options[name] is not None}
+        images = render_cameras.recorded_images(settings, options)
         recorded = settings.get("render", {}).get("brightness", 1.0)
         brightness = recorded if options["brightness"] is None else options["brightness"]
         changes = {name for name in (*images, "brightness", *declared_fields("VideoCfg")) if options.get(name) is not None}
@@ -275,8 +274,11 @@ def render(
     shadow_samples: int | None = None,
     shading: Literal["classic", "pbr"] | None = None,
     exposure: float | None = None,
-    tone_mapping: Literal["neutral", "filmic", "linear"] | None = None,
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] | None = None,
+    white_balance: float | None = None,
+    environment: str | None = None,
     environment_intensity: float | None = None,
+    environment_rotation: float | None = None,
     ambient_occlusion: bool | None = None,
     brightness: float | None = None,
     num_worlds: int = 4,
@@ -329,8 +331,14 @@ def render(
             segmentation and the other images are the same. The options below belong to pbr. By default as recorded.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness. By default as recorded.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
-            clips. By default as recorded.
-        environment_intensity: Factor of the light from the surroundings, a neutral bright room. By default as recorded.
+            clips; agx: bright colours become white. By default as recorded.
+        white_balance: Colour temperature of the light that appears white. By default as recorded. [K]
+        environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
+            file, which is also the background. By default as recorded.
+        environment_intensity: Factor of the light from the surroundings. By default as recorded.
+        environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
+            rotate. By default as recorded. [degrees]
         ambient_occlusion: Darken the light from the surroundings where other geoms are near. By default as recorded.
         brightness: Factor of all lights. By default as recorded.
         num_worlds: Number of episodes that are rendered in parallel.

@@ -141,8 +141,9 @@ class _Archived:
     """The archived model with the recorded cameras, for recordings whose task cannot be rebuilt."""
 
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
-        cameras, settings = render_cameras.recorded_cameras(episode, None), episode._recording.settings
-        images = render_cameras.recorded_images(settings)
+        settings = episode._recording.settings
+        cameras = [] if render_cameras.shows_file(settings) else render_cameras.recorded_cameras(episode, None)
+        images = render_cameras.recorded_images(settings) if cameras else {}
         views = [camera.scene_sensor(images) for camera in cameras]
         self._worlds = EpisodeWorlds(
             episode, num_worlds, views, brightness=settings.get("render", {}).get("brightness", 1.0), threads=threads

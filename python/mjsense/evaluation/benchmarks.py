@@ -35,7 +35,16 @@ _FILE_BYTES = 1 << 24
 _MAX_EPISODES, _MAX_FILES, _MAX_DEPTH = 100_000, 1_000_000, 4
 _PARTS = ("task", "robot", "scene", "split", "arm_controller", "camera_system")
 _IMAGES = ("cameras", "width", "height", "depth", "segmentation", "shadows", "samples", "shadow_samples", "meshes")
-_COLOURS = ("shading", "exposure", "tone_mapping", "environment_intensity", "ambient_occlusion")
+_COLOURS = (
+    "shading",
+    "exposure",
+    "tone_mapping",
+    "white_balance",
+    "environment",
+    "environment_intensity",
+    "environment_rotation",
+    "ambient_occlusion",
+)
 _PLAY = ("seed", "horizon", "policy_dt_ms", "perturb", "instructions", "terminate_upon_success", "max_penetration")
 RECIPE = (*_PARTS, *_IMAGES, *_COLOURS, *_PLAY)
 """Options of a recording that a benchmark fixes."""

@@ -30,7 +30,7 @@ _MODEL_ARRAYS = (
     "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
     "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
     "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
-    "mat_metallic", "mat_roughness",
+    "mat_metallic", "mat_roughness", "light_type", "light_texid", "light_active",
 )
 """The model's arrays that an image depends on and that are not in the abstract scene."""
 
@@ -158,7 +158,7 @@ class Renderer:
         self._fixed_camera = -1
         """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
         self._depth = self._segmentation = self._point_lights = False
-        self._shading = "classic"
+        self._shading, self._environment = "classic", "model"
         self._sizes = self._sizes_of(model)
         flag = mujoco.mjtRndFlag
         self._flags = {
@@ -236,8 +236,18 @@ class Renderer:
 
     @shading.setter
     def shading(self, value: str) -> None:
-        self._opened().set_shading(value)
+        self._opened().set_shading(value, self._environment)
         self._shading = value
+
+    @property
+    def environment(self) -> str:
+        """With ``shading="pbr"``: the light from the surroundings, as the option `environment` of cameras; ``"model"`` by default."""
+        return self._environment
+
+    @environment.setter
+    def environment(self, value: str) -> None:
+        self._opened().set_shading(self._shading, value)
+        self._environment = value
 
     @property
     def height(self) -> int:
@@ -444,8 +454,8 @@ class Renderer:
             renderer = pool.take()
             try:
                 renderer._point_lights = self._point_lights
-                if renderer._shading != self._shading:
-                    renderer.shading = self._shading
+                if (renderer._shading, renderer._environment) != (self._shading, self._environment):
+                    renderer._environment, renderer.shading = self._environment, self._shading
                 renderer._update(datas[index], each[index], scene_option)
                 renderer._draw(rgb=images[index])
             except ValueError as error:
@@ -483,6 +493,7 @@ class Renderer:
         may be missed.
         """
         self._opened().reload()
+        self.shading = self._shading  # a skybox or an image light may have changed
 
     def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
         if kind not in _KINDS:

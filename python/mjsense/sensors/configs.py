@@ -302,7 +302,7 @@ class CameraSensorCfg(SensorCfg):
     height: int = 120
     """Height of the image; the resolution in the MJCF is not used. [pixels]"""
     data_types: Sequence[Literal[
-            "rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow"
+            "rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow", "hdr"
         ]] = ("rgb",)
     """The image types to compute."""
     use_textures: bool = True
@@ -343,10 +343,19 @@ class CameraSensorCfg(SensorCfg):
     the other images are the same. The options below belong to pbr."""
     exposure: float = 8.0
     """Exposure in EV at ISO 100; 1 more halves the brightness."""
-    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral"
-    """From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: clips."""
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral"
+    """From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: clips; agx:
+    bright colours become white."""
+    white_balance: float = 6504.0
+    """Colour temperature of the light that appears white. [K]"""
+    environment: str = "model"
+    """Light from the surroundings. model: the model's image light, else studio; auto: its image light, else its skybox,
+    else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr file, which is also the
+    background."""
     environment_intensity: float = 1.0
-    """Factor of the light from the surroundings, a neutral bright room."""
+    """Factor of the light from the surroundings."""
+    environment_rotation: float = 0.0
+    """Rotation of the surroundings about the world's z axis; a skybox in the background does not rotate. [degrees]"""
     ambient_occlusion: bool = True
     """Darken the light from the surroundings where other geoms are near."""
     depth_kind: Literal["planar", "ray"] = "planar"

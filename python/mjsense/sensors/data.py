@@ -21,6 +21,9 @@ class CameraData(SensorData):
 
     rgb: np.ndarray | None = None
     """uint8 [B, H, W, 3]. Colour image, row 0 at the top."""
+    hdr: np.ndarray | None = None
+    """float32 [B, H, W, 3] cd/m^2. Linear radiance, before white balance, exposure and tone mapping; only with shading
+    "pbr"."""
     depth: np.ndarray | None = None
     """float32 [B, H, W, 1] m. Distance to the camera plane; 0 where nothing is seen."""
     segmentation: np.ndarray | None = None

@@ -41,8 +41,11 @@ def record(
     shadow_samples: int = 1,
     shading: Literal["classic", "pbr"] = "classic",
     exposure: float = 8.0,
-    tone_mapping: Literal["neutral", "filmic", "linear"] = "neutral",
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral",
+    white_balance: float = 6504.0,
+    environment: str = "model",
     environment_intensity: float = 1.0,
+    environment_rotation: float = 0.0,
     ambient_occlusion: bool = True,
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
@@ -118,8 +121,14 @@ def record(
             segmentation and the other images are the same. The options below belong to pbr.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
-            clips.
-        environment_intensity: Factor of the light from the surroundings, a neutral bright room.
+            clips; agx: bright colours become white.
+        white_balance: Colour temperature of the light that appears white. [K]
+        environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
+            file, which is also the background.
+        environment_intensity: Factor of the light from the surroundings.
+        environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
+            rotate. [degrees]
         ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
             if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.

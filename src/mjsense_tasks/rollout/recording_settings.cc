@@ -13,6 +13,7 @@
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/text/json.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/render/light/environment_image.h"
 #include "mjsense_tasks/scenes/load_scene.h"
 
 namespace mjsense::tasks::rollout {
@@ -159,6 +160,12 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
     record::Checksum sum;
     sum.add(text.data(), text.size());
     settings["camera_file"] = sum.text();
+  }
+  if (cfg.shading == sensors::Shading::kPbr && render::is_environment_file(cfg.environment)) {
+    const std::string bytes = render::read_environment_file(cfg.environment);
+    record::Checksum sum;
+    sum.add(bytes.data(), bytes.size());
+    settings["environment_file"] = sum.text();
   }
   if (!cfg.code.empty()) settings["code"] = cfg.code;
   return settings.dump();

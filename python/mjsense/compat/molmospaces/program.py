@@ -27,26 +27,28 @@ if TYPE_CHECKING:
 
 _TESTED = ("0.2.9",)
 """Versions of molmo-spaces that this is tested with."""
-_SHADINGS = ("classic",)
+_SHADINGS = ("classic", "pbr")
 
 _own: dict[tuple[type, str], Any] = {}
 """By class and name: the methods of molmo-spaces, for renderers that do not use mjsense."""
 _threads = 0
+_shading, _environment = "classic", "model"
 _active = False
 
 
-def use(shading: str = "classic", threads: int = 0) -> None:
+def use(shading: str = "classic", threads: int = 0, environment: str = "model") -> None:
     """From now on, renderers that molmo-spaces makes draw with mjsense.
 
     Args:
-        shading: ``classic``: the colours of MuJoCo's OpenGL renderer.
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours.
         threads: Threads that draw the cameras of one observation; 0: one per CPU that is available to this process.
+        environment: With ``pbr``, the light from the surroundings, as the option of cameras.
 
     Raises:
         ImportError: If molmo-spaces is missing, or of a version that was not tested.
         ValueError: For an unknown `shading`, or a negative number of threads.
     """
-    global _active, _threads
+    global _active, _threads, _shading, _environment
     if shading not in _SHADINGS:
         near = nearest(shading, list(_SHADINGS), cutoff=0.0)
         raise ValueError(f"mjsense.compat.molmospaces.use: unknown shading '{shading}'. Nearest: {', '.join(near)}")
@@ -63,7 +65,7 @@ def use(shading: str = "classic", threads: int = 0) -> None:
             f"mjsense.compat.molmospaces.use is tested with molmo-spaces {', '.join(_TESTED)}, and {version} is installed"
         )
     _replace_methods()
-    _active, _threads = True, threads
+    _active, _threads, _shading, _environment = True, threads, shading, environment
 
 
 def stop() -> None:
@@ -73,9 +75,9 @@ def stop() -> None:
 
 
 @contextlib.contextmanager
-def used(shading: str = "classic", threads: int = 0) -> Iterator[None]:
+def used(shading: str = "classic", threads: int = 0, environment: str = "model") -> Iterator[None]:
     """``use()`` for a ``with`` block, and ``stop()`` at its end."""
-    use(shading, threads)
+    use(shading, threads, environment)
     try:
         yield
     finally:
@@ -141,6 +143,7 @@ def __init__(
     self._gl_context = self._mjr_context = None
     self._context_is_cgl = self._depth_rendering = self._segmentation_rendering = self._textures_need_upload = False
     self._mjsense = Renderer.of_scene(model, self._scene, height, width)
+    self._mjsense.environment, self._mjsense.shading = _environment, _shading
     self._mjsense_views = [View(self._scene, self._mjsense)]
 
 
@@ -327,7 +330,9 @@ def _views(renderer: Any, count: int) -> list[View]:
     views = renderer._mjsense_views
     while len(views) < count:
         scene = mujoco.MjvScene(renderer.model, renderer.scene.maxgeom)
-        views.append(View(scene, Renderer.of_scene(renderer.model, scene, renderer.height, renderer.width)))
+        made = Renderer.of_scene(renderer.model, scene, renderer.height, renderer.width)
+        made.environment, made.shading = renderer._mjsense.environment, renderer._mjsense.shading
+        views.append(View(scene, made))
     for view in views[1:]:
         view.scene.flags[:] = renderer.scene.flags
     return views[:count]

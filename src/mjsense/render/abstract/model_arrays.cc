@@ -152,6 +152,12 @@ std::unique_ptr<mjModel> model_of_arrays(const NamedArrays& arrays) {
   if (fields.has("tex_colorspace")) MJSENSE_READ(tex_colorspace, 0, m.ntex);
   m.ntexdata = MJSENSE_READ(tex_data, 0);
 
+  if (fields.has("light_type") && fields.has("light_texid")) {  // for image lights
+    m.nlight = MJSENSE_READ(light_type, 0);
+    MJSENSE_READ(light_texid, 0, m.nlight);
+    MJSENSE_READ(light_active, 0, m.nlight);
+  }
+
   m.nmat = MJSENSE_READ(mat_texid, mjNTEXROLE);
   MJSENSE_READ(mat_texuniform, 0, m.nmat);
   MJSENSE_READ(mat_texrepeat, 2, m.nmat);

@@ -198,6 +198,13 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
       out.material.uniform = model_->mat_texuniform[geom.matid] != 0;
     }
     if (colored) out.texture = assets_.texture(texture);
+    if (colored && physical_.on) {
+      out.material.textures = textures_of(model_.get(), geom.matid);
+      if (texture < 0) out.texture = assets_.texture(out.material.textures[mjTEXROLE_RGBA]);
+      for (int i = 0; i < kNumTextureMaps; ++i)
+        out.maps[i] =
+            assets_.texture(texture_of(out.material.textures, static_cast<TextureMap>(i)));
+    }
     if (model_->mat_metallic) out.material.metallic = model_->mat_metallic[geom.matid];
     if (model_->mat_roughness) out.material.roughness = model_->mat_roughness[geom.matid];
   }

@@ -86,6 +86,15 @@ inline void write_geometry(const View& view, const ImageTargets& targets, int x0
   if (targets.points) write_points(view, targets.points, x0, y0, pixels, hits);
 }
 
+// Writes the linear radiance of a packet, before the tone mapping.
+inline void write_hdr(float* image, const PixelGrid& grid, int x0, int y0,
+                      const float (*rgb)[kLanes], float scale) {
+  float values[kLanes][3];
+  for (int i = 0; i < kLanes; ++i)
+    for (int c = 0; c < 3; ++c) values[i][c] = scale * rgb[c][i];
+  write_pixels<3>(grid, x0, y0, values[0], image);
+}
+
 // Packs two 24-bit pixels into 48 bits.
 inline std::uint64_t close_up(const std::uint32_t* p) {
   constexpr std::uint64_t kLow = 0xffffff;

@@ -77,7 +77,7 @@ inline void find_reflectances(const View& view, const Surfaces& s, const ToEye& 
     const Float under = (one - metallic) * max(one - whole, zero);
     Float base[3], mean = zero;
     for (int c = 0; c < 3; ++c) {
-      base[c] = load(s.rgb[c] + k) * srgb_to_linear(load(s.texture[c] + k));
+      base[c] = load(s.rgb[c] + k) * load(s.texture[c] + k);
       mean = fma(base[c], splat(1.0f / 3), mean);
     }
     const Float metal90 = grazing(mean);
@@ -179,7 +179,7 @@ inline void add_ambient(const View& view, const Surfaces& s, const Reflectances&
                        fma(splat(2.0f) * nv, n.y, -(p.y * to_eye)),
                        fma(splat(2.0f) * nv, n.z, -(p.z * to_eye))};
   const Radiance ahead =
-      environment_radiance(*v.radiance, from_geom(v.r_wc, mirrored), load(s.roughness + k));
+      environment_radiance(*v.radiance, from_geom(v.r_ec, mirrored), load(s.roughness + k));
   const Float visible = load(open + k);
   // Filament 5.6.2 (Lagarde): surfaces mirror what is above their horizon.
   const Float seen = load(r.cosine + k) + visible;
@@ -206,9 +206,8 @@ inline void shade_physical(const View& view, const Surfaces& s, const Hits& hits
   Reflectances r;
   find_reflectances(view, s, eye, r);
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Float glow = load(s.emission + k) * splat(view.physical.unit);
     for (int c = 0; c < 3; ++c)
-      store(out.rgb[c] + k, glow * load(s.rgb[c] + k) * srgb_to_linear(load(s.texture[c] + k)));
+      store(out.rgb[c] + k, load(s.glow[c] + k) * splat(view.physical.unit));
   }
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
@@ -226,7 +225,10 @@ inline void shade_physical(const View& view, const Surfaces& s, const Hits& hits
   } else {
     for (int k = 0; k < kLanes; k += kWidth) store(open + k, splat(1.0f));
   }
-  for (int k = 0; k < kLanes; k += kWidth) add_ambient(view, s, r, eye, k, open, out);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    store(open + k, load(open + k) * load(s.occlusion + k));
+    add_ambient(view, s, r, eye, k, open, out);
+  }
   if (view.fog.slope == 0) return;
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth)

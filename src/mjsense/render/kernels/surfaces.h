@@ -13,10 +13,12 @@ namespace {
 struct alignas(64) Surfaces {
   float p[3][kLanes], n[3][kLanes];
   float rgb[3][kLanes], alpha[kLanes];
-  float texture[3][kLanes];  // 0..1
+  float texture[3][kLanes];  // 0..1; linear in physically based views
   float specular[kLanes], exponent[kLanes], highlight_threshold[kLanes], emission[kLanes];
   // For physically based views, where `rgb` is linear, and `specular` is the F0 of dielectrics.
   float roughness[kLanes], metallic[kLanes];
+  float occlusion[kLanes];  // share of the light from the surroundings that reaches the surface
+  float glow[3][kLanes];    // emission, as a colour
 };
 
 // Normal of a primitive at the surface point p, geom frame, any length.
@@ -171,19 +173,67 @@ inline void map_curved(const ViewGeom& g, std::uint32_t lanes, const float (*loc
   }
 }
 
-// Samples the texture for `lanes`, which all show geom g. The mipmap level follows from the surface's own
+// Changes the surfaces by the material's maps, in the lanes of `m`. read(texture) samples it; du, dv:
+// gradients of its coordinates; n: the normal by which the surface is shaded, unit; geom frame.
+template <class Read>
+inline void apply_maps(const ViewGeom& g, Read read, Vec3f du, Vec3f dv, Vec3f n, int k, Mask m,
+                       Surfaces& out) {
+  const auto& maps = g.surface.maps;
+  const Float scale = splat(1.0f / 255);
+  const auto put = [&](float* to, Float x) { store(to + k, select(m, x, load(to + k))); };
+  const auto multiply = [&](float* to, Float x) { put(to, load(to + k) * x * scale); };
+  if (const Texture* map = maps[kOrmMap]) {
+    const Rgb orm = read(*map);
+    multiply(out.occlusion, orm.r);
+    multiply(out.roughness, orm.g);
+    multiply(out.metallic, orm.b);
+  }
+  if (const Texture* map = maps[kOcclusionMap]) multiply(out.occlusion, read(*map).r);
+  if (const Texture* map = maps[kRoughnessMap]) multiply(out.roughness, read(*map).r);
+  if (const Texture* map = maps[kMetallicMap]) multiply(out.metallic, read(*map).r);
+  if (const Texture* map = maps[kOpacityMap]) multiply(out.alpha, read(*map).r);
+  if (const Texture* map = maps[kEmissiveMap]) {
+    const Rgb seen = read(*map);
+    const Float rgb[3] = {seen.r * scale, seen.g * scale, seen.b * scale};
+    for (int c = 0; c < 3; ++c)
+      put(out.glow[c], load(out.emission + k) * (map->linear ? rgb[c] : srgb_to_linear(rgb[c])));
+  }
+  if (const Texture* map = maps[kNormalMap]) {
+    const Rgb seen = read(*map);
+    const auto part = [&](Float x) { return fma(x, splat(2.0f / 255), splat(-1.0f)); };
+    // With w = n . (du x dv), the point moves by (dv x n) / w if u grows by 1 and v stays, and by
+    // (n x du) / w if v grows.
+    const Float w = dot(n, cross(du, dv));
+    const auto along = [&](Vec3f d, Float much) -> Vec3f {
+      const Float size = much / sqrt(max(dot(d, d), splat(1e-20f)));
+      const Float turned = select(w < splat(0.0f), -size, size);
+      return {d.x * turned, d.y * turned, d.z * turned};
+    };
+    const Vec3f right = along(cross(dv, n), part(seen.r)), up = along(cross(n, du), -part(seen.g));
+    const Float out_of = max(part(seen.b), splat(0.05f));
+    Vec3f t{fma(n.x, out_of, right.x + up.x), fma(n.y, out_of, right.y + up.y),
+            fma(n.z, out_of, right.z + up.z)};
+    const Float inverse = splat(1.0f) / sqrt(dot(t, t));
+    const Vec3f c = from_geom(g.rot, {t.x * inverse, t.y * inverse, t.z * inverse});
+    put(out.n[0], c.x);
+    put(out.n[1], c.y);
+    put(out.n[2], c.z);
+  }
+}
+
+// Samples the textures for `lanes`, which all show geom g. The mipmap level follows from the surface's own
 // plane, not from the normal by which it is shaded.
 inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pixels,
                           const Hits& hits, std::uint32_t lanes, const float (*local)[kLanes],
                           const float (*normal)[kLanes], Surfaces& out) {
   const Surface& s = g.surface;
-  const Texture& texture = *s.texture;
-  const float width = texture.width[0], height = texture.height[0];
-  const bool plane = g.type == mjGEOM_PLANE;
+  const Texture* const texture = s.texture;
+  const bool cube = texture && texture->cube, flat = !cube || s.mapped;
+  const bool plane = g.type == mjGEOM_PLANE, projected = plane || s.projected_along_z;
   const bool round = g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
-  const bool curved = !texture.cube && !s.projected_along_z &&
+  const bool curved = flat && !s.projected_along_z &&
                       (round || g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID);
-  const bool seen_through = g.transparent && texture.alpha;
+  const bool seen_through = g.transparent && texture && texture->alpha;
   Mapped mapped;
   if (g.mesh || curved) mapped = {};
   if (g.mesh) map_mesh(g, hits, lanes, mapped);
@@ -197,51 +247,67 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
     const auto store_sample = [&](auto sample_as) {
       const Rgb color = sample_as(Rgb{});
       const Float scale = splat(1.0f / 255);
-      store(out.texture[0] + k, select(m, color.r * scale, load(out.texture[0] + k)));
-      store(out.texture[1] + k, select(m, color.g * scale, load(out.texture[1] + k)));
-      store(out.texture[2] + k, select(m, color.b * scale, load(out.texture[2] + k)));
+      const bool encoded = view.physical.on && !texture->linear;
+      const auto store_part = [&](int c, Float x) {
+        const Float part = encoded ? srgb_to_linear(x * scale) : x * scale;
+        store(out.texture[c] + k, select(m, part, load(out.texture[c] + k)));
+      };
+      store_part(0, color.r);
+      store_part(1, color.g);
+      store_part(2, color.b);
       if (!seen_through) return;
       const Float alpha = load(out.alpha + k);
       store(out.alpha + k, select(m, alpha * sample_as(Alpha{}).a * scale, alpha));
     };
-    if (texture.cube) {
+    if (cube) {
       const auto stretched = [&](Vec3f v) -> Vec3f {
         return {v.x * s.cube_scale[0], v.y * s.cube_scale[1], v.z * s.cube_scale[2]};
       };
       const CubeFace face(stretched(q));
+      const float width = texture->width[0];
       const Float footprint =
           max(face.texels(stretched(steps.x), width), face.texels(stretched(steps.y), width));
       store_sample(
-          [&](auto texel) { return sample_cube<decltype(texel)>(texture, m, face, footprint); });
-      continue;
+          [&](auto texel) { return sample_cube<decltype(texel)>(*texture, m, face, footprint); });
+      if (!flat) continue;
+    }
+    Coordinates at;
+    float sx = 0, sy = 0;
+    if (projected) {
+      sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
+      const float size_y = round ? g.size[0] : g.size[1];
+      sy = size_y > 0 ? 0.5f / size_y : 0.5f;
+      at.u = fma(q.x, splat(sx), splat(!s.projected_along_z && g.size[0] > 0 ? 0.5f : 0.0f));
+      at.v = fma(q.y, splat(-sy), splat(!s.projected_along_z && g.size[1] > 0 ? 0.5f : 0.0f));
+    } else {
+      at = curved || s.uses_mesh_uvs ? mapped.coordinates(k) : box_uv(g, q, load3(normal, k));
     }
     // The maximum component, as in Mesa; it gives a sharper image than the length of the vector.
-    Float u, v, footprint;
-    if (plane || s.projected_along_z) {
-      const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
-      const float size_y = round ? g.size[0] : g.size[1];
-      const float sy = size_y > 0 ? 0.5f / size_y : 0.5f;
-      u = fma(q.x, splat(sx), splat(!s.projected_along_z && g.size[0] > 0 ? 0.5f : 0.0f));
-      v = fma(q.y, splat(-sy), splat(!s.projected_along_z && g.size[1] > 0 ? 0.5f : 0.0f));
-      const Float ku = splat(sx * s.uv_scale[0] * width), kv = splat(sy * s.uv_scale[1] * height);
-      const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
-      footprint = max(texels(steps.x), texels(steps.y));
-    } else {
-      const Coordinates at =
-          curved || s.uses_mesh_uvs ? mapped.coordinates(k) : box_uv(g, q, load3(normal, k));
-      u = at.u;
-      v = at.v;
+    const auto footprint_on = [&](const Texture& map) {
+      const float width = map.width[0], height = map.height[0];
+      if (projected) {
+        const Float ku = splat(sx * s.uv_scale[0] * width), kv = splat(sy * s.uv_scale[1] * height);
+        const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
+        return max(texels(steps.x), texels(steps.y));
+      }
       const Float ku = splat(s.uv_scale[0] * width), kv = splat(s.uv_scale[1] * height);
       const auto texels = [&](Vec3f w) {
         return max(abs(ku * dot(at.du, w)), abs(kv * dot(at.dv, w)));
       };
-      footprint = max(texels(steps.x), texels(steps.y));
-    }
-    const Float place_s = fma(u, splat(s.uv_scale[0]), splat(s.uv_offset[0])),
-                place_t = fma(v, splat(s.uv_scale[1]), splat(s.uv_offset[1]));
-    store_sample([&](auto texel) {
-      return sample<decltype(texel)>(texture, m, int_of(0), place_s, place_t, footprint);
-    });
+      return max(texels(steps.x), texels(steps.y));
+    };
+    const Float place_s = fma(at.u, splat(s.uv_scale[0]), splat(s.uv_offset[0])),
+                place_t = fma(at.v, splat(s.uv_scale[1]), splat(s.uv_offset[1]));
+    const auto read = [&](const Texture& map, auto texel) {
+      return sample<decltype(texel)>(map, m, int_of(0), place_s, place_t, footprint_on(map));
+    };
+    if (texture && !cube) store_sample([&](auto texel) { return read(*texture, texel); });
+    if (!s.mapped) continue;
+    const Float zero = splat(0.0f), one = splat(1.0f);
+    apply_maps(
+        g, [&](const Texture& map) { return read(map, Rgb{}); },
+        projected ? Vec3f{one, zero, zero} : at.du, projected ? Vec3f{zero, -one, zero} : at.dv,
+        load3(normal, k), k, m, out);
   }
 }
 
@@ -261,6 +327,18 @@ inline Vec3f triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t
   }
   const Vec4f n = columns(rows);
   return {n.x, n.y, n.z};
+}
+
+// The emission of surfaces whose material has no map of it: a share of their colour.
+inline void set_glow(std::uint32_t lanes, Surfaces& out) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    if (!any(m)) continue;
+    for (int c = 0; c < 3; ++c) {
+      const Float glow = load(out.emission + k) * load(out.rgb[c] + k) * load(out.texture[c] + k);
+      store(out.glow[c] + k, select(m, glow, load(out.glow[c] + k)));
+    }
+  }
 }
 
 // Gathers normals, materials and textures of the lanes `mine`, which all show g. `first`: g is the
@@ -299,11 +377,12 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     if (view.physical.on) {
       put(out.roughness, splat(s.roughness));
       put(out.metallic, splat(s.metallic));
+      put(out.occlusion, splat(1.0f));
     } else {
       put(out.exponent, splat(s.exponent));
       put(out.highlight_threshold, splat(s.highlight_threshold));
     }
-    if (!s.texture) continue;
+    if (!s.texture && !s.mapped) continue;
     store(local[0] + k, q.x);
     store(local[1] + k, q.y);
     store(local[2] + k, q.z);
@@ -311,7 +390,9 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     store(normal[1] + k, n.y);
     store(normal[2] + k, n.z);
   }
-  if (color && s.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
+  if (!color) return;
+  if (s.texture || s.mapped) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
+  if (view.physical.on && !s.maps[kEmissiveMap]) set_glow(mine, out);
 }
 
 // Gathers points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only

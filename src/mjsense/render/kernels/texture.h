@@ -36,6 +36,13 @@ inline Rgb mix(Rgb a, Rgb b, Float f) {
 }
 inline Alpha mix(Alpha a, Alpha b, Float f) { return {fma(f, b.a - a.a, a.a)}; }
 
+// sRGB's curve from a colour in [0, 1] to linear light; the error is below 3e-4.
+inline Float srgb_to_linear(Float x) {
+  const Float a = fma(x, splat(0.2157905f), splat(-0.6573604f));
+  const Float b = fma(x, a, splat(1.0077318f));
+  return x * fma(x, fma(x, b, splat(0.3785078f)), splat(0.0553303f));
+}
+
 // x = mantissa 2^exponent for x >= 1, with a mantissa of at least 1 and less than 2.
 inline Float exponent_of(Float x) { return to_float(shift_right(bits_of(x), 23)) - splat(127.0f); }
 inline Float mantissa_of(Float x) {
@@ -194,7 +201,7 @@ inline Coordinates box_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
   return {fma(select(x_face, p.y, p.x), kx, half),
           fma(select(z_face, p.y, p.z), -ky, half),
           {select(x_face, zero, kx), select(x_face, kx, zero), zero},
-          {zero, select(z_face, ky, zero), select(z_face, zero, ky)}};
+          {zero, select(z_face, -ky, zero), select(z_face, zero, -ky)}};
 }
 
 // Scalar coordinates of one lane.

@@ -150,14 +150,17 @@ inline void start_tile(const View& view, int x0, int y0, int across, int packets
   tile.depth = far;
 }
 
-// Computes the colours of packet `q` with transparent geoms. `color`: where to store them.
+// Computes the colours of packet `q` with transparent geoms. `radiance`: null, or what gets their
+// values before the tone mapping.
 inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflection& reflection,
                          int q, const TileLists& lists, const TileScratch& scratch, Tile& tile,
-                         Shadows& shadows, Colors& colors) {
+                         Shadows& shadows, Colors& colors, Colors* radiance = nullptr) {
   shade_packet(view, fixed, reflection, q, tile.pixels[q], tile.hits[q], shadows, colors);
   if (lists.transparent)
     shade_transparent(view, scratch.transparent_geoms, lists.transparent, tile.pixels[q],
                       tile.hits[q], colors);
+  if (radiance)
+    for (int c = 0; c < 3; ++c) copy_lanes(colors.rgb[c], radiance->rgb[c]);
   if (view.physical.on) map_tones(view, colors);
 }
 
@@ -286,11 +289,12 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
   const int packets = across * down;
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
-  tile.shaded = targets.rgb || targets.normals || targets.fixed_tiles;
-  const int samples = targets.rgb ? targets.samples : 1;
+  const bool colored = targets.rgb || targets.hdr;
+  tile.shaded = colored || targets.normals || targets.fixed_tiles;
+  const int samples = colored ? targets.samples : 1;
   TileBox* const receivers =
       targets.receivers ? targets.receivers + tile_index(grid, x0, y0) : nullptr;
-  alignas(64) float sum[kTilePackets][3][kLanes];
+  alignas(64) float sum[kTilePackets][3][kLanes], radiance_sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
        ++sample) {
     // The last round, if present, is for depth and segmentation: its rays pass through the pixel
@@ -319,19 +323,24 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       }
       trace_tile(view, Part::kMoving, scratch.opaque_geoms, lists.opaque, tile);
     }
-    if (targets.rgb && sample < samples) {
+    if (colored && sample < samples) {
       Shadows shadows;
       if (needs_others(view))
         find_all_casters(view, fixed, tile, packets, scratch, shadows, receivers);
       if (view.reflection) trace_reflection(view, packets, tile, reflection);
       for (int q = 0; q < packets; ++q) {
-        Colors colors;
-        shade_pixels(view, fixed, reflection, q, lists, scratch, tile, shadows, colors);
-        for (int c = 0; c < 3; ++c)
-          for (int k = 0; k < kLanes; k += kWidth) {
-            const Float color = load(colors.rgb[c] + k);
-            store(sum[q][c] + k, sample == 0 ? color : color + load(sum[q][c] + k));
-          }
+        Colors colors, radiance;
+        shade_pixels(view, fixed, reflection, q, lists, scratch, tile, shadows, colors,
+                     targets.hdr ? &radiance : nullptr);
+        const auto add = [&](const Colors& more, float(*total)[kLanes]) {
+          for (int c = 0; c < 3; ++c)
+            for (int k = 0; k < kLanes; k += kWidth) {
+              const Float color = load(more.rgb[c] + k);
+              store(total[c] + k, sample == 0 ? color : color + load(total[c] + k));
+            }
+        };
+        add(colors, sum[q]);
+        if (targets.hdr) add(radiance, radiance_sum[q]);
       }
     }
     if (geometry && centered) {
@@ -342,9 +351,12 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       }
     }
   }
-  if (!targets.rgb) return;
-  for (int q = 0; q < packets; ++q)
-    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), sum[q], 1.0f / samples);
+  for (int q = 0; q < packets; ++q) {
+    const int x = x0 + 4 * (q % across), y = y0 + 4 * (q / across);
+    if (targets.rgb) write_rgb(targets, grid, x, y, sum[q], 1.0f / samples);
+    if (targets.hdr)
+      write_hdr(targets.hdr, grid, x, y, radiance_sum[q], view.physical.white_radiance / samples);
+  }
 }
 
 inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last,

@@ -9,13 +9,6 @@ namespace {
 
 inline Float float_of(Int a) { return {(decltype(Float::v))a.v}; }
 
-// sRGB's curve from a colour in [0, 1] to linear light; the error is below 3e-4.
-inline Float srgb_to_linear(Float x) {
-  const Float a = fma(x, splat(0.2157905f), splat(-0.6573604f));
-  const Float b = fma(x, a, splat(1.0077318f));
-  return x * fma(x, fma(x, b, splat(0.3785078f)), splat(0.0553303f));
-}
-
 // Tone curve and sRGB's curve, see ToneCurve.
 inline Float tone_curve(const float* table, Float x) {
   // max() also removes NaN.
@@ -51,15 +44,23 @@ inline Vec3f neutral(Vec3f c) {
   return {out(base.x), out(base.y), out(base.z)};
 }
 
+inline Vec3f shown(const float* curve, Vec3f c) {
+  return {tone_curve(curve, c.x), tone_curve(curve, c.y), tone_curve(curve, c.z)};
+}
+
 // Replaces linear radiance by colours in [0, 1].
 inline void map_tones(const View& view, Colors& colors) {
   const PhysicalView& p = view.physical;
   for (int k = 0; k < kLanes; k += kWidth) {
     Vec3f c{load(colors.rgb[0] + k), load(colors.rgb[1] + k), load(colors.rgb[2] + k)};
+    c = {c.x * splat(p.white[0]), c.y * splat(p.white[1]), c.z * splat(p.white[2])};
     if (p.tone_mapping == ToneMapping::kNeutral) c = neutral(c);
-    store(colors.rgb[0] + k, tone_curve(p.tone_curve, c.x));
-    store(colors.rgb[1] + k, tone_curve(p.tone_curve, c.y));
-    store(colors.rgb[2] + k, tone_curve(p.tone_curve, c.z));
+    if (p.tone_mapping == ToneMapping::kAgx) c = from_geom(p.agx_inset, c);
+    c = shown(p.tone_curve, c);
+    if (p.tone_mapping == ToneMapping::kAgx) c = shown(p.display_curve, from_geom(p.agx_outset, c));
+    store(colors.rgb[0] + k, c.x);
+    store(colors.rgb[1] + k, c.y);
+    store(colors.rgb[2] + k, c.z);
   }
 }
 

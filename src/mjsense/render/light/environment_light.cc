@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/render/light/microfacets.h"
+
 namespace mjsense::render {
 namespace {
 
@@ -13,16 +15,6 @@ using RadianceByHeight = std::function<double(double)>;
 
 constexpr std::array<int, 9> kSizes{64, 32, 32, 32, 16, 16, 16, 16, 16};
 constexpr int kSteps = 128;  // of z in a table of one level
-
-std::uint32_t rgb9e5(double x) {
-  int exponent = std::max(-15, static_cast<int>(std::floor(std::log2(std::max(x, 1e-9)))) + 1);
-  const auto mantissa = [&] {
-    return static_cast<std::uint32_t>(std::lround(x / std::exp2(exponent - 9)));
-  };
-  if (mantissa() > 511) ++exponent;
-  const std::uint32_t m = mantissa();
-  return m | m << 9 | m << 18 | static_cast<std::uint32_t>(exponent + 15) << 27;
-}
 
 // z of texel (x, y) of a face; faces as in the kernels: +x -x +y -y +z -z.
 double height_of(int face, double s, double t) {
@@ -43,9 +35,8 @@ std::array<double, kSteps + 1> seen_by_lobe(const RadianceByHeight& radiance, do
     }
     double sum = 0, weights = 0;
     for (int k = 0; k < kSamples; ++k) {
-      double turn = 0, digit = 0.5;
-      for (int j = k; j; j /= 2, digit /= 2) turn += digit * (j % 2);
-      const double u = (k + 0.5) / kSamples, cosine = std::sqrt((1 - u) / (1 + (a2 - 1) * u));
+      const double turn = radical_inverse(k), u = (k + 0.5) / kSamples,
+                   cosine = std::sqrt((1 - u) / (1 + (a2 - 1) * u));
       const double nl = 2 * cosine * cosine - 1;
       if (nl <= 0) continue;
       const double sine = std::sqrt(1 - nl * nl);
@@ -58,6 +49,30 @@ std::array<double, kSteps + 1> seen_by_lobe(const RadianceByHeight& radiance, do
 }
 
 }  // namespace
+
+std::uint32_t pack_rgb9e5(const float rgb[3]) {
+  const float largest = std::max({rgb[0], rgb[1], rgb[2]});
+  if (!(largest > 0)) return 0;
+  constexpr float kLargest = 65408;  // 511 / 512 * 2^16
+  int exponent;
+  std::frexp(std::min(largest, kLargest), &exponent);
+  exponent = std::max(exponent, -15);
+  if (std::lround(std::ldexp(std::min(largest, kLargest), 9 - exponent)) == 512) ++exponent;
+  std::uint32_t out = static_cast<std::uint32_t>(exponent + 15) << 27;
+  for (int c = 0; c < 3; ++c)
+    out |= static_cast<std::uint32_t>(
+               std::lround(std::ldexp(std::clamp(rgb[c], 0.0f, kLargest), 9 - exponent)))
+           << 9 * c;
+  return out;
+}
+
+std::array<float, 3> unpack_rgb9e5(std::uint32_t texel) {
+  const int exponent = static_cast<int>(texel >> 27) - 15 - 9;
+  std::array<float, 3> out;
+  for (int c = 0; c < 3; ++c)
+    out[c] = std::ldexp(static_cast<float>(texel >> 9 * c & 511), exponent);
+  return out;
+}
 
 std::shared_ptr<const Environment> upright_environment(const RadianceByHeight& radiance) {
   auto out = std::make_shared<Environment>();
@@ -88,7 +103,8 @@ std::shared_ptr<const Environment> upright_environment(const RadianceByHeight& r
         for (int x = 0; x <= n; ++x) {  // the last texel of a row is stored twice
           const double at = (height_of(face, place(x), place(y)) + 1) * kSteps / 2;
           const int i = std::min(static_cast<int>(at), kSteps - 1);
-          out->texels.push_back(rgb9e5(std::lerp(table[i], table[i + 1], at - i)));
+          const auto grey = static_cast<float>(std::lerp(table[i], table[i + 1], at - i));
+          out->texels.push_back(pack_rgb9e5(std::array{grey, grey, grey}.data()));
         }
   }
   map.texels = out->texels.data();

@@ -2,6 +2,7 @@
 #pragma once
 // Light from the surroundings of a scene, prepared for the kernels. Frame: the world's, z up.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -26,6 +27,10 @@ struct Environment {
   EnvironmentLight light;
   std::vector<std::uint32_t> texels;
 };
+
+// The texels of EnvironmentLight::radiance.
+std::uint32_t pack_rgb9e5(const float rgb[3]);
+std::array<float, 3> unpack_rgb9e5(std::uint32_t texel);
 
 // An environment without colour whose radiance depends only on z of the direction.
 std::shared_ptr<const Environment> upright_environment(

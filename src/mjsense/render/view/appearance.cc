@@ -55,7 +55,8 @@ void Appearance::copy(const mjModel* m) {
                      .roughness = m->mat_roughness[i],
                      .texture = m->mat_texid[mjNTEXROLE * i + mjTEXROLE_RGB],
                      .repeat = {m->mat_texrepeat[2 * i], m->mat_texrepeat[2 * i + 1]},
-                     .uniform = m->mat_texuniform[i] != 0};
+                     .uniform = m->mat_texuniform[i] != 0,
+                     .textures = textures_of(m, i)};
   sky_.distance = static_cast<float>(0.7 * m->vis.map.zfar * m->stat.extent);
   sky_.haze_width = m->vis.map.haze;
   std::copy_n(m->vis.rgba.haze, 3, sky_.haze_rgb);

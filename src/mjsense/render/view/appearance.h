@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mjsense/rays/flex_surface.h"
+#include "mjsense/render/view/texture_maps.h"
 #include "mjsense/render/view/view_light.h"
 
 namespace mjsense::render {
@@ -18,6 +19,7 @@ struct Material {
   int texture;                         // id; -1: none
   float repeat[2];                     // of a 2D texture
   bool uniform;                        // `repeat` is per metre instead of per geom
+  TextureIds textures = kNoTextures;   // by role; physically based views use all of them
 };
 
 // The fields of mjModel's vis.map and vis.rgba that affect the sky.

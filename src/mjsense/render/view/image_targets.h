@@ -36,12 +36,13 @@ struct alignas(64) FixedTile {
 // Output images, H x W, rows from the top. Null: not requested.
 struct ImageTargets {
   std::uint8_t* rgb = nullptr;           // [H, W, 3]
+  float* hdr = nullptr;                  // [H, W, 3], cd/m^2, only for physically based views
   float* depth = nullptr;                // [H, W], m
   std::int32_t* segmentation = nullptr;  // [H, W, 2]
   float* normals = nullptr;              // [H, W, 3]
   float* points = nullptr;               // [H, W, 3], m
   bool depth_along_ray = false;          // instead of planar depth
-  int samples = 1;                       // samples per pixel, for rgb
+  int samples = 1;                       // samples per pixel, for rgb and hdr
   FixedTile* fixed_tiles = nullptr;      // by tile; if not null, these are written and no image
   // As with multisampling in OpenGL, use the samples for edges only, and write rgb only. `samples`
   // must be a power of two up to kMaxMultisamples.

@@ -5,8 +5,12 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <vector>
+
+#include "mjsense/render/light/brdf_table.h"
+#include "mjsense/render/light/tone_map.h"
 
 namespace mjsense::render {
 namespace {
@@ -14,68 +18,50 @@ namespace {
 // Radiance of the environment, whose mean is 1, in classic units.
 constexpr double kEnvironmentLevel = 0.3;
 
-double srgb_of_linear(double x) {
-  return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
-}
-
-// K. Narkowicz, ACES Filmic Tone Mapping Curve, 2016, with the exposure of the original curve.
-double filmic(double x) {
-  x *= 0.6;
-  return std::min(1.0, x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14));
-}
-
 using Curve = std::array<float, ToneCurve::kValues + 1>;
 
-Curve make_curve(bool is_filmic) {
+// `shown`: the value in [0, 1] that the display gets for each value of the table.
+Curve make_curve(const std::function<double(double)>& shown) {
   Curve out;
   for (std::size_t i = 0; i < out.size(); ++i) {
     const auto bits =
         (static_cast<std::uint32_t>(ToneCurve::kFirst) + static_cast<std::uint32_t>(i))
         << ToneCurve::kShift;
     const double x = static_cast<double>(std::bit_cast<float>(bits)) - ToneCurve::kOffset;
-    out[i] = static_cast<float>(
-        std::clamp(srgb_of_linear(is_filmic ? filmic(x) : std::clamp(x, 0.0, 1.0)), 0.0, 1.0));
+    out[i] = static_cast<float>(shown(x));
   }
   return out;
 }
 
-const float* tone_curve_of(ToneMapping mapping) {
-  static const Curve filmic_curve = make_curve(true), plain = make_curve(false);
-  return (mapping == ToneMapping::kFilmic ? filmic_curve : plain).data();
+void set_curves(ToneMapping mapping, PhysicalView& out) {
+  const auto encoded = [](double x) { return srgb_encode(std::clamp(x, 0.0, 1.0)); };
+  static const Curve plain = make_curve(encoded);
+  static const Curve s_shaped = make_curve([&](double x) { return encoded(filmic(x)); });
+  static const Curve agx_curve = make_curve(agx_contrast);
+  static const Curve agx_display = make_curve([&](double x) { return encoded(agx_linear(x)); });
+  out.tone_mapping = mapping;
+  out.tone_curve = (mapping == ToneMapping::kFilmic ? s_shaped
+                    : mapping == ToneMapping::kAgx  ? agx_curve
+                                                    : plain)
+                       .data();
+  out.display_curve = agx_display.data();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      out.agx_inset[3 * i + j] = static_cast<float>(kAgxInset[i][j]);
+      out.agx_outset[3 * i + j] = static_cast<float>(kAgxOutset[i][j]);
+    }
 }
 
-std::vector<std::uint32_t> make_specular_table() {
-  constexpr int kSamples = 512;
+std::vector<std::uint32_t> pack_specular_table() {
   std::vector<std::uint32_t> out;
-  for (int row = 0; row < SpecularTable::kRows; ++row) {
-    const double roughness = static_cast<double>(row) / (SpecularTable::kRows - 1);
-    const double alpha = std::max(roughness * roughness, 1e-4), a2 = alpha * alpha;
+  const auto part = [](float x) {
+    return static_cast<std::uint32_t>(std::lround(std::clamp(x, 0.0f, 1.0f) * 65535));
+  };
+  for (const auto& row : brdf_table().entries)
     for (int column = 0; column < SpecularTable::kStride; ++column) {
-      const double nv =
-          std::clamp(static_cast<double>(column) / (SpecularTable::kColumns - 1), 1e-4, 1.0);
-      const double vx = std::sqrt(1 - nv * nv);
-      double a = 0, b = 0;
-      for (int i = 0; i < kSamples; ++i) {
-        double radical = 0, digit = 0.5;
-        for (int k = i; k; k /= 2, digit /= 2) radical += digit * (k % 2);
-        const double u = (i + 0.5) / kSamples, phi = 2 * std::numbers::pi * radical;
-        const double c = std::sqrt((1 - u) / (1 + (a2 - 1) * u)), s = std::sqrt(1 - c * c);
-        const double vh = vx * s * std::cos(phi) + nv * c;
-        const double nl = 2 * vh * c - nv;
-        if (nl <= 0) continue;
-        const double smith =
-            nl * std::sqrt(nv * nv * (1 - a2) + a2) + nv * std::sqrt(nl * nl * (1 - a2) + a2);
-        const double weight = 2 * nl * vh / (smith * c) / kSamples;  // V * 4 nl vh / c
-        const double fresnel = std::pow(1 - vh, 5);
-        a += weight * (1 - fresnel);
-        b += weight * fresnel;
-      }
-      const auto part = [](double x) {
-        return static_cast<std::uint32_t>(std::lround(std::clamp(x, 0.0, 1.0) * 65535));
-      };
-      out.push_back(part(a) | part(b) << 16);
+      const BrdfTable::Entry& entry = row[std::min(column, SpecularTable::kColumns - 1)];
+      out.push_back(part(entry.a) | part(entry.b) << 16);
     }
-  }
   return out;
 }
 
@@ -97,12 +83,12 @@ void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& o
         {k(8), k(4) / 2, k(7) / 2}, {k(4) / 2, -k(8), k(5) / 2}, {k(7) / 2, k(5) / 2, 3 * k(6)}};
     const double linear[3] = {k(3), k(1), k(2)};
     double q[3][3];
-    turn(quadratic, out.r_wc, q);
+    turn(quadratic, out.r_ec, q);
     const auto set = [&](int i, double x) { out.irradiance[i][c] = static_cast<float>(x); };
     set(0, k(0) - k(6));
     for (int i = 0; i < 3; ++i) {
       double along = 0;
-      for (int a = 0; a < 3; ++a) along += linear[a] * out.r_wc[3 * a + i];
+      for (int a = 0; a < 3; ++a) along += linear[a] * out.r_ec[3 * a + i];
       set(1 + i, along);
       set(4 + i, q[i][i]);
     }
@@ -114,23 +100,27 @@ void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& o
 
 }  // namespace
 
-double maximum_radiance(double exposure) { return 1.2 * std::exp2(exposure); }
-
-float linear_of_srgb(float x) {
-  return x <= 0.04045f
-             ? x / 12.92f
-             : static_cast<float>(std::pow((static_cast<double>(x) + 0.055) / 1.055, 2.4));
-}
+double maximum_radiance(double exposure) { return 1 / exposure_scale(exposure); }
 
 void set_physical(const PhysicalOptions& options, const double rotation[9], PhysicalView& out) {
-  static const std::vector<std::uint32_t> specular_table = make_specular_table();
+  static const std::vector<std::uint32_t> specular_table = pack_specular_table();
   out.on = true;
-  out.tone_mapping = options.tone_mapping;
-  out.tone_curve = tone_curve_of(options.tone_mapping);
+  set_curves(options.tone_mapping, out);
   out.specular_table = specular_table.data();
-  out.unit = static_cast<float>(kClassicRadiance / maximum_radiance(options.exposure));
+  const double white = maximum_radiance(options.exposure);
+  out.white_radiance = static_cast<float>(white);
+  out.unit = static_cast<float>(kClassicRadiance / white);
   out.occlusion_reach = options.occlusion_reach;
-  for (int i = 0; i < 9; ++i) out.r_wc[i] = static_cast<float>(rotation[i]);
+  const Rgb64 gains = white_balance(options.white_balance);
+  for (int c = 0; c < 3; ++c) out.white[c] = static_cast<float>(gains[c]);
+  const double turn = options.environment_rotation * std::numbers::pi / 180;
+  const double cosine = std::cos(turn), sine = std::sin(turn);
+  for (int j = 0; j < 3; ++j) {
+    const double x = rotation[j], y = rotation[3 + j];
+    out.r_ec[j] = static_cast<float>(cosine * x + sine * y);
+    out.r_ec[3 + j] = static_cast<float>(cosine * y - sine * x);
+    out.r_ec[6 + j] = static_cast<float>(rotation[6 + j]);
+  }
   const EnvironmentLight& light = options.environment->light;
   out.radiance = &light.radiance;
   const double scale = kEnvironmentLevel * options.environment_intensity * out.unit;

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "mjsense/render/light/environment_light.h"
+#include "mjsense/render/light/tone_map.h"
 #include "mjsense/render/view/view.h"
 
 namespace mjsense::render {
@@ -25,9 +26,12 @@ struct PhysicalOptions {
   bool on = false;
   double exposure = kDefaultExposure;
   ToneMapping tone_mapping = ToneMapping::kNeutral;
+  double white_balance = kDaylight;  // K
   std::shared_ptr<const Environment> environment;
+  bool hides_skybox = false;  // the environment is the background even if there is a skybox
   double environment_intensity = 1;
-  float occlusion_reach = 0.5f;  // m; 0: no ambient occlusion
+  double environment_rotation = 0;  // degrees, about the world's z axis
+  float occlusion_reach = 0.5f;     // m; 0: no ambient occlusion
 };
 
 // Sets `out` for a camera whose rotation (R_WC, row-major) is given, except `reflectance`.
@@ -36,8 +40,5 @@ void set_physical(const PhysicalOptions& options, const double rotation[9], Phys
 // Turns the colours of a classic light into radiance. intensity: in candela, or in lux for a directional
 // light; 0: not set. range: m, used with an intensity.
 void set_physical(const PhysicalOptions& options, float intensity, float range, ViewLight& light);
-
-// sRGB's curve, to linear light.
-float linear_of_srgb(float x);
 
 }  // namespace mjsense::render

@@ -11,7 +11,7 @@
 
 namespace mjsense::render {
 
-enum class ToneMapping : std::uint8_t { kNeutral, kFilmic, kLinear };
+enum class ToneMapping : std::uint8_t { kNeutral, kFilmic, kLinear, kAgx };
 
 // The tone curve is a table: value i belongs to the number x for which the bits of x + kOffset as a
 // float, shifted right by kShift, are kFirst + i. Between them it is linear. x is in [0, kEnd].
@@ -32,7 +32,11 @@ struct SpecularTable {
 struct PhysicalView {
   bool on = false;  // otherwise the light model is MuJoCo's classic one
   ToneMapping tone_mapping = ToneMapping::kNeutral;
-  const float* tone_curve = nullptr;              // [ToneCurve::kValues]
+  const float* tone_curve = nullptr;  // [ToneCurve::kValues]
+  // AgX: the curve is applied between two mixtures of the channels (row-major), and then display_curve.
+  const float* display_curve = nullptr;
+  float agx_inset[9] = {}, agx_outset[9] = {};
+  float white[3] = {1, 1, 1};  // factors of the radiance before the tone mapping: white balance
   const std::uint32_t* specular_table = nullptr;  // [kRows, kStride]
   // Radiance of a white matte surface of normal n in the light of the environment: the sum of these
   // coefficients times 1, x, y, z, x^2, y^2, z^2, xy, xz, yz.
@@ -40,8 +44,9 @@ struct PhysicalView {
   // The environment's radiance by perceptual roughness / (levels - 1), see EnvironmentLight
   const Texture* radiance = nullptr;
   float radiance_scale = 0;
-  float r_wc[9] = {};              // R_WC, row-major
-  bool shows_environment = false;  // as the background, because there is no skybox
+  float r_ec[9] = {};              // R_EC, row-major, E: frame of `radiance`
+  bool shows_environment = false;  // as the background, instead of a skybox
+  float white_radiance = 1;        // cd/m^2 of a radiance of 1
   float unit = 1;         // radiance of a colour of 1 of the skybox, haze, fog and emission
   float reflectance = 0;  // of the mirror
   // Distance up to which geoms hide the environment from each other, m; 0: they do not.

@@ -177,6 +177,11 @@ class SourceRows {
     static const std::array<std::uint8_t, 256> linear = linear_values();
     const mjtByte* from = data_ + bytes(y);
     if (!srgb_ && channels_ == 3) return opaque_row(from, width_, out);
+    if (channels_ == 1) {
+      for (int x = 0; x < width_; ++x)
+        out[x] = 0xff000000 | 0x010101u * (srgb_ ? linear[from[x]] : from[x]);
+      return;
+    }
     for (int x = 0; x < width_; ++x, from += channels_) {
       const std::uint32_t alpha = channels_ == 4 ? from[3] : 255;
       out[x] = srgb_ ? linear[from[0]] | linear[from[1]] << 8 | linear[from[2]] << 16 | alpha << 24
@@ -270,9 +275,12 @@ Texture texture_levels(const mjModel* model, int id) {
   Texture texture;
   const int channels = model->tex_nchannel[id];
   // Textures with another number of channels are encoded for another renderer and ignored.
-  if (channels != 3 && channels != 4) return texture;
+  if (channels != 1 && channels != 3 && channels != 4) return texture;
   texture.alpha = channels == 4;
+  texture.grey = channels == 1;
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
+  // MuJoCo marks PNG files without a colour space as linear, though their colours are encoded.
+  texture.linear = color_space(model, id) == mjCOLORSPACE_SRGB && !texture.cube;
   // A cube texture with a square image repeats that image on all faces.
   texture.same_faces = texture.cube && model->tex_width[id] == model->tex_height[id];
   int width = model->tex_width[id], height = texture.cube ? width : model->tex_height[id];

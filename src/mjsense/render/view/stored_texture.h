@@ -29,6 +29,8 @@ struct Texture {
   static constexpr int kMaxLevels = 15;
   bool cube = false;
   bool alpha = false;       // it has an alpha channel
+  bool grey = false;        // it has one channel and is not used for colours
+  bool linear = false;      // its colours were decoded from sRGB when they were stored
   bool same_faces = false;  // a cube map with one image for all faces, which is stored once
   int levels = 0;           // of the mipmap; 0: the texture cannot be drawn
   int finest = 0;           // the finest level that is stored

@@ -97,7 +97,8 @@ SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
   for (int i = 0; i < model->ntex && textures; ++i)
     textures_[i] = stored_.emplace_back(stored_texture(model, i))->texture;
   for (int i = 0; i < model->ntex && !skybox_; ++i)
-    if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
+    if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0 && !textures_[i].grey)
+      skybox_ = &textures_[i];
   for (int i = 0; i < model->nmesh && meshes; ++i)
     keep(mesh_tables(model, i, true), meshes_[i], model->mesh_vert + 3 * model->mesh_vertadr[i],
          model->mesh_face + 3 * model->mesh_faceadr[i]);

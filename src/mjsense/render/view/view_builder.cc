@@ -10,6 +10,8 @@
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
+#include "mjsense/render/light/material.h"
+#include "mjsense/render/light/tone_map.h"
 #include "mjsense/render/view/fixed_layer.h"
 #include "mjsense/render/view/frustum.h"
 #include "mjsense/render/view/image_window.h"
@@ -88,7 +90,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
-  view_.skybox = options.textures ? assets.skybox() : nullptr;
+  view_.skybox = options.textures && !options.physical.hides_skybox ? assets.skybox() : nullptr;
   if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;
     flat.reflections = flat.shadows = flat.layered = false;
@@ -100,7 +102,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
 template <class SetShape>
 void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rgba,
                             const Material* material, const double position[3],
-                            const double rotation[9], SetShape shape) {
+                            const double rotation[9], SetShape shape, const Texture* const* maps) {
   const int index = static_cast<int>(order_.size());
   ViewGeom& g = unsorted_[index];
   g.id = id;
@@ -109,7 +111,7 @@ void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rg
   const Texture* texture = shape(g);
   const bool sight = find_window(view_, g) && rgba[3] > 0;
   if (!sight && !view_.shadows && !(view_.physical.occlusion_reach > 0)) return;
-  set_surface(source, rgba, material, texture, g);
+  set_surface(source, rgba, material, texture, maps, g);
   Order order{sight ? g.transparent : 2, g.min_depth, index};
   if (order.rank == 1) {
     const float* p = g.pos;
@@ -153,7 +155,8 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
   const auto texture_of = [&](const Material& material) {
-    return assets_->texture(material.texture);
+    const bool whole = options_.physical.on && material.texture < 0;
+    return assets_->texture(whole ? material.textures[mjTEXROLE_RGBA] : material.texture);
   };
   const auto add = [&](const rays::RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
@@ -260,7 +263,7 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   view_.near = scene.near;
   view_.far = scene.far;
   view_.shadows = scene.shadows;
-  view_.skybox = scene.skybox;
+  view_.skybox = scene.physical && scene.physical->hides_skybox ? nullptr : scene.skybox;
   view_.physical.shows_environment = !view_.skybox;
   order_.clear();
   const rays::RayGeom* endless = nullptr;  // the first infinite plane
@@ -270,19 +273,23 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
     if (!endless && shape.type == mjGEOM_PLANE && shape.size[0] == 0 && shape.size[1] == 0)
       endless = &shape;
     if (id++ == excluded_geom_) continue;
-    add_shape(shape, id - 1, geom.rgba, &geom.material, position, rotation, [&](ViewGeom& g) {
-      set_primitive(shape.type, geom.object_type, geom.object_id, g);
-      if (geom.bvh || geom.mesh_on_demand) g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
-      g.casts_shadows = geom.casts_shadows;
-      g.bvh = geom.bvh;
-      g.clusters = geom.clusters;
-      g.horizons = geom.horizons;
-      g.mesh = geom.mesh;
-      g.mesh_on_demand = geom.mesh_on_demand;
-      g.height_field = geom.height_field;
-      g.deforms = geom.bvh && !geom.height_field;  // a flex, a skin or a decoration
-      return geom.texture;
-    });
+    add_shape(
+        shape, id - 1, geom.rgba, &geom.material, position, rotation,
+        [&](ViewGeom& g) {
+          set_primitive(shape.type, geom.object_type, geom.object_id, g);
+          if (geom.bvh || geom.mesh_on_demand)
+            g.type = geom.height_field ? mjGEOM_HFIELD : mjGEOM_MESH;
+          g.casts_shadows = geom.casts_shadows;
+          g.bvh = geom.bvh;
+          g.clusters = geom.clusters;
+          g.horizons = geom.horizons;
+          g.mesh = geom.mesh;
+          g.mesh_on_demand = geom.mesh_on_demand;
+          g.height_field = geom.height_field;
+          g.deforms = geom.bvh && !geom.height_field;  // a flex, a skin or a decoration
+          return geom.texture;
+        },
+        geom.maps);
   }
   sort_geoms(rotation);
   view_.num_lights = static_cast<int>(scene.lights.size());
@@ -424,12 +431,14 @@ const MeshSurface* ViewBuilder::soft_surface(int index, const MeshSurface& share
 }
 
 void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
-                              const Material* material, const Texture* texture, ViewGeom& g) const {
+                              const Material* material, const Texture* texture,
+                              const Texture* const* maps, ViewGeom& g) const {
   Surface& s = g.surface;
   s = {};
   std::copy_n(rgba, 4, s.rgba);
   const bool physical = view_.physical.on;
-  for (int i = 0; i < 3; ++i) s.rgba[i] = physical ? linear_of_srgb(rgba[i]) : rgba[i] * tint_;
+  for (int i = 0; i < 3; ++i)
+    s.rgba[i] = physical ? static_cast<float>(srgb_decode(rgba[i])) : rgba[i] * tint_;
   if (g.shows_back) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.shows_back;
   s.specular = 0.5f;
@@ -437,23 +446,25 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   s.highlight_threshold = highlight_threshold_of(s.exponent);
   if (material) s.specular = material->specular;
   if (physical) {
-    s.specular = std::min(0.16f * s.specular * s.specular, 1.0f);  // Filament 4.8.3.2
-    s.metallic = material ? std::clamp(material->metallic, 0.0f, 1.0f) : 0;
-    s.roughness = material ? material->roughness : -1;
-    if (s.roughness < 0) s.roughness = 1 - (material ? material->shininess : 0.5f);
-    s.roughness = std::clamp(s.roughness, 0.0f, 1.0f);
+    s.specular = static_cast<float>(dielectric_f0(s.specular));
+    s.metallic = static_cast<float>(metallic_of(material ? material->metallic : -1));
+    s.roughness = static_cast<float>(
+        material ? roughness_of(material->roughness, material->shininess) : roughness_of(-1, 0.5));
   }
   if (!material) return;
   s.emission = material->emission;
   if (!options_.textures) return;
-  s.texture = texture && texture->levels > 0 ? texture : nullptr;
-  if (!s.texture) return;
+  s.texture = texture && texture->levels > 0 && !texture->grey ? texture : nullptr;
+  if (physical) set_maps(*material, maps, s);
+  if (s.maps[kOpacityMap]) g.transparent = true;
+  if (!s.texture && !s.mapped) return;
   const bool uniform = material->uniform;
   const bool coordinates = g.mesh_on_demand ? g.mesh_on_demand->has_uvs() : g.mesh && g.mesh->uvs;
-  s.uses_mesh_uvs = coordinates && !s.texture->cube;
+  s.uses_mesh_uvs = coordinates && (s.mapped || !s.texture->cube);
   // MuJoCo textures flexes by their own coordinates only.
   if (g.object_type == mjOBJ_FLEX && !s.uses_mesh_uvs) {
     s.texture = nullptr;
+    s.mapped = false;
     return;
   }
   const bool soft = g.object_type == mjOBJ_FLEX || g.object_type == mjOBJ_SKIN;
@@ -488,9 +499,24 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
   }
 }
 
+void ViewBuilder::set_maps(const Material& material, const Texture* const* maps, Surface& s) const {
+  for (int i = 0; i < kNumTextureMaps; ++i) {
+    const Texture* map =
+        maps ? maps[i]
+             : assets_->texture(texture_of(material.textures, static_cast<TextureMap>(i)));
+    if (!map || map->levels == 0 || map->cube) continue;
+    s.maps[i] = map;
+    s.mapped = true;
+  }
+  const auto is_in = [&](TextureMap map) { return s.maps[map] || s.maps[kOrmMap]; };
+  if (is_in(kRoughnessMap) && material.roughness < 0) s.roughness = 1;
+  if (is_in(kMetallicMap) && material.metallic < 0) s.metallic = 1;
+  if (s.maps[kEmissiveMap] && s.emission == 0) s.emission = 1;
+}
+
 // A colour of the sky as the kernels need it: radiance, if the view is physically based.
 float ViewBuilder::shown(float color) const {
-  return view_.physical.on ? linear_of_srgb(color) * view_.physical.unit : color;
+  return view_.physical.on ? static_cast<float>(srgb_decode(color)) * view_.physical.unit : color;
 }
 
 // The sky's cylinder and the haze are at least (1 - width) times the cylinder's radius away; the

@@ -42,8 +42,9 @@ struct DrawnGeom {
   rays::RayGeom shape;  // `center` and `half` are set
   float rgba[4];
   Material material;
-  const Texture* texture;      // null: none
-  int object_id, object_type;  // for segmentation
+  const Texture* texture;                // null: none
+  const Texture* maps[kNumTextureMaps];  // null: none
+  int object_id, object_type;            // for segmentation
   bool casts_shadows;
   const MeshSurface* mesh;       // null unless the shape has triangles
   MeshOnDemand* mesh_on_demand;  // as in ViewGeom
@@ -118,11 +119,15 @@ class ViewBuilder {
   const MeshSurface* soft_surface(int index, const MeshSurface& shared, const float* normals,
                                   const float* positions, const int* faces);
   void set_surface(const rays::RayGeom& source, const float* rgba, const Material* material,
-                   const Texture* texture, ViewGeom& g) const;
-  // shape(g) sets the fields that depend on the kind of object.
+                   const Texture* texture, const Texture* const* maps, ViewGeom& g) const;
+  // Sets the maps of a physically based view, and the factors that are 1 because of them.
+  void set_maps(const Material& material, const Texture* const* maps, Surface& s) const;
+  // shape(g) sets the fields that depend on the kind of object and returns the texture of its colours.
+  // `maps`: those of the geom, otherwise of `assets_`.
   template <class SetShape>
   void add_shape(const rays::RayGeom& source, int id, const float* rgba, const Material* material,
-                 const double position[3], const double rotation[9], SetShape shape);
+                 const double position[3], const double rotation[9], SetShape shape,
+                 const Texture* const* maps = nullptr);
   void sort_geoms(const double rotation[9]);
   void set_occluders();
   // Whether the geom ends the search for the mirror. If it reflects, build(p, r) must return the

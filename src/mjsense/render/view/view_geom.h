@@ -3,6 +3,7 @@
 // A geom of a view: its pose, shape and material in the camera's frame.
 
 #include "mjsense/render/view/surface_assets.h"
+#include "mjsense/render/view/texture_maps.h"
 
 namespace mjsense::rays {
 class Horizons;
@@ -19,12 +20,14 @@ struct Surface {
   float roughness, metallic;  // 0..1, for physically based views
   float exponent;             // 128 * shininess
   float highlight_threshold;  // (N . H)^2 below which the specular highlight is 0, or -1
-  const Texture* texture;     // null: no texture
-  // For 2D textures: coordinates are multiplied by uv_scale, then uv_offset is added.
+  const Texture* texture;     // of the colours; null: none
+  const Texture* maps[kNumTextureMaps];  // for physically based views; null: none
+  bool mapped;                           // whether there are any
+  // For 2D textures and maps: coordinates are multiplied by uv_scale, then uv_offset is added.
   float uv_scale[2], uv_offset[2];
   float cube_scale[3];     // for cube maps: multiplies the direction in which the texture is read
-  bool uses_mesh_uvs;      // 2D texture with the mesh's own texture coordinates
-  bool projected_along_z;  // 2D texture projected along the geom's z axis
+  bool uses_mesh_uvs;      // 2D textures with the mesh's own texture coordinates
+  bool projected_along_z;  // 2D textures projected along the geom's z axis
 
   bool operator==(const Surface&) const = default;
 };

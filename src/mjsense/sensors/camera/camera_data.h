@@ -9,6 +9,7 @@ namespace mjsense::sensors {
 // clang-format off
 inline constexpr DataField kCameraDataFields[] = {
   {"rgb", DType::kUint8, "B, H, W, 3", "", "Colour image, row 0 at the top."},
+  {"hdr", DType::kFloat32, "B, H, W, 3", "cd/m^2", "Linear radiance, before white balance, exposure and tone mapping; only with shading \"pbr\"."},
   {"depth", DType::kFloat32, "B, H, W, 1", "m", "Distance to the camera plane; 0 where nothing is seen."},
   {"segmentation", DType::kInt32, "B, H, W, 2", "", "(id, mjtObj) of each pixel: geom, flex, skin, site or tendon; (-1, -1) where nothing is seen."},
   {"body_segmentation", DType::kInt32, "B, H, W, 1", "", "Body id of each pixel's geom or site; -1 where there is none."},

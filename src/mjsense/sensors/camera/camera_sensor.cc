@@ -33,11 +33,10 @@ render::MarkerOptions marker_options(const CameraSensorCfg& cfg) {
   return {bits_of(cfg.enabled_site_groups), bits_of(cfg.enabled_tendon_groups), cfg.use_textures};
 }
 
-render::ViewOptions view_options(const CameraSensorCfg& cfg, double near, double far) {
+render::ViewOptions view_options(const CameraSensorCfg& cfg, bool colors, double near, double far) {
   render::ViewOptions options;
   options.groups = bits_of(cfg.enabled_geom_groups);
   options.textures = cfg.use_textures;
-  const bool colors = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
   options.shadows = cfg.use_shadows && colors;
   options.shadow_samples = cfg.shadow_samples;
   options.reflections = colors;
@@ -83,8 +82,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   model_ = init.model;
   find_camera();
   set_clip_planes();
-  assets_ =
-      surface_assets_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
+  assets_ = surface_assets_of(init, colored() || wants("normals"), colored() && cfg_.use_textures);
   clear_fields();
   declare_fields(init.num_worlds);
   worlds_.assign(init.num_worlds, PerWorld{{},
@@ -176,7 +174,7 @@ void CameraSensor::prepare_layers(int num_worlds) {
   // The other fields follow from images that are not stored.
   if (fixed && !optical_flow_ && !owners_ && clean_.empty()) changed_tiles_.resize(num_worlds);
   fixed_layers_.reset();
-  if (rgb_ && cfg_.samples == 1 && fixed)
+  if (colored() && cfg_.samples == 1 && fixed)
     fixed_layers_ =
         std::make_unique<render::FixedLayers>(model_, cfg_.width, cfg_.height, num_worlds);
 }
@@ -188,9 +186,9 @@ void CameraSensor::allocate_workspace(const SensorInit& init) {
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
   workspace_->making.resize(slots);
-  render::ViewOptions options = view_options(cfg_, near_, far_);
+  render::ViewOptions options = view_options(cfg_, colored(), near_, far_);
   options.markers = max_markers();
-  if (wants("rgb")) options.physical = physical_options(cfg_);
+  if (colored()) options.physical = physical_options(cfg_, model_);
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
   const int geoms = static_cast<int>(render::ViewBuilder::max_geoms(model_) + options.markers);
@@ -242,8 +240,9 @@ void CameraSensor::declare_fields(int num_worlds) {
     return &add_field(field, spec, num_worlds);
   };
   constexpr double inf = std::numeric_limits<double>::infinity();
-  rgb_ = depth_ = segmentation_ = bodies_ = entities_ = normals_ = points_ = flow_ = nullptr;
+  rgb_ = hdr_ = depth_ = segmentation_ = bodies_ = entities_ = normals_ = points_ = flow_ = nullptr;
   if (wants("rgb")) rgb_ = add("rgb", {h, w, 3}, 0, 255, Storage::kRgbVideo);
+  if (wants("hdr")) hdr_ = add("hdr", {h, w, 3}, 0, inf);
   if (wants("depth")) {
     depth_ = add("depth", {h, w, 1}, 0, inf, Storage::kDepthVideo);
     if (cfg_.depth_kind == DepthKind::kRay)
@@ -307,6 +306,7 @@ void CameraSensor::compute(const World& world) {
 render::ImageTargets CameraSensor::targets(int world, int thread) {
   render::ImageTargets t;
   if (rgb_) t.rgb = rgb_->data.row<std::uint8_t>(world).data();
+  if (hdr_) t.hdr = hdr_->data.row<float>(world).data();
   if (depth_) t.depth = depth_->data.row<float>(world).data();
   if (segmentation_) t.segmentation = segmentation_->data.row<std::int32_t>(world).data();
   if (normals_) t.normals = normals_->data.row<float>(world).data();

@@ -58,6 +58,7 @@ class CameraSensor final : public Sensor {
   };
   std::string context() const;  // for errors: "camera 'NAME'"
   bool wants(std::string_view type) const;
+  bool colored() const { return wants("rgb") || wants("hdr"); }
   // The parts of initialize(), in order.
   void find_camera();
   void set_clip_planes();
@@ -104,8 +105,9 @@ class CameraSensor final : public Sensor {
   std::unique_ptr<render::FixedLayers> fixed_layers_;  // null: not useful, or the camera moves
   std::unique_ptr<OpticalFlow> optical_flow_;          // null: not requested
   std::unique_ptr<PixelOwners> owners_;                // null: not requested
-  Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *bodies_ = nullptr,
-        *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr, *flow_ = nullptr;
+  Field *rgb_ = nullptr, *hdr_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr,
+        *bodies_ = nullptr, *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr,
+        *flow_ = nullptr;
   Field *intrinsics_ = nullptr, *pose_ = nullptr;
 };
 

@@ -83,6 +83,8 @@ void validate(const CameraSensorCfg& cfg) {
       fail(fmt::format("renderer 'opengl' supports at most {} lights; max_lights is {}",
                        render::kClassicLights, cfg.max_lights));
   }
+  if (cfg.shading != Shading::kPbr && std::ranges::count(cfg.data_types, "hdr"))
+    fail("data type 'hdr' needs shading 'pbr'");
   const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
   if (cfg.depth_noise != DepthNoise::kNone &&
       (!has_depth || cfg.depth_kind != DepthKind::kPlanar || cfg.orthographic))

@@ -6,6 +6,7 @@
 // Fields, only those in data_types; row 0 is the top of the image:
 //
 //   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look
+//   hdr           float32 [B, H, W, 3]  cd/m^2, linear; only with physically based shading
 //   depth         float32 [B, H, W, 1]  m; planar: distance to the camera plane; ray: along the
 //                                       pixel's ray; 0 where nothing is seen
 //   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, _FLEX, _SKIN, _SITE, _TENDON;
@@ -120,9 +121,9 @@ constexpr std::array<std::string_view, 2> enum_names(ClipPlane) { return {"none"
 enum class CameraRenderer { kRays, kOpenGl };
 constexpr std::array<std::string_view, 2> enum_names(CameraRenderer) { return {"rays", "opengl"}; }
 
-inline constexpr std::array<std::string_view, 8> kCameraDataTypes{
-    "rgb",     "depth",       "segmentation", "body_segmentation", "entity_segmentation",
-    "normals", "point_cloud", "flow"};
+inline constexpr std::array<std::string_view, 9> kCameraDataTypes{
+    "rgb",         "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals",
+    "point_cloud", "flow",  "hdr"};
 
 struct CameraSensorCfg : SensorCfg, RgbCfg {
   std::string camera_name;

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "mjsense/core/fields/named_enum.h"
@@ -15,9 +16,9 @@ enum class Shading { kClassic, kPbr };
 constexpr std::array<std::string_view, 2> enum_names(Shading) { return {"classic", "pbr"}; }
 
 // As render::ToneMapping.
-enum class ToneMap { kNeutral, kFilmic, kLinear };
-constexpr std::array<std::string_view, 3> enum_names(ToneMap) {
-  return {"neutral", "filmic", "linear"};
+enum class ToneMap { kNeutral, kFilmic, kLinear, kAgx };
+constexpr std::array<std::string_view, 4> enum_names(ToneMap) {
+  return {"neutral", "filmic", "linear", "agx"};
 }
 
 // Options of colour images that each camera sensor has. A new one is an option of recordings and
@@ -28,7 +29,10 @@ struct RgbCfg {
   NamedEnum<Shading> shading;
   double exposure = 8;
   NamedEnum<ToneMap> tone_mapping;
+  double white_balance = 6504;
+  std::string environment = "model";
   double environment_intensity = 1;
+  double environment_rotation = 0;
   bool ambient_occlusion = true;
 };
 template <class V>
@@ -54,12 +58,26 @@ void visit_fields(V& v, RgbCfg& c) {
       .decides_data();
   v("tone_mapping", c.tone_mapping,
     "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; "
-    "linear: "
-    "clips.")
+    "linear: clips; agx: bright colours become white.")
       .decides_data();
-  v("environment_intensity", c.environment_intensity,
-    "Factor of the light from the surroundings, a neutral bright room.")
+  v("white_balance", c.white_balance, "Colour temperature of the light that appears white.")
+      .unit("K")
+      .within(1667, 25000)
+      .decides_data();
+  v("environment", c.environment,
+    "Light from the surroundings. model: the model's image light, else studio; auto: its image "
+    "light, else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or "
+    "the "
+    "path of an .hdr file, which is also the background.")
+      .decides_data();
+  v("environment_intensity", c.environment_intensity, "Factor of the light from the surroundings.")
       .within(0, 1e6)
+      .decides_data();
+  v("environment_rotation", c.environment_rotation,
+    "Rotation of the surroundings about the world's z axis; a skybox in the background does not "
+    "rotate.")
+      .unit("degrees")
+      .within(-360, 360)
       .decides_data();
   v("ambient_occlusion", c.ambient_occlusion,
     "Darken the light from the surroundings where other geoms are near.")

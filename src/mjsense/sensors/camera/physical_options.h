@@ -7,6 +7,6 @@
 
 namespace mjsense::sensors {
 
-render::PhysicalOptions physical_options(const RgbCfg& cfg);
+render::PhysicalOptions physical_options(const RgbCfg& cfg, const mjModel* model);
 
 }  // namespace mjsense::sensors

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Linear radiance of the surroundings in all directions, as an equirectangular image.
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/render/light/microfacets.h"
+
+namespace mjsense::render {
+
+// The world's z axis is up. The top row looks up, the centre of the image along +x, the quarter left
+// of it along +y.
+struct EnvironmentImage {
+  int width, height;       // width = 2 * height
+  std::vector<float> rgb;  // [height, width, 3], not negative
+
+  // The direction of the point (x, y), in pixels from the left and top border.
+  Vec3 direction(double x, double y) const;
+  // Interpolated between pixels.
+  std::array<float, 3> at(const Vec3& direction) const;
+  // Solid angle of each pixel of a row, sr.
+  double solid_angle(int row) const;
+  // Half of its size.
+  EnvironmentImage halved() const;
+};
+
+// The surroundings that a cube texture of the model shows as its skybox.
+EnvironmentImage skybox_image(const mjModel* model, int texture);
+
+// Whether `name` is the path of a file; names of surroundings have no suffix.
+inline bool is_environment_file(std::string_view name) { return name.ends_with(".hdr"); }
+
+// The bytes of a file. Throws ValueError that names it.
+std::string read_environment_file(const std::string& path);
+
+// A Radiance picture: 32-bit RGBE, equirectangular, of at most 8192 x 4096 pixels. Throws ValueError
+// that names the file.
+EnvironmentImage parse_radiance(const std::string& path, std::string_view bytes);
+
+inline EnvironmentImage read_radiance_file(const std::string& path) {
+  return parse_radiance(path, read_environment_file(path));
+}
+
+}  // namespace mjsense::render
