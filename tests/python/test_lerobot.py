@@ -1,22 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exported data sets, read with LeRobot itself in environments of its own, build/lerobot_VERSION.
+"""Exported data sets, read with LeRobot itself in environments of its own (lerobot_environments.py)."""
 
-MJSENSE_TEST_LEROBOT=1 makes them: 8 GB for 0.4.4 and 0.3.3, which share one, 5 GB for 0.6.1, which needs Python 3.12.
-"""
-
-import glob
 import json
 import os
 import re
-import shutil
 import subprocess
-import sys
 from fractions import Fraction
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from lerobot_environments import environment
 from scenes import ball_scene
 from waiting import MOVES, WAITS, Waiting
 
@@ -25,47 +20,6 @@ pytest.importorskip("pyarrow")
 
 import mjsense as mjs
 from mjsense.exporting import Source
-
-BUILD = Path(__file__).parents[2] / "build"
-
-
-def run_pip(python, *words):
-    pip = [python, "-I", "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", "--retries=1", *words]
-    done = subprocess.run(pip, capture_output=True, text=True)
-    if done.returncode:
-        pytest.skip(f"pip cannot install {' '.join(map(str, words))}: {done.stderr.strip()[-300:]}")
-
-
-def python_312():
-    """A Python of at least 3.12, or None."""
-    pyenv = sorted(glob.glob(os.path.expanduser("~/.pyenv/versions/3.12*/bin/python")))
-    for name in [sys.executable, *filter(None, [shutil.which("python3.12")]), *pyenv]:
-        code = "import sys; sys.exit(sys.version_info < (3, 12))"
-        if subprocess.run([name, "-c", code], capture_output=True).returncode == 0:
-            return name
-    return None
-
-
-def environment(version):
-    """The Python of LeRobot's environment, and its PYTHONPATH."""
-    folder = BUILD / f"lerobot_{version}"
-    if version == "0.3.3":  # only this version and the datasets library that it needs; the rest is that of 0.4.4
-        python, _ = environment("0.4.4")
-        packages = ["--no-deps", "--target", folder, "lerobot==0.3.3", "datasets==3.6.0"]
-    else:
-        python = folder / "bin/python"
-        packages = ["lerobot==0.4.4"] if version == "0.4.4" else [f"lerobot[dataset]=={version}"]
-    if not (folder / "installed").exists():
-        if os.environ.get("MJSENSE_TEST_LEROBOT", "0") == "0":
-            pytest.skip(f"needs {folder}; make it: MJSENSE_TEST_LEROBOT=1 ./dev test -k test_lerobot")
-        if version != "0.3.3":
-            base = sys.executable if version == "0.4.4" else python_312()
-            if base is None:
-                pytest.skip(f"LeRobot {version} needs Python 3.12")
-            subprocess.run([base, "-m", "venv", folder], check=True)
-        run_pip(python, *packages)
-        (folder / "installed").touch()
-    return python, str(folder) if version == "0.3.3" else ""
 
 
 class Height(mjs.Sensor):

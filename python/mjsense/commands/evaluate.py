@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mjsense.commands._policy import add_policy_options, policy_options
 from mjsense.commands._ray import add_ray
@@ -32,7 +32,7 @@ _NOT_OFFERED = (
     "shard",
     "terminate_upon_success",
 )
-_POLICIES = "planner, random, replay:DIR, python:MODULE:CLASS, FILE.py:CLASS, ws://HOST:PORT"
+_POLICIES = "planner, random, replay:DIR, lerobot:DIR, python:MODULE:CLASS, FILE.py:CLASS, ws://HOST:PORT"
 
 
 def add_arguments(parser: Parser) -> None:
@@ -81,6 +81,12 @@ def add_arguments(parser: Parser) -> None:
         help="Time from an observation until the actions that answer it are executed; measured: the time that the policy needs.",
     )
     parser.add_argument(
+        "--vary",
+        metavar="NAMES",
+        help="Evaluate on the same episodes again with each of these factors, one at a time: light, camera, texture, distractors, instruction, "
+        "start, latency=SECONDS; separated by commas.",
+    )
+    parser.add_argument(
         "--no-terminate-upon-success",
         dest="terminate_upon_success",
         action="store_const",
@@ -98,6 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
     from mjsense.commands.output import tell
     from mjsense.core.progress_line import ProgressLine
     from mjsense.evaluation.playing import play
+    from mjsense.evaluation.varied import play_varied
     from mjsense.tasks.record_job import of_recording
 
     options = {"terminate_upon_success": True, **field_values(arguments, "RecordJobCfg"), "task": arguments.task}
@@ -114,17 +121,20 @@ def run(arguments: argparse.Namespace) -> int:
         if line is not None:
             line.show(of_recording(now), now.succeeded + now.failed)
 
+    given: dict[str, Any] = {
+        "policy_options": policy_options(arguments.policy_options) | adapter,
+        "execution_horizon": arguments.execution_horizon,
+        "ensemble": arguments.ensemble,
+        "latency": "measured" if arguments.latency == "measured" else _seconds(arguments.latency),
+        "ray": arguments.ray,
+        "progress": show,
+    }
+    found: Any
     try:
-        found = play(
-            options,
-            arguments.policy,
-            policy_options=policy_options(arguments.policy_options) | adapter,
-            execution_horizon=arguments.execution_horizon,
-            ensemble=arguments.ensemble,
-            latency="measured" if arguments.latency == "measured" else _seconds(arguments.latency),
-            ray=arguments.ray,
-            progress=show,
-        )
+        if arguments.vary is None:
+            found = play(options, arguments.policy, **given)
+        else:
+            found = play_varied(options, arguments.policy, arguments.vary.split(","), **given)
     except Exception as error:
         if line is not None:
             line.end()
@@ -136,7 +146,7 @@ def run(arguments: argparse.Namespace) -> int:
             line.end()
     if not arguments.quiet:
         print(found)
-        tell(f"Wrote results.parquet and report.html into {options['out']}.")
+        tell(f"Wrote results.parquet and report.html into {options['out']}{'/*' if arguments.vary else ''}.")
     return 0
 
 

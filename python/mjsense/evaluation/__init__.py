@@ -26,12 +26,14 @@ _PLACES: dict[str, str] = {
     "PolicyServer": "remote.server",
     "RemotePolicy": "remote.policy",
     "Results": "report",
+    "Sensitivity": "varied",
     "Timed": "timing",
     "compare": "comparison",
     "create_benchmark": "benchmarks",
     "evaluate": "playing",
     "policy_from": "policies",
     "results": "report",
+    "sensitivity": "varied",
 }
 """Module of each public name."""
 __all__ = [
@@ -41,12 +43,14 @@ __all__ = [
     "PolicyServer",
     "RemotePolicy",
     "Results",
+    "Sensitivity",
     "Timed",
     "compare",
     "create_benchmark",
     "evaluate",
     "policy_from",
     "results",
+    "sensitivity",
 ]
 
 

@@ -100,7 +100,8 @@ def evaluate(
             data: its folder, or ``benchmark:pick`` and similar, which the package contains.
         robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
         policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function ``obs -> actions``, or
-            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``python:MODULE:CLASS`` or ``FILE.py:CLASS``.
+            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``lerobot:DIR``, ``python:MODULE:CLASS`` or
+            ``FILE.py:CLASS``.
         out: Output directory.
         episodes: Number of episodes, which are then those from 0 on, or a list of their numbers. A benchmark states them itself.
         scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
@@ -218,6 +219,8 @@ def play(
         noise = bool(made.settings.get("action_noise", False))
     if execution_horizon is None:
         execution_horizon = getattr(made, "execution_horizon", None)
+    if ensemble is None:
+        ensemble = getattr(made, "ensemble", None)
     timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
     if any(value is not None for value in timing.values()):
         if not isinstance(made, Policy):

@@ -18,6 +18,7 @@ from mjsense.tasks.policy import Policy, policy_names, policy_of
 
 PREFIXES = {
     "replay": "mjsense.evaluation.replayed:policy_of",
+    "lerobot": "mjsense.evaluation.lerobot_policy:policy_of",
     "python": "mjsense.evaluation.policies:of_module",
     "ws": "mjsense.evaluation.remote.policy:policy_of",
     "wss": "mjsense.evaluation.remote.policy:policy_of",
@@ -47,7 +48,7 @@ def policy_from(policy: Any, **options: Any) -> Policy | str:
         return _of_object(RandomPolicy, options)
     known = policy_names()
     if policy not in known:
-        forms = "replay:DIR, python:MODULE:CLASS, FILE.py:CLASS or ws://HOST:PORT"
+        forms = "replay:DIR, lerobot:DIR, python:MODULE:CLASS, FILE.py:CLASS or ws://HOST:PORT"
         raise ValueError(
             f"policy '{policy}' is neither a name nor {forms}{did_you_mean(policy, ['random', *known], 'names are')}"
         )

@@ -159,7 +159,7 @@ class TaskVectorEnv(VectorEnv):
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
         seed. An environment that has never received a seed plays other episodes than all others. With ``episodes``, a reset of all
-        worlds begins with the first of them."""
+        worlds begins with the first of them. ``options["episodes"]`` gives the number of the episode of each of these worlds."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -175,7 +175,7 @@ class TaskVectorEnv(VectorEnv):
             mask[:] = True
         if self._episodes is not None and mask.all():
             self._next_episode = 0
-        self._begin(np.flatnonzero(mask))
+        self._begin(np.flatnonzero(mask), self._given(options, int(mask.sum())))
         return self._observe(), self._episode_infos()
 
     def _one_seed(self, seed: Any) -> int:
@@ -190,11 +190,25 @@ class TaskVectorEnv(VectorEnv):
             raise error(f"seed must be an int of 64 bits from 0 on, not {seed!r}")
         return int(seed)
 
-    def _begin(self, worlds: np.ndarray) -> None:
+    def _given(self, options: dict[str, Any] | None, count: int) -> list[int] | None:
+        """The numbers of the episodes in the options of a reset."""
+        if not options or "episodes" not in options:
+            return None
+        numbers = [checked_episodes("reset()", [number])[0] for number in options["episodes"]]
+        if self._episodes is not None:
+            raise ValueError("reset(): options['episodes'] is given, but the environment was made with episodes of its own")
+        if len(numbers) != count:
+            raise ValueError(f"reset(): options['episodes'] has {len(numbers)} numbers for {count} worlds")
+        return numbers
+
+    def _begin(self, worlds: np.ndarray, given: list[int] | None = None) -> None:
         numbers = range(self._next_episode, self._next_episode + len(worlds))
         episodes = list(numbers) if self._episodes is None else self._episodes[numbers.start : numbers.stop]
+        if given is None:
+            self._next_episode += len(episodes)
+        else:
+            episodes = given
         worlds, idle = worlds[: len(episodes)], worlds[len(episodes) :]
-        self._next_episode += len(episodes)
         if len(worlds):
             self._rollout.start(worlds.tolist(), episodes)
         for world in idle:

@@ -19,6 +19,7 @@ class JointPositionRelative final : public ChangeController {
   }
   void describe(MoveGroup& group) const override {
     ActuatedController::describe(group);
+    group.command_unit += ", relative";
     for (int i = 0; i < size(); ++i) {
       const double span = group_.ctrl_high[i] - group_.ctrl_low[i];
       group.command_low[i] = -span;
