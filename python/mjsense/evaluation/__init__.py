@@ -15,9 +15,13 @@ if TYPE_CHECKING:
     from mjsense.evaluation.playing import evaluate as evaluate
     from mjsense.evaluation.policies import policy_from as policy_from
     from mjsense.evaluation.protocol import BatchedPolicy as BatchedPolicy
+    from mjsense.evaluation.remote.policy import RemotePolicy as RemotePolicy
+    from mjsense.evaluation.remote.server import PolicyServer as PolicyServer
     from mjsense.evaluation.report import Results as Results
     from mjsense.evaluation.report import results as results
     from mjsense.evaluation.timing import Timed as Timed
+    from mjsense.evaluation.varied import Sensitivity as Sensitivity
+    from mjsense.evaluation.varied import sensitivity as sensitivity
 
 _PLACES: dict[str, str] = {
     "Benchmark": "benchmarks",

@@ -45,7 +45,8 @@ class LeRobotPolicy(Policy):
         map: The map that the export had: a TOML file.
     """
 
-    observation = ()
+    observation: tuple[str, ...] = ()
+    """Streams of the checkpoint's features, once the worlds are known."""
     execution_horizon: int | None = None
     """Number of actions of a chunk that are executed before the policy is called again."""
     ensemble: float | None = None
@@ -90,6 +91,7 @@ class LeRobotPolicy(Policy):
         self._rows = {spec.name: rows for _, spec, rows in streams}
         self._features = Features({spec.name: spec for _, spec, _ in streams}, self.action_groups, self.map)
         self._features.check(self._inputs, self._owner)
+        self.observation = tuple(dict.fromkeys(stream for feature in self._inputs for stream in self._features.streams[feature]))
         for feature, shape in self._inputs.items():
             here = self._features.shape(feature)
             if feature.startswith(IMAGES) and (here[2], here[0], here[1]) != shape:
