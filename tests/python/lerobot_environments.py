@@ -63,7 +63,7 @@ def with_mjsense(version):
     python, _ = environment(version)
     folder = BUILD / f"lerobot_{version}_mjsense"
     if not (folder / "installed").exists():
-        run_pip(python, "--no-deps", "--target", folder, "nanobind-backend", "mujoco-core", "h5py")
+        run_pip(python, "--no-deps", "--target", folder, "nanobind-backend", "mujoco-core", "h5py", "msgpack", "websockets")
         (folder / "installed").touch()
     plugin = ROOT / "packaging/lerobot_env_mjsense"
     run_pip(python, "--no-deps", "--upgrade", "--target", folder / "plugin", plugin)

@@ -4,6 +4,7 @@
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -177,6 +178,17 @@ def test_mjsense_and_lerobot_eval_play_the_same_episodes(recorded, tmp_path, ver
         # The last observation of LeRobot 0.4.4 is the first of the next episode.
         np.testing.assert_array_equal(mine.astype(np.float32)[:20], theirs["states"][world][:20])
     assert "largest difference" in run(python, variables, scripts / "lerobot_steps.py", "memory", trained, 3)
+    serve = ["-m", "mjsense", "serve", f"lerobot:{trained}", "--task", "pick", "--size", "64x64", "--port", "0"]
+    with subprocess.Popen([python, *map(str, serve)], stdout=subprocess.PIPE, text=True, env={**os.environ, **variables}) as server:
+        assert server.stdout is not None
+        try:
+            url = next(found[0] for line in server.stdout if (found := re.search(r"ws://\S+\d", line)))  # LeRobot prints lines before it
+            served = mjs.evaluate("pick", policy=url, episodes=2, num_worlds=2, horizon=20, out=tmp_path / "served", progress=False, **OPTIONS)
+        finally:
+            server.terminate()
+    for mine, other in zip(mjs.Dataset(tmp_path / "ours").episodes, served.dataset.episodes, strict=True):
+        # The server computes one row for each call, and torch's results depend on the number of rows.
+        np.testing.assert_allclose(other["obs/agent/qpos/arm"], mine["obs/agent/qpos/arm"], atol=1e-4)
     words = ["--env.type=mjsense", "--env.task=pick", "--env.env_seed=5", "--env.width=64", "--env.height=64", "--env.horizon=20", "--seed=0",
              "--env.options={shadows: false}", f"--policy.path={trained}", "--policy.device=cpu", "--eval.batch_size=2", "--eval.n_episodes=2",
              f"--output_dir={tmp_path / 'eval'}"]  # fmt: skip

@@ -73,7 +73,8 @@ class Field(NamedTuple):
         parts = ([] if text == "none" else text.split(",")) if self.is_list else [text]
         values = [self._of_word(part) for part in parts]
         if None in values or (self.is_list and "" in parts):
-            raise ValueError(f"{place} is '{text}': must be {self.expected}")
+            separated = ", separated by commas, or none" if self.is_list else ""
+            raise ValueError(f"{place} is '{text}': must be {self.expected}{separated}")
         return self._checked(values if self.is_list else values[0], place)
 
     def of_toml(self, value: Any, place: str) -> Any:

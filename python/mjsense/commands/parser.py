@@ -76,6 +76,8 @@ class Parser(argparse.ArgumentParser):
                 continue
             names = NAMES.get(_NAMED.get(field.flag, ""), ())
             listed = f" One of: {', '.join(names)}." if field.flag in _LISTED else ""
+            if field.is_list:
+                listed += " Separated by commas; none: an empty list."
             action = self.add_argument(
                 flag, dest=field.name, default=argparse.SUPPRESS, metavar=field.metavar, help=field.help + listed
             )

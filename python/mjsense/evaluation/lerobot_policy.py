@@ -7,6 +7,7 @@ import contextlib
 import hashlib
 import importlib
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ class LeRobotPolicy(Policy):
         map: The map that the export had: a TOML file.
     """
 
-    observation: tuple[str, ...] = ()
+    observation: Sequence[str] | None = ()
     """Streams of the checkpoint's features, once the worlds are known."""
     execution_horizon: int | None = None
     """Number of actions of a chunk that are executed before the policy is called again."""
