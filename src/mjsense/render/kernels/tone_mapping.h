@@ -2,7 +2,7 @@
 #pragma once
 // From linear radiance to the colours of an image. Part of the tile kernels.
 
-#include "mjsense/render/kernels/texture.h"
+#include "mjsense/render/kernels/shading.h"
 
 namespace mjsense::render {
 namespace {
