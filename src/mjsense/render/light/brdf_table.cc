@@ -26,13 +26,11 @@ BrdfTable::Entry integrate_brdf(double roughness, double n_v, int samples) {
 }
 
 BrdfTable::Entry BrdfTable::at(float roughness, float n_v) const {
-  const auto place = [](float x) {
-    const float at = std::clamp(x, 0.0f, 1.0f) * (kSize - 1);
-    const int low = std::min(static_cast<int>(at), kSize - 2);
-    return std::pair{low, at - static_cast<float>(low)};
-  };
-  const auto [row, down] = place(roughness);
-  const auto [column, across] = place(n_v);
+  const auto place = [](float x) { return std::clamp(x, 0.0f, 1.0f) * (kSize - 1); };
+  const float y = place(roughness), x = place(n_v);
+  const int row = std::min(static_cast<int>(y), kSize - 2);
+  const int column = std::min(static_cast<int>(x), kSize - 2);
+  const float down = y - static_cast<float>(row), across = x - static_cast<float>(column);
   const auto mix = [&](float Entry::*part) {
     const auto along = [&](int r) {
       const float left = entries[r][column].*part, right = entries[r][column + 1].*part;
