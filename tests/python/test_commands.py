@@ -186,7 +186,7 @@ def test_texts_are_read(field, text, value):
     (STEPS, "4.5", "--x is '4.5': must be an int"), (STEPS, "99999999999", "--x is '99999999999': must be an int"),
     (STEPS, "0", "--x is 0: must be between 1 and 9"), (STEPS, "1_0", "--x is '1_0': must be an int"), (STEPS, " 4", "--x is ' 4': must be an int"),
     (SEED, "-1", "--x is '-1': must be an int from 0 on"), (Field("on", "on", "on", "bool", ""), "1", "--x is '1': must be a bool"),
-    (Field("m", "m", "m", "text", "", is_list=True), "a,,b", "--x is 'a,,b': must be a list, each a str"),
+    (Field("m", "m", "m", "text", "", is_list=True), "a,,b", "--x is 'a,,b': must be a list, each a str, separated by commas, or none"),
     (Field("x", "x", "x", "number", "", low=0, above_low=True), "nan", "--x is nan: must be above 0"),
     (Field("s", "s", "s", "text", "", words=("left", "right")), "rihgt", "--x is 'rihgt': must be one of left, right; did you mean 'right'?"),
 ))  # fmt: skip
