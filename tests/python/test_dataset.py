@@ -17,6 +17,7 @@ import pytest
 from edited_recordings import changed
 
 import mjsense as mjs
+from mjsense.dataset.json_rows import decode
 from mjsense.dataset import video
 
 SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
@@ -412,3 +413,9 @@ def test_files_without_attributes(tmp_path, root):
     np.testing.assert_array_equal(dataset[5]["obs/agent/qpos/arm"], ours[5]["obs/agent/qpos/arm"])
     with pytest.raises(KeyError, match="it has no videos"):
         dataset.episodes[0].video("wrist_camera")
+
+
+def test_integers_that_no_float_has_stay_integers():
+    rows = np.frombuffer(b'{"a": 1' + b"0" * 400 + b"}", np.uint8)[None]
+    values, given = decode(rows)["/a"]
+    assert values[0] == 10**400 and given.all()

@@ -27,7 +27,7 @@ def _array(values: list[Any]) -> np.ndarray:
         return np.array(values, bool)
     try:
         return np.array(values, np.float64)
-    except (TypeError, ValueError):  # text, or lists of different lengths
+    except (TypeError, ValueError, OverflowError):  # text, lists of different lengths, or integers that no float64 has
         array = np.empty(len(values), object)
         array[:] = values
         return array
