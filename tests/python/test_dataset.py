@@ -17,7 +17,7 @@ import pytest
 from edited_recordings import changed
 
 import mjsense as mjs
-from mjsense.dataset.json_rows import decode
+from mjsense.dataset import json_rows as rows_as_json
 from mjsense.dataset import video
 
 SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
@@ -417,5 +417,5 @@ def test_files_without_attributes(tmp_path, root):
 
 def test_integers_that_no_float_has_stay_integers():
     rows = np.frombuffer(b'{"a": 1' + b"0" * 400 + b"}", np.uint8)[None]
-    values, given = decode(rows)["/a"]
+    values, given = rows_as_json.decode(rows)["/a"]
     assert values[0] == 10**400 and given.all()
