@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsense.core.optional import optional
+from mjsense.dataset import parquet_footer
 from mjsense.dataset.limits import EPISODES, STEPS, TEXT_BYTES
 from mjsense.dataset.places import open_plain, printable
 
@@ -33,6 +34,9 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with open_plain(path) as plain:
         try:
+            if other := parquet_footer.codecs(path, plain) - set(_PACKED):
+                raise ValueError(f"{path} is packed with {min(other)}; it must be {' or '.join(_PACKED)}")
+            plain.seek(0)
             _check_columns(path, parquet.ParquetFile(arrow.PythonFile(plain, "r")))
             # Dictionaries of texts: a text that occurs in many rows is not copied for each of them.
             file = parquet.ParquetFile(arrow.PythonFile(plain, "r"), read_dictionary=list(_TEXTS))
@@ -55,10 +59,6 @@ def _check_columns(path: Path, file: Any) -> None:
             )
     if metadata.num_rows > EPISODES:
         raise ValueError(f"{path} has {metadata.num_rows} rows, more than {EPISODES}")
-    for group in range(metadata.num_row_groups):
-        for column in range(metadata.num_columns):
-            if (packed := metadata.row_group(group).column(column).compression) not in _PACKED:
-                raise ValueError(f"{path} is packed with {packed}; it must be {' or '.join(_PACKED)}")
 
 
 def _check_texts(path: Path, batch: Any) -> None:
