@@ -148,15 +148,15 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
 
 void SceneRenderer::trace_paths(const View& view, std::uint8_t* rgb) {
   // Meshes and textures that are prepared on demand belong to one thread.
+  const auto prepare = [](const Texture* texture) {
+    if (texture && texture->on_demand) texture->on_demand->add_level(0);
+  };
+  prepare(view.skybox);
   for (int i = 0; i < view.num_geoms; ++i) {
     const ViewGeom& g = view.geoms[i];
     if (g.mesh_on_demand) g.mesh_on_demand->prepare_surface(g.surface.uses_mesh_uvs);
-    const auto prepare = [](const Texture* texture) {
-      if (texture && texture->on_demand) texture->on_demand->add_level(0);
-    };
     prepare(g.surface.texture);
     for (const Texture* map : g.surface.maps) prepare(map);
-    prepare(view.skybox);
   }
   if (around_ != physical_.environment) {
     sampler_ = std::make_shared<const EnvironmentSampler>(physical_.environment->light);

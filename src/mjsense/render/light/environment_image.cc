@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/render/light/cube_map.h"
 #include "mjsense/render/light/tone_map.h"
 
 namespace mjsense::render {
@@ -20,19 +21,6 @@ EnvironmentImage image_of(int height, Radiance radiance) {
       for (double c : color) image.rgb.push_back(static_cast<float>(c));
     }
   return image;
-}
-
-// The face (+x -x +y -y +z -z) and the position on it, -1..1, at which OpenGL reads a cube map.
-struct CubePlace {
-  int face;
-  double s, t;
-};
-
-CubePlace cube_place(const Vec3& d) {
-  const double x = std::abs(d[0]), y = std::abs(d[1]), z = std::abs(d[2]);
-  if (x >= y && x >= z) return {d[0] < 0 ? 1 : 0, (d[0] < 0 ? d[2] : -d[2]) / x, -d[1] / x};
-  if (y >= z) return {d[1] < 0 ? 3 : 2, d[0] / y, (d[1] < 0 ? -d[2] : d[2]) / y};
-  return {d[2] < 0 ? 5 : 4, (d[2] < 0 ? -d[0] : d[0]) / z, -d[1] / z};
 }
 
 }  // namespace

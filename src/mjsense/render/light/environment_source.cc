@@ -11,7 +11,9 @@
 #include "mjsense/core/content_cache.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/thread_pool.h"
+#include "mjsense/render/light/cube_map.h"
 #include "mjsense/render/light/material.h"
+#include "mjsense/render/light/tone_map.h"
 
 namespace mjsense::render {
 namespace {
@@ -91,24 +93,10 @@ class Lobe {
   double total_ = 0;
 };
 
-// The direction of texel (x, y) of a face of `size` texels. Texels on a common edge of two faces have
-// exactly the same.
+// The direction of texel (x, y) of a face of `size` texels.
 Vec3 texel_direction(int face, int x, int y, int size) {
-  const double s = (2.0 * x - (size - 1)) / (size - 1), t = (2.0 * y - (size - 1)) / (size - 1);
-  switch (face) {
-    case 0:
-      return unit({1, -t, -s});
-    case 1:
-      return unit({-1, -t, s});
-    case 2:
-      return unit({s, 1, t});
-    case 3:
-      return unit({s, -1, -t});
-    case 4:
-      return unit({s, -t, 1});
-    default:
-      return unit({-s, -t, -1});
-  }
+  return cube_direction(
+      {face, (2.0 * x - (size - 1)) / (size - 1), (2.0 * y - (size - 1)) / (size - 1)});
 }
 
 void prefilter(const EnvironmentImage& image, Environment& out) {
@@ -188,8 +176,8 @@ void normalize(EnvironmentImage& image) {
   const float* pixel = image.rgb.data();
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x, pixel += 3)
-      mean += image.solid_angle(y) / (4 * std::numbers::pi) *
-              (0.2126729 * pixel[0] + 0.7151522 * pixel[1] + 0.0721750 * pixel[2]);
+      mean +=
+          image.solid_angle(y) / (4 * std::numbers::pi) * luminance({pixel[0], pixel[1], pixel[2]});
   if (mean > 0)
     for (float& value : image.rgb) value = static_cast<float>(value / mean);
 }
@@ -242,17 +230,11 @@ std::shared_ptr<const Environment> of_texture(const mjModel* m, int id) {
 }  // namespace
 
 std::shared_ptr<const Environment> prepared(EnvironmentImage image) {
-  static ContentCache<Environment> all;
   normalize(image);
-  const ContentKey key = ContentKey()
-                             .add(std::span<const float>(image.rgb))
-                             .add(std::span<const int>(&image.width, 1));
-  return all.get(key, [&] {
-    auto made = std::make_shared<Environment>();
-    project(image, made->light.irradiance);
-    prefilter(image, *made);
-    return made;
-  });
+  auto made = std::make_shared<Environment>();
+  project(image, made->light.irradiance);
+  prefilter(image, *made);
+  return made;
 }
 
 std::shared_ptr<const Environment> environment(const mjModel* model, const std::string& name) {

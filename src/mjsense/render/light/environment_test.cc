@@ -105,9 +105,12 @@ TEST(Environment, NeighbouringFacesHaveEqualEdges) {
 }
 
 TEST(Environment, EqualSurroundingsArePreparedOnce) {
-  const auto image = [] { return image_of(16, [](const Vec3& d, int) { return 2 + d[0]; }); };
-  const auto first = prepared(image());
-  EXPECT_EQ(first, prepared(image()));
+  const std::string xml =
+      R"(<asset><texture type="skybox" builtin="gradient" rgb1="1 1 1" rgb2="0 0 0" width="8"
+          height="48"/></asset><worldbody><geom size="1"/></worldbody>)";
+  const testing::TestRenderer one(xml), other(xml);
+  const auto first = environment(one.model.get(), "skybox");
+  EXPECT_EQ(first, environment(other.model.get(), "auto"));
 }
 
 TEST(Environment, SkyboxIsLinearAndStandsUpright) {

@@ -72,13 +72,8 @@ Rgb64 white_balance(double kelvin) {
   const Rgb64 color = seen(kelvin), day = seen(kDaylight);
   Rgb64 gains;
   for (int i = 0; i < 3; ++i) gains[i] = 1 / std::max(color[i] / day[i], 0.02);
-  const Rgb64 weights{0.2126729, 0.7151522, 0.0721750};
-  double luminance = 0, whole = 0;
-  for (int i = 0; i < 3; ++i) {
-    luminance += weights[i] * gains[i];
-    whole += weights[i];
-  }
-  for (double& gain : gains) gain *= whole / luminance;
+  const double scale = luminance({1, 1, 1}) / luminance(gains);
+  for (double& gain : gains) gain *= scale;
   return gains;
 }
 

@@ -11,6 +11,11 @@ namespace mjsense::render {
 double srgb_encode(double linear);
 double srgb_decode(double encoded);
 
+// Of linear sRGB.
+inline double luminance(const Rgb64& rgb) {
+  return 0.2126729 * rgb[0] + 0.7151522 * rgb[1] + 0.0721750 * rgb[2];
+}
+
 // Factor of the luminance, cd/m^2, so that 1 is the most that a camera with this exposure (EV at ISO
 // 100) can record without clipping: ISO 12232's saturation, as in Filament 8.1.
 double exposure_scale(double ev);

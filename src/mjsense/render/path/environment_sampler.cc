@@ -5,48 +5,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/render/light/cube_map.h"
+#include "mjsense/render/light/tone_map.h"
+
 namespace mjsense::render {
 namespace {
-
-// The face of a cube map (+x -x +y -y +z -z) in a direction, and the place on it, -1..1.
-struct FacePlace {
-  int face;
-  double s, t;
-
-  explicit FacePlace(const Vec3& d) {
-    const double x = std::abs(d[0]), y = std::abs(d[1]), z = std::abs(d[2]);
-    if (x >= y && x >= z) {
-      face = d[0] < 0;
-      s = (d[0] < 0 ? d[2] : -d[2]) / x;
-      t = -d[1] / x;
-    } else if (y >= z) {
-      face = 2 + (d[1] < 0);
-      s = d[0] / y;
-      t = (d[1] < 0 ? -d[2] : d[2]) / y;
-    } else {
-      face = 4 + (d[2] < 0);
-      s = (d[2] < 0 ? -d[0] : d[0]) / z;
-      t = -d[1] / z;
-    }
-  }
-};
-
-Vec3 direction_of(int face, double s, double t) {
-  switch (face) {
-    case 0:
-      return unit({1, -t, -s});
-    case 1:
-      return unit({-1, -t, s});
-    case 2:
-      return unit({s, 1, t});
-    case 3:
-      return unit({s, -1, -t});
-    case 4:
-      return unit({s, -t, 1});
-    default:
-      return unit({-s, -t, -1});
-  }
-}
 
 // Solid angle of an area 1 on a face, at (s, t).
 double solid_angle(double s, double t) { return std::pow(1 + s * s + t * t, -1.5); }
@@ -64,10 +27,6 @@ struct CellPlace {
 };
 
 }  // namespace
-
-double luminance(const Rgb64& rgb) {
-  return 0.2126729 * rgb[0] + 0.7151522 * rgb[1] + 0.0721750 * rgb[2];
-}
 
 EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
     : size_(static_cast<int>(light.radiance.width[0])) {
@@ -98,7 +57,7 @@ EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
 }
 
 Rgb64 EnvironmentSampler::radiance(const Vec3& direction) const {
-  const FacePlace at(direction);
+  const CubePlace at = cube_place(direction);
   const CellPlace x(at.s, size_ - 1), y(at.t, size_ - 1);
   const auto* texel = &texels_[(at.face * size_ + y.cell) * size_ + x.cell];
   Rgb64 out;
@@ -114,11 +73,11 @@ Vec3 EnvironmentSampler::sample(double choice, double u, double v) const {
   const int cell = static_cast<int>(std::min<std::ptrdiff_t>(
       found - ends_.begin(), static_cast<std::ptrdiff_t>(ends_.size()) - 1));
   const int x = cell % cells, y = cell / cells % cells;
-  return direction_of(cell / (cells * cells), 2 * (x + u) / cells - 1, 2 * (y + v) / cells - 1);
+  return cube_direction({cell / (cells * cells), 2 * (x + u) / cells - 1, 2 * (y + v) / cells - 1});
 }
 
 double EnvironmentSampler::density(const Vec3& direction) const {
-  const FacePlace at(direction);
+  const CubePlace at = cube_place(direction);
   const int cells = size_ - 1;
   const CellPlace x(at.s, cells), y(at.t, cells);
   const int cell = (at.face * cells + y.cell) * cells + x.cell;

@@ -31,6 +31,4 @@ class EnvironmentSampler {
   double mean_ = 0;
 };
 
-double luminance(const Rgb64& rgb);
-
 }  // namespace mjsense::render

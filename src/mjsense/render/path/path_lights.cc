@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/render/light/tone_map.h"
+
 namespace mjsense::render {
 namespace {
 
