@@ -148,7 +148,7 @@ SPECS = {
 }  # fmt: skip
 RANGES = {"actions/joint_pos/arm": (-3, 3), "actions/joint_pos/gripper": (0, 255)}
 STREAMS = {
-    name: (name.split("/")[0], SimpleNamespace(name=name, shape=shape, dtype=dtype, is_dict=False, low=RANGES.get(name, (0, 0))[0], high=RANGES.get(name, (0, 0))[1]), None)
+    name: (name.split("/")[0], SimpleNamespace(name=name, unit="", shape=shape, dtype=dtype, is_dict=False, low=RANGES.get(name, (0, 0))[0], high=RANGES.get(name, (0, 0))[1]), None)
     for name, (shape, dtype) in SPECS.items()
 }
 GROUPS = {"gripper": slice(0, 1), "arm": slice(1, 8)}

@@ -245,12 +245,10 @@ def digests_of(benchmark: Benchmark, num_worlds: int = 4) -> dict[str, Any]:
 
 def _digests(env: TaskVectorEnv, world: int) -> dict[str, str]:
     """Checksums of what an episode starts with: what the task says of it, the state, and the model."""
-    model = env.sim.model_of(world)
-    arrays = [(name, getattr(model, name)) for name in sorted(dir(model)) if not name.startswith("_")]
     contents = {
         "episode": [json.dumps(json.loads(env._rollout.obs_scene(world)), sort_keys=True).encode()],
         "state": [env.sim.state[world].tobytes()],
-        "model": [part for name, value in arrays if isinstance(value, np.ndarray) for part in (name.encode(), value.tobytes())],
+        "model": [part for name, value in arrays_of(env.sim.model_of(world)) for part in (name.encode(), value.tobytes())],
     }
     return {name: hashlib.sha256(b"".join(parts)).hexdigest()[:16] for name, parts in contents.items()}
 
@@ -284,12 +282,18 @@ def _difference(env: TaskVectorEnv, world: int, stored: Episode) -> str:
     if len(different := np.flatnonzero(state.view(np.uint64) != before.view(np.uint64))):
         i = different[0]
         return f"{len(different)} of {len(state)} numbers of the state differ, the first by {state[i] - before[i]:.3g}"
-    was, model = stored.model(), env.sim.model_of(world)
-    for name in (name for name in dir(was) if not name.startswith("_")):
-        old, new = getattr(was, name), getattr(model, name, None)
-        if isinstance(old, np.ndarray) and (not isinstance(new, np.ndarray) or old.tobytes() != new.tobytes()):
+    now = dict(arrays_of(env.sim.model_of(world)))
+    for name, old in arrays_of(stored.model()):
+        if name not in now or old.tobytes() != now[name].tobytes():
             return f"the model's {name} differs"
     return ""
+
+
+def arrays_of(model: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Names and values of the arrays of an MjModel, by name."""
+    for name in sorted(dir(model)):
+        if not name.startswith("_") and isinstance(value := getattr(model, name), np.ndarray):
+            yield name, value
 
 
 def _recipe(recipe: Any, path: Path) -> dict[str, Any]:

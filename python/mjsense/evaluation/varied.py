@@ -13,7 +13,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.errors import did_you_mean, printable
-from mjsense.evaluation.benchmarks import Benchmark, is_benchmark
+from mjsense.evaluation.benchmarks import Benchmark, arrays_of, is_benchmark
 from mjsense.evaluation.comparison import Comparison
 from mjsense.evaluation.playing import play
 from mjsense.evaluation.report import Results
@@ -204,11 +204,9 @@ _STARTS = (
 
 def _digest(model: Any) -> str:
     total = hashlib.sha256()
-    for name in dir(model):
-        if name.startswith(("light_", "mat_", "geom_", "cam_", "body_")) and isinstance(
-            values := getattr(model, name), np.ndarray
-        ):
-            total.update(np.ascontiguousarray(values).tobytes())
+    for name, values in arrays_of(model):
+        if name.startswith(("light_", "mat_", "geom_", "cam_", "body_")):
+            total.update(values.tobytes())
     return total.hexdigest()
 
 

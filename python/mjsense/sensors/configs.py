@@ -340,8 +340,8 @@ class CameraSensorCfg(SensorCfg):
     soft shadows and takes longer. A view has at most 32 lights and points."""
     shading: Literal["classic", "pbr", "path"] = "classic"
     """classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth, segmentation and
-    the other images are the same. path: the same by path tracing, which is the reference for pbr and takes a thousand
-    times longer. The options below belong to pbr and path."""
+    the other images are the same. path: the same by path tracing, which is the reference for pbr and takes much
+    longer. The options below belong to pbr and path."""
     samples_per_pixel: int = 64
     """Paths per pixel with shading path; four times as many halve the noise. ``samples`` and ``shadow_samples`` are for
     the other kinds of shading."""

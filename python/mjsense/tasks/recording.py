@@ -120,7 +120,7 @@ def record(
             more than 1 gives soft shadows and takes longer. A view has at most 32 lights and points.
         shading: classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; depth,
             segmentation and the other images are the same. path: the same by path tracing, which is the reference for
-            pbr and takes a thousand times longer. The options below belong to pbr and path.
+            pbr and takes much longer. The options below belong to pbr and path.
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.

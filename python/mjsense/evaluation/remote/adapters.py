@@ -7,9 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from mjsense.core.errors import did_you_mean
 from mjsense.core.input_files import read_toml
-from mjsense.evaluation.remote.adapter import ACTIONS, Adapter, Commanded, Numbers, Observed, is_image_spec
+from mjsense.evaluation.lerobot_features import Features
+from mjsense.evaluation.remote.adapter import ACTIONS, Adapter, Commanded, Numbers, Observed
 from mjsense.evaluation.remote.adapter_file import adapter_of_table
 from mjsense.sensors.nested_streams import Streams, choose_streams
 
@@ -100,18 +103,11 @@ def _of_streams(names: Iterable[str], groups: Mapping[str, slice]) -> Adapter:
 
 def _of_features(specs: Mapping[str, Any], groups: Mapping[str, slice]) -> Adapter:
     """The columns of :func:`mjsense.export` without a map: joint positions of all move groups, colour cameras, joint targets."""
-    state = tuple(sorted(name for name, spec in specs.items() if name.startswith("qpos/") and 0 not in spec.shape))
-    observation = {"observation.state": Observed(state)} if state else {}
-    for name, spec in specs.items():
-        if is_image_spec(spec) and len(spec.shape) == 3 and spec.shape[2] == 3:
-            observation[f"observation.images.{name}"] = Observed((name,))
-    moved = sorted(group for group, at in groups.items() if at.stop > at.start)
-    targets = [group for group in moved if f"actions/joint_pos/{group}" in specs]
+    features = Features(specs, groups)
     actions: dict[str, Commanded] = {}
-    first, all_columns = 0, sum(groups[group].stop - groups[group].start for group in moved)
-    for group in [*targets, *(group for group in moved if group not in targets)]:
-        width = groups[group].stop - groups[group].start
-        columns = tuple(range(first, first + width))
-        actions[group] = Commanded("action", all_columns, Numbers(columns), targets=group in targets)
-        first += width
-    return Adapter("features", observation, actions)
+    for group, at in groups.items():
+        columns = np.flatnonzero((features.action >= at.start) & (features.action < at.stop))
+        if len(columns):
+            numbers, targets = Numbers(tuple(columns.tolist())), f"actions/joint_pos/{group}" in specs
+            actions[group] = Commanded("action", len(features.action), numbers, targets)
+    return Adapter("features", {name: Observed(streams) for name, streams in features.streams.items()}, actions)

@@ -53,8 +53,7 @@ void visit_fields(V& v, RgbCfg& c) {
     "classic: MuJoCo's light model. pbr: physically based materials, lights and surroundings; "
     "depth, "
     "segmentation and the other images are the same. path: the same by path tracing, which is the "
-    "reference "
-    "for pbr and takes a thousand times longer. The options below belong to pbr and path.")
+    "reference for pbr and takes much longer. The options below belong to pbr and path.")
       .decides_data();
   v("samples_per_pixel", c.samples_per_pixel,
     "Paths per pixel with shading path; four times as many halve the noise. ``samples`` and "
