@@ -4,7 +4,7 @@
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
                 OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
-find_package(nanobind CONFIG REQUIRED)
+find_package(nanobind CONFIG REQUIRED NO_CMAKE_FIND_ROOT_PATH)
 
 file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
 nanobind_add_module(mjsense_python BACKEND_MODULE nanobind_backend NOMINSIZE NB_SUPPRESS_WARNINGS ${MJSENSE_PY_SOURCES})
