@@ -26,6 +26,9 @@ elseif(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR STREQUAL "a
   list(FILTER MJSENSE_SOURCES EXCLUDE REGEX "_avx(2|512)\\.cc$")
   # As on x86-64 without FMA: products are rounded before they are added, and char is signed.
   add_compile_options(-ffp-contract=off -fsigned-char)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    add_compile_options(-Wno-psabi)  # notes that GCC 9 passed structs of vectors differently
+  endif()
 else()
   message(FATAL_ERROR "mjsense supports Linux on x86-64 and AArch64 (docs/install.md); this is ${CMAKE_SYSTEM_NAME} on ${CMAKE_SYSTEM_PROCESSOR}")
 endif()

@@ -72,6 +72,9 @@ foreach(file IN LISTS MJSENSE_PY_FILES)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/python/mjsense/${file} ${MJSENSE_PY_DIR}/${file} SYMBOLIC)
 endforeach()
 
+if(CMAKE_CROSSCOMPILING)
+  set(Python_EXECUTABLE ${CMAKE_SYSROOT}/emulated_python)  # imports the module
+endif()
 nanobind_add_stub(mjsense_stub MODULE mjsense._core OUTPUT ${MJSENSE_PY_DIR}/_core.pyi DEPENDS mjsense_python
                   PYTHON_PATH ${PROJECT_BINARY_DIR}/python)
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # A Debian 12 for aarch64 in build/aarch64_sysroot: the libraries of apt.txt, for `cmake --preset aarch64`, and a Python with the packages
-# that mjsense needs, for tests under emulation. Packages are downloaded with an apt configuration of its own and unpacked, so that
-# nothing of this machine changes. Fast when it is there. usage: packaging/aarch64_sysroot.sh
+# that mjsense needs, which build/aarch64_sysroot/emulated_python runs. Packages are downloaded with an apt configuration of its own and
+# unpacked, so that nothing of this machine changes. Fast when it is there. usage: packaging/aarch64_sysroot.sh
 #
 # Needs g++-aarch64-linux-gnu and qemu-user-static, and .venv (./dev setup).
 set -euo pipefail
@@ -21,7 +21,8 @@ for program in aarch64-linux-gnu-g++ qemu-aarch64-static; do
 done
 
 # The libraries that apt.txt names, the C library, and a Python that creates virtual environments. The compilers run on this machine.
-packages="$(sed 's/#.*//' apt.txt | grep -oE '^(lib|zlib|nlohmann|python3)[^ ]*' | grep -v '^libgl1-mesa-dri') libc6-dev libstdc++-12-dev libpython3.11 bash coreutils"
+packages="$(sed 's/#.*//' apt.txt | grep -oE '^(lib|zlib|nlohmann|python3)[^ ]*' | grep -v '^libgl1-mesa-dri')
+  libc6-dev libstdc++-12-dev libpython3.11 bash coreutils"
 # Packages that mujoco-core, NumPy, Gymnasium, the binding library and the tests of recordings bring, as for the development environment.
 wheels="mujoco-core==$("$python" -c 'import importlib.metadata as m; print(m.version("mujoco-core"))') \
   $(sed 's/#.*//' requirements.txt | grep -E '^(numpy|gymnasium|nanobind-backend|h5py|pytest>)' | tr -d ' ') imageio-ffmpeg"
@@ -43,7 +44,7 @@ arm_apt install -y --download-only --no-install-recommends $packages >&2
 
 say "unpacking them"
 rm -rf "$root"
-mkdir -p "$root"/{proc,tmp}
+mkdir -p "$root"/{dev,proc,tmp,mjsense}
 for package in "$work"/cache/archives/*.deb; do dpkg-deb -x "$package" "$root"; done
 # Links to absolute names lead out of the folder.
 find "$root" -type l -lname '/*' -printf '%l\t%p\n' | while IFS=$'\t' read -r target link; do
@@ -51,7 +52,10 @@ find "$root" -type l -lname '/*' -printf '%l\t%p\n' | while IFS=$'\t' read -r ta
 done
 
 say "adding Python packages"
-"$python" -m pip install -q --disable-pip-version-check --no-warn-conflicts --only-binary=:all: --implementation cp --python-version 3.11 --abi cp311 --abi abi3 --abi none \
+"$python" -m pip install -q --disable-pip-version-check --no-warn-conflicts --only-binary=:all: \
+  --implementation cp --python-version 3.11 --abi cp311 --abi abi3 --abi none \
   --platform manylinux_2_28_aarch64 --platform manylinux_2_17_aarch64 --platform manylinux2014_aarch64 \
   --target "$root/usr/lib/python3/dist-packages" --upgrade $wheels
+printf '#!/bin/sh\nexec qemu-aarch64-static -L "%s" "%s/usr/bin/python3" "$@"\n' "$root" "$root" > "$root/emulated_python"
+chmod +x "$root/emulated_python"
 echo "$wanted" > "$root/made_from"
