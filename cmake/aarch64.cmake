@@ -11,7 +11,7 @@ cmake_path(NORMAL_PATH CMAKE_SYSROOT)
 if(NOT EXISTS ${CMAKE_SYSROOT}/made_from)
   message(FATAL_ERROR "No Debian for aarch64 in ${CMAKE_SYSROOT}: run packaging/aarch64_sysroot.sh")
 endif()
-set(CMAKE_CROSSCOMPILING_EMULATOR qemu-aarch64-static -L ${CMAKE_SYSROOT})
+set(CMAKE_CROSSCOMPILING_EMULATOR ${CMAKE_CURRENT_LIST_DIR}/../packaging/emulate.sh)
 
 # Libraries and headers come from there, programs from this machine.
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

@@ -56,6 +56,6 @@ say "adding Python packages"
   --implementation cp --python-version 3.11 --abi cp311 --abi abi3 --abi none \
   --platform manylinux_2_28_aarch64 --platform manylinux_2_17_aarch64 --platform manylinux2014_aarch64 \
   --target "$root/usr/lib/python3/dist-packages" --upgrade $wheels
-printf '#!/bin/sh\nexec qemu-aarch64-static -L "%s" "%s/usr/bin/python3" "$@"\n' "$root" "$root" > "$root/emulated_python"
+printf '#!/bin/sh\nexec "%s" "%s/usr/bin/python3" "$@"\n' "$PWD/packaging/emulate.sh" "$root" > "$root/emulated_python"
 chmod +x "$root/emulated_python"
 echo "$wanted" > "$root/made_from"

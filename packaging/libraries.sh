@@ -63,8 +63,9 @@ build_embree() {
   sed -i 's/^  IF (${ISA} EQUAL ${AVX})$/  IF (${ISA} EQUAL ${ISA_LOWEST_AVX})/' "$src/kernels/CMakeLists.txt"
   sed -i 's/^#define SELECT_SYMBOL_AVX(features,intersector)$/& if ((features \& AVX2) == AVX2) intersector = avx2::intersector;/' \
     "$src/kernels/common/isa.h"
-  local unused=() name isas=()  # on AArch64, Embree selects NEON
-  [ "$arch" != x86_64 ] || isas=(-DEMBREE_ISA_SSE2=ON -DEMBREE_ISA_SSE42=OFF -DEMBREE_ISA_AVX=OFF -DEMBREE_ISA_AVX2=ON -DEMBREE_ISA_AVX512=ON)
+  local unused=() name isas=(-DEMBREE_ARM=ON -DEMBREE_IGNORE_CMAKE_CXX_FLAGS=OFF -DCMAKE_CXX_FLAGS=-flax-vector-conversions)  # NEON
+  [ "$arch" = aarch64 ] ||
+    isas=(-DEMBREE_ISA_SSE2=ON -DEMBREE_ISA_SSE42=OFF -DEMBREE_ISA_AVX=OFF -DEMBREE_ISA_AVX2=ON -DEMBREE_ISA_AVX512=ON)
   for name in QUAD GRID SUBDIVISION INSTANCE USER POINT; do unused+=("-DEMBREE_GEOMETRY_$name=OFF"); done
   cmake -S "$src" -B "$work/embree" -G Ninja -Wno-dev -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
     -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
