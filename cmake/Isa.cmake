@@ -6,7 +6,9 @@
 # GCC copies structures 16 bytes at a time; a vector of 32 or 64 that is read right after such a copy has to wait until all parts
 # have left the store buffer. Effect of copies as wide as the vectors: depth of the moving Panda 4.1 -> 2.4 ms, of the kitchen 6.1 -> 4.4,
 # colors 14.2 -> 11.6 and 14.8 -> 12.8 (640 x 480, shortest of 21 with AVX2).
+set(MJSENSE_ISAS portable)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  list(APPEND MJSENSE_ISAS avx2 avx512)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     set(quiet "-Wno-uninitialized;-Wno-maybe-uninitialized")
     if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 12)

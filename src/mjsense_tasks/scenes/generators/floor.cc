@@ -246,9 +246,11 @@ scene::ModelSource make_floor(GeneratorInput& input, SceneFileCfg& cfg) {
   write_furniture_materials(out, rng);
   for (int i = 0; i < 3; ++i) write_picture(out, fmt::format("painting_{}", i), rng);
   const Gloss polished{0.15, 0.3, 0.02};
-  for (int i = 0; i < 3; ++i)
-    out.tiled(fmt::format("floor_{}", i),
-              planks_png(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2, polished);
+  for (int i = 0; i < 3; ++i) {
+    const auto planks = rng.next();
+    out.tiled(fmt::format("floor_{}", i), planks_png(brighter(wood_colour(rng), 0.85), 8, planks),
+              1.2, polished);
+  }
   out.tiled("floor_3", tiles_png({0.70, 0.68, 0.64}, {0.52, 0.51, 0.49}, 3, false, rng.next()), 1.2,
             polished);
 
