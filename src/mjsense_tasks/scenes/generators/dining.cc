@@ -34,8 +34,8 @@ scene::ModelSource make_dining(GeneratorInput& input, SceneFileCfg& cfg) {
   const Gloss satin{.specular = 0.2, .shininess = 0.4};
   room.tiled("table", boards_png(wood, 8, rng.next()), 1.0, satin);
   room.wrapped("table_edge", wood_png(brighter(wood, 0.85), rng.next()), satin);
-  const auto chair = rng.next();
-  room.wrapped("chair", wood_png(wood_colour(rng), chair), satin);
+  const auto seat = rng.next();
+  room.wrapped("chair", wood_png(wood_colour(rng), seat), satin);
   const auto rug = rng.next();
   room.tiled("rug", cloth_png(pick(rng, kRugs), rug), 0.5);
   room.plain("frame", pick(rng, kFrames), satin);
