@@ -58,14 +58,18 @@ build_embree() {
   src=$(fetch embree libembree-dev)
   # mjsense uses triangles and round linear curves; the other curves take most of the compile time.
   sed -i -E '/vtbl\[Geometry::GTY_/{/GTY_ROUND_LINEAR_CURVE/!d}' "$src"/kernels/geometry/curve_intersector_virtual_*.cpp
-  # Files compiled for AVX only are compiled for AVX2 instead, and selected on machines with AVX2.
-  sed -i 's/SET(ISA_LOWEST_AVX 2)/SET(ISA_LOWEST_AVX 3)/' "$src/CMakeLists.txt"
-  sed -i 's/^  IF (${ISA} EQUAL ${AVX})$/  IF (${ISA} EQUAL ${ISA_LOWEST_AVX})/' "$src/kernels/CMakeLists.txt"
-  sed -i 's/^#define SELECT_SYMBOL_AVX(features,intersector)$/& if ((features \& AVX2) == AVX2) intersector = avx2::intersector;/' \
-    "$src/kernels/common/isa.h"
-  local unused=() name isas=(-DEMBREE_ARM=ON -DEMBREE_IGNORE_CMAKE_CXX_FLAGS=OFF -DCMAKE_CXX_FLAGS=-flax-vector-conversions)  # NEON
-  [ "$arch" = aarch64 ] ||
+  local unused=() name isas
+  if [ "$arch" = x86_64 ]; then
+    # Files compiled for AVX only are compiled for AVX2 instead, and selected on machines with AVX2.
+    sed -i 's/SET(ISA_LOWEST_AVX 2)/SET(ISA_LOWEST_AVX 3)/' "$src/CMakeLists.txt"
+    sed -i 's/^  IF (${ISA} EQUAL ${AVX})$/  IF (${ISA} EQUAL ${ISA_LOWEST_AVX})/' "$src/kernels/CMakeLists.txt"
+    sed -i 's/^#define SELECT_SYMBOL_AVX(features,intersector)$/& if ((features \& AVX2) == AVX2) intersector = avx2::intersector;/' \
+      "$src/kernels/common/isa.h"
     isas=(-DEMBREE_ISA_SSE2=ON -DEMBREE_ISA_SSE42=OFF -DEMBREE_ISA_AVX=OFF -DEMBREE_ISA_AVX2=ON -DEMBREE_ISA_AVX512=ON)
+  else
+    isas=(-DEMBREE_ARM=ON -DEMBREE_IGNORE_CMAKE_CXX_FLAGS=OFF -DCMAKE_CXX_FLAGS=-flax-vector-conversions)  # NEON
+  fi
+  rm -rf "$work/embree"
   for name in QUAD GRID SUBDIVISION INSTANCE USER POINT; do unused+=("-DEMBREE_GEOMETRY_$name=OFF"); done
   cmake -S "$src" -B "$work/embree" -G Ninja -Wno-dev -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
     -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
