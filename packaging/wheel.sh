@@ -34,7 +34,15 @@ rm -rf $work/raw
 $python -m pip wheel -q --disable-pip-version-check --no-deps --no-build-isolation -w $work/raw \
   -C build-dir=$work/cmake -C cmake.define.MJSENSE_STATIC=ON "$@" .
 rm -f dist/mjsense-*_$arch.whl dist/mjsense-*.tar.gz
-PATH=$PWD/$tools/bin:$PATH $tools/bin/auditwheel repair --plat manylinux_2_28_$arch --only-plat --exclude libmj_mjsense.so -w dist $work/raw/mjsense-*.whl
+# auditwheel accepts the platforms of the CPU that Python names.
+audit() {
+  PATH=$PWD/$tools/bin:$PATH $tools/bin/python -c 'import platform, sys
+machine = sys.argv.pop(1)
+platform.machine = lambda: machine
+from auditwheel.main import main
+sys.exit(main())' "$arch" "$@"
+}
+audit repair --plat manylinux_2_28_$arch --only-plat --exclude libmj_mjsense.so -w dist $work/raw/mjsense-*.whl
 $python -c 'import scikit_build_core.build as build; build.build_sdist("dist")' >/dev/null
-$tools/bin/auditwheel show dist/mjsense-*_$arch.whl
+audit show dist/mjsense-*_$arch.whl
 ls -l dist
