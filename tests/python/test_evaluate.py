@@ -56,6 +56,18 @@ def test_recorded_actions_repeat_the_episodes(planned, tmp_path):
         evaluate("pick", policy=f"replay:{out}", out=tmp_path / "b", episodes=4, **SMALL)
 
 
+def test_videos_that_were_left_out_are_rendered_afterwards(tmp_path):
+    options = {"policy": "random", "episodes": 2, "num_worlds": 2, "horizon": 4, "width": 32, "height": 24, "progress": False}
+    filmed = evaluate("pick", out=tmp_path / "filmed", **options)
+    plain = evaluate("pick", out=tmp_path / "plain", videos=False, **options)
+    assert rows(plain) == rows(filmed) and not list(tmp_path.glob("plain/*/*.mp4"))
+    mjs.render(tmp_path / "plain", tmp_path / "rendered", progress=False)
+    videos = {path.name: path.read_bytes() for path in tmp_path.glob("filmed/*/*.mp4")}
+    assert len(videos) == 4 and {path.name: path.read_bytes() for path in tmp_path.glob("rendered/*/*.mp4")} == videos
+    with pytest.raises(ValueError, match="belongs to a different recording: 'video' was absent and is now"):
+        evaluate("pick", out=tmp_path / "plain", resume=True, **options)
+
+
 class Counting:
     """Moves the first joint by the number of the call and of the action in its chunk."""
 

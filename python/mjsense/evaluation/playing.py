@@ -83,6 +83,7 @@ def evaluate(
     keyint: int = 20,
     molmospaces_depth: bool = False,
     replay: bool = True,
+    videos: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     ray: str | None = None,
@@ -175,6 +176,8 @@ def evaluate(
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        videos: Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos of chosen
+            episodes afterwards.
         Others:
         sensors: Additional sensors, as in :func:`mjsense.record`.
         ray: ``local``, ``auto`` or the address of a Ray cluster, as in :func:`mjsense.record`.
