@@ -116,6 +116,25 @@ def test_chunks_are_executed_as_asked(tmp_path, options, expected):
         assert np.nanmax(latency) == np.float32(0.13)
 
 
+def test_the_same_policy_in_a_loop_of_steps(tmp_path):
+    options, arm = {"execution_horizon": 2, "latency": 0.13}, slice(1, 8)
+    evaluate("pick", policy=Counting(3), out=tmp_path, episodes=[1, 4], num_worlds=2, horizon=7, **options, **SMALL)
+    states = [episode.states for episode in mjs.Dataset(tmp_path).episodes]
+    worlds = mjs.make_vec("pick", num_envs=2, policy=mjs.wrap_policy(Counting(3), **options), episodes=[1, 4], seed=0, horizon=7, autoreset_mode="disabled", cameras=[])
+    worlds.reset()
+    for t in range(1, 8):
+        worlds.step(worlds.expert_action(), done=worlds.expert_done)
+        np.testing.assert_allclose(worlds.sim.state[:, arm], [rows[t, arm] for rows in states], atol=1e-5)  # actions of environments are float32
+    one = mjs.make("pick", policy=mjs.wrap_policy(Counting(3), **options), episodes=[4], seed=0, horizon=7, cameras=[])
+    one.reset()
+    for t in range(1, 8):
+        one.step(one.expert_action())
+        np.testing.assert_allclose(one.sim.state[0, arm], states[1][t, arm], atol=1e-5)
+    assert mjs.wrap_policy("planner") == "planner"
+    with pytest.raises(ValueError, match="policy 'planner' is computed together with its episode"):
+        mjs.wrap_policy("planner", latency=0.1)
+
+
 def test_an_evaluation_is_resumed_after_an_error_of_its_policy(tmp_path):
     options = {"episodes": 4, "num_worlds": 2, "horizon": 6, **SMALL}
     unbroken = evaluate("pick", policy=Counting(), out=tmp_path / "a", **options)
