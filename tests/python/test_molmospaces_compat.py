@@ -181,15 +181,14 @@ class Stateful(Foreign):
         self.buffer, self.prompt = list(state[0]), state[1]
 
 
-class Own(InferencePolicy, StatefulPolicy):
+class Own(Stateful, InferencePolicy, StatefulPolicy):
     """The same with mjsense's classes."""
 
-    def __init__(self):
-        super().__init__("configuration")
-        self.speed = 0.02
+    get_action = InferencePolicy.get_action
 
-    get_state, set_state, reset = Stateful.get_state, Stateful.set_state, Foreign.reset
-    obs_to_model_input, inference_model, model_output_to_action = Foreign.obs_to_model_input, Foreign.inference_model, Foreign.model_output_to_action
+    def __init__(self):
+        InferencePolicy.__init__(self, "configuration")
+        self.speed = 0.02
 
 
 @pytest.mark.parametrize(("policy", "worlds"), ((f"python:{__name__}:Foreign", 2), (Stateful(), 3), (Own, 3)), ids=("copied", "shared", "own"))

@@ -478,6 +478,46 @@ def test_limits_of_the_server(monkeypatch):
             PolicyServer(Joints, port=served.port)
 
 
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory):
+    """A certificate of 127.0.0.1 that signs itself, and its private key."""
+    folder = tmp_path_factory.mktemp("certificate")
+    made = [str(folder / "certificate.pem"), str(folder / "private.pem")]
+    words = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", "/CN=mjsense", "-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run(["openssl", "req", "-x509", *words, "-out", made[0], "-keyout", made[1]], check=True, capture_output=True)
+    return made
+
+
+def test_a_key_and_encryption(certificate, tmp_path):
+    right, wrong = tmp_path / "right", tmp_path / "wrong"
+    right.write_text("0123456789abcdef\n")
+    wrong.write_text("0123456789abcdeg")
+    access = {"key_file": str(right), "certificate": certificate[0]}
+    with PolicyServer(Joints(), port=0, private_key=certificate[1], **access) as server:
+        assert server.url.startswith("wss://127.0.0.1:")
+        made = RemotePolicy(server.url, **access)
+        assert made.name == "joints" and "0123456789abcdef" not in made.fingerprint()
+        for options, message in (
+            ({**access, "key_file": ""}, "needs a key: the option key_file"),
+            ({**access, "key_file": str(wrong)}, "needs another key: the option key_file"),
+            ({**access, "certificate": ""}, "its certificate is not trusted: self.signed certificate; the option certificate names"),
+        ):
+            with pytest.raises(ConnectionError, match=message):
+                RemotePolicy(server.url, patience=0.1, **options)
+    with PolicyServer(Joints(), port=0) as server, pytest.raises(ConnectionError, match="does not use encryption: expected ws://"):
+        RemotePolicy(server.url.replace("ws:", "wss:"), patience=0.1)
+    wrong.write_text("short")
+    for options, message in (
+        ({"key_file": str(wrong)}, "key_file '.*wrong': it must contain one key: 16 to 512 visible ASCII characters"),
+        ({"certificate": certificate[0]}, "wss:// needs both certificate and private_key; private_key is missing"),
+        ({"certificate": str(wrong), "private_key": str(wrong)}, "expected PEM files"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            PolicyServer(Joints(), port=0, **options)
+    with pytest.raises(ValueError, match="a certificate belongs to wss://HOST:PORT"):
+        RemotePolicy("ws://127.0.0.1:1", certificate=certificate[0])
+
+
 def ask_metadata(url):
     with connect(url) as link:
         return link.recv()

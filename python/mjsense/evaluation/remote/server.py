@@ -17,6 +17,7 @@ from mjsense import _core
 from mjsense.core.optional import optional
 from mjsense.core.representations import plain
 from mjsense.evaluation.playing import fingerprint
+from mjsense.evaluation.remote.access import is_allowed, key_of, server_context
 from mjsense.evaluation.remote.adapter import ACTIONS, MJSENSE
 from mjsense.evaluation.remote.messages import MAX_BYTES, pack, unpack
 from mjsense.evaluation.remote.served import BadRequest, ServedPolicy
@@ -42,6 +43,8 @@ class PolicyServer:
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
         connections: Maximum number of connections. Further ones are refused.
+        key_file: File with a key, without which nobody can connect: clients send it as ``Authorization: Api-Key KEY``. Empty: no key.
+        certificate, private_key: PEM files with which the server encrypts its connections, ``wss://HOST:PORT``. Empty: no encryption.
         log: Called with a line for each error.
     """
 
@@ -55,6 +58,9 @@ class PolicyServer:
         host: str = "127.0.0.1",
         port: int = 8000,
         connections: int = 64,
+        key_file: str = "",
+        certificate: str = "",
+        private_key: str = "",
         log: Callable[[str], None] | None = None,
     ) -> None:
         if not host:
@@ -67,6 +73,7 @@ class PolicyServer:
             raise ValueError(f"connections is {connections}: must be at least 1")
         if not task and task_options:
             raise ValueError(f"{min(task_options)} belongs to a task, which is missing")
+        self._key, self._encryption = key_of(key_file), server_context(certificate, private_key)
         self._library: Any = optional("websockets.asyncio.server", "evaluate", "a policy server")
         self._closed_error: Any = optional("websockets.exceptions", "evaluate", "a policy server").ConnectionClosed
         of_task = {"task": task, **(task_options or {})} if task else {}
@@ -92,7 +99,8 @@ class PolicyServer:
                 f"cannot listen at {plain(host, 60)}, port {port}: {getattr(error, 'strerror', '') or error}"
             ) from None
         address, self.port = self._server.sockets[0].getsockname()[:2]
-        self.url: str = f"ws://[{address}]:{self.port}" if ":" in address else f"ws://{address}:{self.port}"
+        scheme = "ws" if self._encryption is None else "wss"
+        self.url: str = f"{scheme}://[{address}]:{self.port}" if ":" in address else f"{scheme}://{address}:{self.port}"
 
     @property
     def name(self) -> str:
@@ -127,10 +135,19 @@ class PolicyServer:
             max_size=MAX_BYTES,
             max_queue=1,
             origins=[None],  # pages of a browser may not connect
-            process_request=_answer_health_check,
+            process_request=self._answer_request,
+            ssl=self._encryption,
             close_timeout=2,
             logger=_SILENT,
         )
+
+    def _answer_request(self, link: Any, request: Any) -> Any:
+        """The answer to a request that is not to become a connection; None for others."""
+        if request.path == "/healthz":
+            return link.respond(http.HTTPStatus.OK, "OK\n")
+        if self._key and not is_allowed(request.headers, self._key):
+            return link.respond(http.HTTPStatus.UNAUTHORIZED, "This server needs the right key.\n")
+        return None
 
     async def _stop(self) -> None:
         self._server.close()
@@ -185,10 +202,6 @@ def _read(data: Any) -> Any:
     if not isinstance(message.value, dict):
         raise BadRequest(f"a message is a {type(message.value).__name__}: must be a map")
     return message
-
-
-def _answer_health_check(link: Any, request: Any) -> Any:
-    return link.respond(http.HTTPStatus.OK, "OK\n") if request.path == "/healthz" else None
 
 
 _SILENT = logging.Logger("mjsense.websockets", logging.CRITICAL)
