@@ -504,8 +504,6 @@ def test_a_key_and_encryption(certificate, tmp_path):
         ):
             with pytest.raises(ConnectionError, match=message):
                 RemotePolicy(server.url, patience=0.1, **options)
-    with PolicyServer(Joints(), port=0) as server, pytest.raises(ConnectionError, match="does not use encryption: expected ws://"):
-        RemotePolicy(server.url.replace("ws:", "wss:"), patience=0.1)
     wrong.write_text("short")
     for options, message in (
         ({"key_file": str(wrong)}, "key_file '.*wrong': it must contain one key: 16 to 512 visible ASCII characters"),

@@ -66,13 +66,6 @@ def client_context(url: str, certificate: str) -> Any:
         raise ValueError(f"certificate '{certificate}': {error}; expected a PEM file") from None
 
 
-def refusal_of(url: str, error: ssl.SSLError) -> str:
-    """Why no encrypted connection can be made, if it is useless to try again; empty otherwise."""
-    if isinstance(error, ssl.SSLCertVerificationError):
-        return f"{url}: its certificate is not trusted: {error.verify_message}; the option certificate names the file of one that is"
-    return f"{url} does not use encryption: expected ws://" if error.reason == "WRONG_VERSION_NUMBER" else ""
-
-
 def _no_password() -> str:
     """OpenSSL would ask for one at the terminal."""
     raise ValueError("the private key has a password; remove it with openssl pkey")

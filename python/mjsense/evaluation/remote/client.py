@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from mjsense.core.optional import optional
 from mjsense.core.representations import plain
-from mjsense.evaluation.remote.access import client_context, headers_of, refusal_of
+from mjsense.evaluation.remote.access import client_context, headers_of
 from mjsense.evaluation.remote.adapter import MJSENSE
 from mjsense.evaluation.remote.messages import MAX_BYTES, unpack
 
@@ -158,10 +158,10 @@ class Connections:
                         f"{self.url} refuses websockets with the HTTP status {error.response.status_code}"
                     ) from None
                 last = error
-            except ssl.SSLError as error:
-                if refusal := refusal_of(self.url, error):
-                    raise ConnectionError(refusal) from None
-                last = error
+            except ssl.SSLCertVerificationError as error:
+                raise ConnectionError(
+                    f"{self.url}: its certificate is not trusted: {error.verify_message}; the option certificate names the file of one that is"
+                ) from None
             except (TimeoutError, ValueError, RuntimeError):
                 raise
             except (OSError, EOFError, self._errors.WebSocketException) as error:
