@@ -18,7 +18,8 @@ from mjsense.core.optional import optional
 from mjsense.core.representations import plain
 from mjsense.evaluation.playing import fingerprint
 from mjsense.evaluation.remote.access import is_allowed, key_of, server_context
-from mjsense.evaluation.remote.adapter import ACTIONS, MJSENSE
+from mjsense.evaluation.remote.adapter import MJSENSE
+from mjsense.evaluation.remote.adapters import BUILT_IN
 from mjsense.evaluation.remote.messages import MAX_BYTES, pack, unpack
 from mjsense.evaluation.remote.served import BadRequest, ServedPolicy
 
@@ -37,9 +38,10 @@ class PolicyServer:
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`. Policies that are computed together with their episode, such as ``planner``, cannot
             be served.
-        task: Task whose streams and robot the policy knows; only a :class:`mjsense.Policy` needs it.
+        task: Task whose streams and robot the policy knows; only a :class:`mjsense.Policy` and an adapter need it.
         task_options: Further arguments of :func:`mjsense.make_vec`, such as ``robot``, ``camera_system``, ``width`` and ``height``.
         policy_options: Arguments of the policy.
+        adapter: ``droid``, ``features`` or a TOML file: the names and conventions of the clients' messages, as for :class:`RemotePolicy`.
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
         connections: Maximum number of connections. Further ones are refused.
@@ -55,6 +57,7 @@ class PolicyServer:
         task: str = "",
         task_options: Mapping[str, Any] | None = None,
         policy_options: Mapping[str, Any] | None = None,
+        adapter: str = "",
         host: str = "127.0.0.1",
         port: int = 8000,
         connections: int = 64,
@@ -77,7 +80,7 @@ class PolicyServer:
         self._library: Any = optional("websockets.asyncio.server", "evaluate", "a policy server")
         self._closed_error: Any = optional("websockets.exceptions", "evaluate", "a policy server").ConnectionClosed
         of_task = {"task": task, **(task_options or {})} if task else {}
-        self._served = ServedPolicy(policy, policy_options or {}, of_task, connections)
+        self._served = ServedPolicy(policy, policy_options or {}, of_task, connections, adapter)
         self._log = log or (lambda line: None)
         self._free = list(range(connections))
         self._episodes = 0
@@ -86,6 +89,8 @@ class PolicyServer:
         about |= {"observation": self._served.observation} | {
             name: getattr(made, name, None) for name in ("execution_horizon", "ensemble")
         }
+        if adapter:
+            about["adapter"] = adapter if adapter in BUILT_IN else "a file"
         self._metadata = pack({MJSENSE: about})
         self._worker = ThreadPoolExecutor(1, "mjsense served policy")
         self._loop = asyncio.new_event_loop()
@@ -183,7 +188,7 @@ class PolicyServer:
             actions = await self._loop.run_in_executor(self._worker, self._answer, world, message, begins)
             begins = False
             timing = {"infer_ms": 1000 * (time.perf_counter() - begun)}
-            await link.send(pack({ACTIONS: actions, "server_timing": timing}, arrays))
+            await link.send(pack({**self._served.reply(actions), "server_timing": timing}, arrays))
 
     def _answer(self, world: int, message: Mapping[str, Any], begins: bool) -> Any:
         if begins:
