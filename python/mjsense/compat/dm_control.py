@@ -163,8 +163,8 @@ def use(env: Any = None) -> Any:
     Overlay texts are an error; `render_flag_overrides` and `scene_option` have the same limits as in ``mjsense.Renderer``.
 
     Args:
-        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that ``copy.deepcopy`` or
-            pickle make use mjsense only with None.
+        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that
+            ``copy.deepcopy`` or pickle make use mjsense only with None.
 
     Returns:
         `env`.
@@ -172,7 +172,8 @@ def use(env: Any = None) -> Any:
     physics = engine.Physics if env is None else getattr(env, "physics", env)
     if env is not None and not isinstance(physics, engine.Physics):
         raise TypeError(
-            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() before environments are made"
+            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() "
+            "before environments are made"
         )
     engine.Physics.copy = _copy
     engine.Physics._make_rendering_contexts = _make_contexts

@@ -89,9 +89,10 @@ def sensitivity(vary: Iterable[str], **options: Any) -> Sensitivity:
     """Evaluates a policy on the same episodes without and with each of several factors, one at a time.
 
     Args:
-        vary: Names of factors: ``light``, ``camera``, ``texture``, ``distractors``, ``instruction``, ``start``, ``latency=0.1``. ``light=0.5``
-            changes half as much; ``distractors=5`` is the number of objects.
-        options: Arguments of :func:`mjsense.evaluation.evaluate`. The evaluations are in the folders ``out/unchanged``, ``out/light`` and so on.
+        vary: Names of factors: ``light``, ``camera``, ``texture``, ``distractors``, ``instruction``, ``start``, ``latency=0.1``.
+            ``light=0.5`` changes half as much; ``distractors=5`` is the number of objects.
+        options: Arguments of :func:`mjsense.evaluation.evaluate`. The evaluations are in the folders ``out/unchanged``,
+            ``out/light`` and so on.
 
     Raises:
         ValueError: A factor is not known, or changes nothing in this task.
@@ -149,9 +150,7 @@ def _factor_of(text: str) -> tuple[str, float]:
     return name, number
 
 
-def _changes(
-    text: str, name: str, strength: float, base: Mapping[str, Any], out: Path
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def _changes(text: str, name: str, strength: float, base: Mapping[str, Any], out: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The options of a recording, and the arguments of ``play``, that a factor changes."""
     if name == "latency":
         return {}, {"latency": strength}
@@ -176,9 +175,7 @@ def _cameras(robot: Robot, strength: float) -> str:
     width, height = robot.image_size
     pos, rot = 3 * [0.03 * strength], 3 * [4 * strength]
     noise = f"pos_noise = {pos}\nrot_noise = {rot}\n"
-    mounts = [
-        f'[[cameras]]\nname = "{one.name}"\nmount = "mjcf"\ncamera = "{one.camera}"\n{noise}' for one in robot.cameras
-    ]
+    mounts = [f'[[cameras]]\nname = "{one.name}"\nmount = "mjcf"\ncamera = "{one.camera}"\n{noise}' for one in robot.cameras]
     return "\n".join([f'name = "camera"\nwidth = {width}\nheight = {height}\n', *mounts])
 
 

@@ -961,6 +961,6 @@ __all__ = [
     "SceneMoodCfg", "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg", "SceneVaryCfg", "SensorCfg",
     "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TerrainCfg", "TerrainHeightSensorCfg", "UserPatternCfg",
     "replace",
-]  # fmt: skip
+]
 
 show_field_docs(__name__)

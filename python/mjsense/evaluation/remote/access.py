@@ -41,7 +41,9 @@ def server_context(certificate: str, private_key: str) -> Any:
     if not certificate and not private_key:
         return None
     if not certificate or not private_key:
-        raise ValueError(f"wss:// needs both certificate and private_key; {'private_key' if certificate else 'certificate'} is missing")
+        raise ValueError(
+            f"wss:// needs both certificate and private_key; {'private_key' if certificate else 'certificate'} is missing"
+        )
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
         context.load_cert_chain(certificate, private_key, password=_no_password)

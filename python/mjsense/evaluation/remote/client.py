@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections to a policy server: one for each world and episode, because servers keep the state of an episode for each connection."""
+"""Connections to a policy server: one for each world and episode, because servers keep the state of an episode for each
+connection."""
 
 from __future__ import annotations
 
@@ -55,7 +56,8 @@ class Connections:
         """Closes all connections."""
 
     def server(self) -> dict[str, Any]:
-        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is closed again."""
+        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is
+        closed again."""
         return self._run(self._greeting())
 
     def begin(self, worlds: Iterable[int]) -> None:
@@ -152,7 +154,9 @@ class Connections:
                 return await self._within(attempt(), "accepted a connection")
             except self._errors.InvalidStatus as error:
                 if error.response.status_code == 401:
-                    raise ConnectionError(f"{self.url} needs {'another' if self._headers else 'a'} key: the option key_file") from None
+                    raise ConnectionError(
+                        f"{self.url} needs {'another' if self._headers else 'a'} key: the option key_file"
+                    ) from None
                 if error.response.status_code < 500:
                     raise ConnectionError(
                         f"{self.url} refuses websockets with the HTTP status {error.response.status_code}"
@@ -160,7 +164,8 @@ class Connections:
                 last = error
             except ssl.SSLCertVerificationError as error:
                 raise ConnectionError(
-                    f"{self.url}: its certificate is not trusted: {error.verify_message}; the option certificate names the file of one that is"
+                    f"{self.url}: its certificate is not trusted: {error.verify_message}; the option certificate names the "
+                    "file of one that is"
                 ) from None
             except (TimeoutError, ValueError, RuntimeError):
                 raise
@@ -170,7 +175,8 @@ class Connections:
                 print(f"Waiting for the policy server at {self.url}: {plain(last) or type(last).__name__}", file=sys.stderr)
             if self._loop.time() + delay > end:
                 raise ConnectionError(
-                    f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: {plain(last) or type(last).__name__}"
+                    f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: "
+                    f"{plain(last) or type(last).__name__}"
                 )
             await asyncio.sleep(delay)
             delay = min(2 * delay, _MAX_DELAY)

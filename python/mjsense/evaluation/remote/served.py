@@ -25,15 +25,17 @@ class BadRequest(ValueError):
 
 
 class ServedPolicy:
-    """One policy for all connections, which are its worlds. It is called for one connection at a time, so that an answer depends neither on
-    the other clients nor on the time of their messages.
+    """One policy for all connections, which are its worlds. It is called for one connection at a time, so that an answer depends
+    neither on the other clients nor on the time of their messages.
 
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`.
         options: Arguments of the policy.
-        task: Task and further arguments of :func:`mjsense.make_vec`, whose streams and move groups a :class:`mjsense.Policy` needs; empty: none.
+        task: Task and further arguments of :func:`mjsense.make_vec`, whose streams and move groups a :class:`mjsense.Policy`
+            needs; empty: none.
         connections: Maximum number of connections.
-        adapter: Names and conventions of the messages, see :class:`mjsense.evaluation.RemotePolicy`; empty: streams and actions as they are.
+        adapter: Names and conventions of the messages, see :class:`mjsense.evaluation.RemotePolicy`; empty:
+            streams and actions as they are.
     """
 
     def __init__(
@@ -159,7 +161,8 @@ class ServedPolicy:
         groups = [] if self._alone else self._groups
         if not groups or given.keys() != set(groups):
             raise ValueError(
-                f"policy '{self._name}': act() returned commands for {', '.join(given) or 'no group'}; expected {', '.join(groups) or 'an array'}"
+                f"policy '{self._name}': act() returned commands for {', '.join(given) or 'no group'}; expected "
+                f"{', '.join(groups) or 'an array'}"
             )
         return np.concatenate([as_numbers(given[group]) for group in groups], -1)
 

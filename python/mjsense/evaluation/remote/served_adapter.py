@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An adapter on the side of the server: what clients send becomes the streams that the policy observes, and its commands become their keys."""
+"""An adapter on the side of the server: what clients send becomes the streams that the policy observes, and its commands become
+their keys."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ class ServedAdapter:
         for stream in self.streams:
             if stream not in keys:
                 raise ValueError(
-                    f"adapter '{made.name}': it has no '{stream}', which the policy observes{did_you_mean(stream, keys, 'it has')}"
+                    f"adapter '{made.name}': it has no '{stream}', which the policy observes"
+                    f"{did_you_mean(stream, keys, 'it has')}"
                 )
         self._needed = {keys[stream]: made.observation[keys[stream]] for stream in self.streams}
         for key, one in self._needed.items():
@@ -44,7 +46,8 @@ class ServedAdapter:
             some = one.numbers.columns is not None and sorted(one.numbers.columns) != list(range(width))
             if some or one.numbers.threshold is not None:
                 raise ValueError(
-                    f"adapter '{made.name}': '{key}' does not have all numbers of {' and '.join(one.streams)}, which the policy observes"
+                    f"adapter '{made.name}': '{key}' does not have all numbers of {' and '.join(one.streams)}, which the policy "
+                    "observes"
                 )
         for group, at in groups.items():
             if at.stop > at.start and group not in made.actions:

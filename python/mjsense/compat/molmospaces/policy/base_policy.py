@@ -18,8 +18,8 @@ class BasePolicy:
 
     config: Any = None
     task: Any = None
-    """The task that it is registered with. Otherwise, while the policy is called, that of the world: ``get_task_description()``, ``config``
-    and so on."""
+    """The task that it is registered with. Otherwise, while the policy is called, that of the world:
+    ``get_task_description()``, ``config`` and so on."""
 
     def __init__(self, config: Any = None, task: Any = None) -> None:
         self.config, self.task = config, task
@@ -57,7 +57,8 @@ class PlannerPolicy(BasePolicy):
 
 
 class InferencePolicy(BasePolicy):
-    """A policy with a model. Implement ``prepare_model``, ``obs_to_model_input``, ``inference_model`` and ``model_output_to_action``."""
+    """A policy with a model. Implement ``prepare_model``, ``obs_to_model_input``, ``inference_model`` and
+    ``model_output_to_action``."""
 
     def get_action(self, observation: dict[str, Any]) -> dict[str, Any] | None:
         return self.model_output_to_action(self.inference_model(self.obs_to_model_input(observation)))
@@ -110,8 +111,8 @@ class _TaskOfWorld:
 
 
 class PolicyOfWorlds(Policy):
-    """Runs a copy of a :class:`BasePolicy`, or of a policy of molmo_spaces, in every world. One with ``get_state`` and ``set_state`` is not
-    copied: all worlds share it."""
+    """Runs a copy of a :class:`BasePolicy`, or of a policy of molmo_spaces, in every world. One with ``get_state`` and
+    ``set_state`` is not copied: all worlds share it."""
 
     def __init__(self, first: Any) -> None:
         self.name = snake_case(type(first).__name__)
