@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.compat.molmospaces.policy.base_policy import PolicyOfWorlds
 from mjsense.core.errors import did_you_mean
 from mjsense.evaluation.protocol import BatchedPolicy
 from mjsense.tasks.policy import Policy, policy_names, policy_of
@@ -117,6 +116,8 @@ def _of_object(policy: Any, options: dict[str, Any]) -> Policy:
     if not isinstance(policy, Policy) and not hasattr(policy, "_mjs_policy") and hasattr(policy, "act"):
         return BatchedPolicy(policy)
     if callable(getattr(policy, "get_action", None)) and not hasattr(policy, "_mjs_policy"):
+        from mjsense.compat.molmospaces.policy.base_policy import PolicyOfWorlds
+
         return PolicyOfWorlds(policy)  # of molmo_spaces
     made = policy_of(policy)[1]
     if made is None:

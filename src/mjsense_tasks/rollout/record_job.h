@@ -52,7 +52,8 @@ void visit_fields(V& v, RecordJobCfg& c) {
   v("replay", c.replay,
     "Store what replay needs: the model, and the simulation's state and controls of every step.");
   v("videos", c.videos,
-    "Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos of "
+    "Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos "
+    "of "
     "chosen episodes afterwards.");
 }
 

@@ -48,7 +48,7 @@ class PolicyServer:
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
         connections: Maximum number of connections. Further ones are refused.
-        key_file: File with a key, without which nobody can connect: clients send it as ``Authorization: Api-Key KEY``.
+        key_file: File with a key that clients must have: they send it as ``Authorization: Api-Key KEY``.
             Empty: no key.
         certificate, private_key: PEM files with which the server encrypts its connections, ``wss://HOST:PORT``. Empty: no
             encryption.
