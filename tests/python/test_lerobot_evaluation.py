@@ -198,7 +198,7 @@ def test_mjsense_and_lerobot_eval_play_the_same_episodes(recorded, tmp_path, ver
     run(python, variables, "-m", "lerobot.scripts.lerobot_eval", *words)
     found = json.loads((tmp_path / "eval/eval_info.json").read_text())["per_task"][0]["metrics"]
     assert found["successes"] == pq.read_table(tmp_path / "ours/results.parquet")["success"].to_pylist()
-    mine = [episode.video("exo_camera_1") for episode in mjs.Dataset(tmp_path / "ours").episodes]
+    mine = [episode.video("wrist_camera") for episode in mjs.Dataset(tmp_path / "ours").episodes]
     for episode, path in enumerate(found["video_paths"]):
         with av.open(path) as file:
             theirs = [frame.to_ndarray(format="rgb24").astype(float) for frame in file.decode(video=0)]

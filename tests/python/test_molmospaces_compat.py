@@ -184,11 +184,12 @@ class Stateful(Foreign):
 class Own(Stateful, InferencePolicy, StatefulPolicy):
     """The same with mjsense's classes."""
 
-    get_action = InferencePolicy.get_action
-
     def __init__(self):
         InferencePolicy.__init__(self, "configuration")
         self.speed = 0.02
+
+    def get_action(self, observation):
+        return InferencePolicy.get_action(self, observation) or {}
 
 
 @pytest.mark.parametrize(("policy", "worlds"), ((f"python:{__name__}:Foreign", 2), (Stateful(), 3), (Own, 3)), ids=("copied", "shared", "own"))

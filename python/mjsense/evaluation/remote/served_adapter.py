@@ -33,7 +33,7 @@ class ServedAdapter:
         self.prompt = made.prompt
         self.streams = list(made.streams if observed is None else observed)
         """The streams that it makes."""
-        keys = {stream: key for key, one in reversed(made.observation.items()) for stream in one.streams}
+        keys = {stream: key for key, one in reversed(list(made.observation.items())) for stream in one.streams}
         for stream in self.streams:
             if stream not in keys:
                 raise ValueError(
