@@ -10,8 +10,8 @@ plain table, and grasps come from above: what is easiest to learn.
 The folder keeps the recordings of the demonstrations and of the judged episodes, with a report of each, and the network, which
 the program evaluates too:
 
-    mjsense evaluate pick --scene table --policy examples/06_clone_the_planner.py:ClonePolicy --policy-option net=clone/network.pt \\
-        --out results
+    mjsense evaluate pick --scene table --policy examples/06_clone_the_planner.py:ClonePolicy \\
+        --policy-option net=clone/network.pt --out results
 """
 
 import argparse
