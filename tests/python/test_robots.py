@@ -141,7 +141,7 @@ def test_an_episode_with_a_deep_contact_is_no_success(tmp_path):
 @pytest.mark.parametrize(
     ("task", "robot", "system", "outer", "wrist", "few"),
     [("pick", "rby1", "", "camera_follower", "", 2), ("pick", "i2rt_yam", "", "exo_camera_1", "wrist_camera", 0),
-     ("pick", "franka", "gopro_d405_d455", "exo_camera_1", "wrist_camera", 0)],
+     ("pick", "franka", "gopro_d405_d455", "exo_camera_1", "wrist_camera", 0), ("pick", "franka", "", "exo_camera_1", "wrist_camera", 0)],
 )  # fmt: skip
 def test_cameras_show_the_target_at_the_start(task, robot, system, outer, wrist, few):
     """A disc of the area of the target is at least 20 pixels wide at 640x480 in one outer camera, except in a few episodes in which a
