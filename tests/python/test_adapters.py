@@ -5,8 +5,8 @@ The packages and the MuJoCo that they need are in environments of their own: bui
 another robosuite, build/mjlab, build/warp, build/molmospaces, build/mitsuba and build/programs.
 MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,mitsuba,programs makes them; build/molmospaces uses the torch of
 build/mjlab, because the one that molmo-spaces requires takes several GB.
-MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/dm_control, tonyzhaozh/act and
-kevinzakka/mink, whose programs are run.
+MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/mujoco_warp, google-deepmind/dm_control,
+tonyzhaozh/act and kevinzakka/mink, whose programs are run.
 """
 
 import os
@@ -230,6 +230,11 @@ def test_recorder_of_act(environment):
 def test_notebooks_of_mujoco(environment, name):
     notebook = checkout(f"mujoco/python/{name}.ipynb")
     run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", "mujoco", notebook, "30", notebook.parents[1])
+
+
+def test_notebook_of_mujoco_warp(environment):
+    notebook = checkout("mujoco_warp/notebooks/tutorial.ipynb")
+    run(environment("warp"), Path(__file__).parent / "adapters/notebook.py", "mujoco_warp", notebook, "40")
 
 
 def test_notebook_of_dm_control(environment):

@@ -10,6 +10,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from world_model import model_of
 
 import mjsense as mjs
 
@@ -136,6 +137,20 @@ def test_an_episode_with_a_deep_contact_is_no_success(tmp_path):
                             episode.outcome)  # fmt: skip
         assert not episode["success"][-1]
     assert mjs.record("pick", "franka", out=tmp_path / "any", max_penetration=0, **options).succeeded == 3
+
+
+def test_discs_that_are_wider_than_the_hand_are_not_targets():
+    """A YAM opens its fingers by 75 mm. A lying disc of 78 mm is flat enough, but would need a finger below it."""
+    with contextlib.closing(mjs.make_vec("pick_and_place", "i2rt_yam", num_envs=24, policy=None, cameras=[])) as env:
+        env.reset(seed=0)
+        widths = [[], []]
+        for world in range(24):
+            model = model_of(env.sim, world)
+            target = json.loads(env._rollout.obs_scene(world))["objects"]["pickup_obj"]["body"]
+            disc = model.body("yellow_puck/yellow_puck")
+            widths[target == disc.name].append(2000 * model.geom_size[disc.geomadr[0], 0])
+    other, chosen = widths
+    assert max(other) > 71 and chosen and max(chosen) < 71, widths
 
 
 @pytest.mark.parametrize(
