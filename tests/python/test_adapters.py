@@ -6,14 +6,16 @@ another robosuite, build/mjlab, build/warp, build/molmospaces, build/mitsuba and
 MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,mitsuba,programs makes them; build/molmospaces uses the torch of
 build/mjlab, because the one that molmo-spaces requires takes several GB.
 MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/mujoco_warp, google-deepmind/dm_control,
-tonyzhaozh/act and kevinzakka/mink, whose programs are run.
+tonyzhaozh/act and kevinzakka/mink, whose programs are run, and of mjlab, of a state with tests/test_foot_height_sensor.py.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -198,6 +200,25 @@ def test_scripts_of_mjlab(environment, tmp_path, monkeypatch):
     options = ("--env.scene.num-envs", "4", "--agent.max-iterations", "2", "--agent.logger", "tensorboard")
     run(python, *program, "train", "Mjlab-Cartpole-Balance", *options)
     assert [*tmp_path.glob("logs/rsl_rl/*/*/model_*.pt")]
+
+
+def test_sensor_tests_of_mjlab(environment, tmp_path):
+    """With the imports renamed, those fail that docs/mjlab.md lists, and no others. Its managers and tasks stay mjlab's own."""
+    names = ("builtin_sensor", "camera_sensor", "contact_sensor", "foot_height_sensor", "raycast_sensor", "sensor_caching")
+    folder = checkout("mjlab/tests/test_foot_height_sensor.py").parent
+    for name in ("conftest", *(f"test_{name}" for name in names)):
+        text = (folder / f"{name}.py").read_text()
+        (tmp_path / f"{name}.py").write_text(re.sub(r"\b(from|import) mjlab\b(?!\.envs|\.tasks)", r"\1 mjsense.compat.mjlab", text))
+    (tmp_path / "fixtures").symlink_to(folder / "fixtures")
+    report = tmp_path / "report.xml"
+    path = Path(mjsense.__file__).parents[1]
+    words = [environment("mjlab"), "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", f"--junit-xml={report}", tmp_path]
+    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(path)})
+    cases = [*ElementTree.parse(report).iter("testcase")]
+    failed = {case.get("name") for case in cases if case.find("failure") is not None or case.find("error") is not None}
+    listed = (ROOT / "docs/mjlab.md").read_text().split("### Tests of mjlab's sensors")[1].split("\n#")[0]
+    assert failed == {*re.findall(r"^\| `(test_\w+)`", listed, re.M)}, done.stdout[-5000:]
+    assert len(cases) - len(failed) > 80
 
 
 @pytest.mark.parametrize("script", ["molmospaces_use", "molmospaces_images"])

@@ -12,7 +12,7 @@ import numpy as np
 import mjsense
 from mjsense import _core
 from mjsense.compat.mjlab._data import Data
-from mjsense.compat.mjlab._tensors import HAS_TORCH, Cache, tensor
+from mjsense.compat.mjlab._tensors import HAS_TORCH, Cache, memory_of, tensor
 from mjsense.compat.mjlab.entity import Entity
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class NativeSensor(Sensor[T]):
         self.cfg = cfg
         self.name = name or (cfg.prefixed_name if cfg is not None else "")
         self._tensors = Cache()
-        self._arrays: list[Any] = []
+        self._memory: list[Any] = []
 
     @property
     def data(self) -> T:
@@ -115,8 +115,9 @@ class NativeSensor(Sensor[T]):
             raise RuntimeError(f"sensor '{self.name}' has no data yet: it belongs to no scene")
         source = self.native.data
         arrays = [source] if self._data_class is None else [getattr(source, name) for name in self._fields()]
-        if self._kept is None or any(a is not b for a, b in zip(arrays, self._arrays)):
-            self._kept, self._arrays = self._compute_data(), arrays
+        memory = [memory_of(array) for array in arrays]
+        if self._kept is None or any(a is not b for a, b in zip(memory, self._memory)):
+            self._kept, self._memory = self._compute_data(), memory
         return self._kept
 
     def update(self, dt: float) -> None:
