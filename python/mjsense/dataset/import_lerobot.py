@@ -21,7 +21,7 @@ from mjsense.core.errors import UnknownNameError
 from mjsense.core.input_files import missing, read_text
 from mjsense.core.new_output import new_output
 from mjsense.core.optional import optional
-from mjsense.dataset import bounded_json
+from mjsense.dataset import bounded_json, parquet_footer
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.import_rows import NOT_A_NUMBER, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
@@ -192,13 +192,11 @@ class _Source:
         """Columns of a Parquet file."""
         place = foreign.regular_inside((self.root,), path, str(path))
         try:
-            about = self._tables.read_metadata(place)
-            groups = [about.row_group(i) for i in range(about.num_row_groups)]
-            count = sum(group.column(i).num_values for group in groups for i in range(group.num_columns))
-            size = sum(group.total_byte_size for group in groups)
-            if about.num_rows > foreign.MAX_ROWS or count > _MAX_VALUES or size > _MAX_TABLE:
+            with open(place, "rb") as plain:
+                footer = parquet_footer.read(path, plain)
+            if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
                 raise ValueError(
-                    f"{path}: has {about.num_rows} rows, {count} values and {size} bytes, "
+                    f"{path}: has {footer.rows} rows, {footer.values} values and {footer.bytes} bytes, "
                     f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
                 )
             return self._tables.read_table(place, columns=columns)
