@@ -334,7 +334,7 @@ def test_entities_are_written_and_read_as_in_mjlab():
         arm.write_root_state_to_sim(like_tensor(state[:, :7]))
     with pytest.raises(ValueError, match="entity 'arm': 3 numbers of qpos for each world, and it has 2"):
         arm.write_joint_position_to_sim(like_tensor(np.zeros((WORLDS, 3))))
-    with pytest.raises(AttributeError, match="Entity.data of mjsense.compat.mjlab has no 'heading_w'"):
+    with pytest.raises(AttributeError, match=r"Entity\.data of mjsense\.compat\.mjlab has no 'heading_w'"):
         _ = arm.data.heading_w
 
 

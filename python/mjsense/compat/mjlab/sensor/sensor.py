@@ -129,7 +129,8 @@ class NativeSensor(Sensor[T]):
         self._kept = None
 
     def _fields(self) -> list[str]:
-        return [field.name for field in dataclasses.fields(self._data_class or ())]
+        kind: Any = self._data_class
+        return [field.name for field in dataclasses.fields(kind)]
 
     def _compute_data(self) -> Any:
         data = self.native.data
