@@ -210,9 +210,9 @@ std::shared_ptr<const Environment> of_texture(const mjModel* m, int id) {
 [[noreturn]] void throw_no_environment(const std::string& name) {
   if (name.find('.') == std::string::npos && name.find('/') == std::string::npos)
     throw_unknown("environment", "surroundings", name,
-                  {{std::string("model"), "auto", "skybox", "studio", "FILE.hdr"}});
+                  {{std::string("model"), "auto", "skybox", "studio", "FILE.hdr", "FILE.exr"}});
   throw ValueError(
-      fmt::format("environment '{:.300}': only Radiance pictures (.hdr) are read", name));
+      fmt::format("environment '{:.300}': only pictures of type .hdr and .exr are read", name));
 }
 
 }  // namespace
@@ -241,7 +241,7 @@ std::shared_ptr<const Environment> environment(const mjModel* model, const std::
   if (is_environment_file(name)) {
     const std::string bytes = read_environment_file(name);
     return prepared_sources().get(ContentKey().add(std::span<const char>(bytes)),
-                                  [&] { return prepared(parse_radiance(name, bytes)); });
+                                  [&] { return prepared(parse_environment(name, bytes)); });
   }
   if (name == "studio") return studio();
   if (name != "auto" && name != "model" && name != "skybox") throw_no_environment(name);
