@@ -7,7 +7,7 @@ import pytest
 
 import mjsense as mjs
 from mjsense import _core
-from mjsense.__main__ import main
+from mjsense.commands.start import main
 from mjsense.core import installed_files
 
 
@@ -81,7 +81,7 @@ def ball(tmp_path):
     )
     scene.add_geometry(sphere, transform=trimesh.transformations.translation_matrix((0, 0.2, 0)))
     sheet = trimesh.Trimesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2, 1], [0, 3, 2]])
-    sheet.visual.face_colors = (0, 255, 0, 255)
+    sheet.visual.vertex_colors = np.full((4, 4), (0, 255, 0, 255), np.uint8)
     scene.add_geometry(sheet)
     path = tmp_path / "a ball.glb"
     scene.export(path)
@@ -125,7 +125,8 @@ def test_converted_assets_have_materials_and_texture_roles(ball, tmp_path):
         small = mujoco.MjModel.from_xml_path(str(next(out.glob("*.xml"))))
         assert not small.geom_contype.any()
         if suffix == "obj":
-            assert np.ptp(small.mesh_vert, axis=0).max() == pytest.approx(0.5)
+            apart = small.mesh_vert[:, None] - small.mesh_vert  # MuJoCo has turned the mesh
+            assert np.linalg.norm(apart, axis=-1).max() == pytest.approx(0.5 * 2**0.5)
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,18 @@ def _parts(source: Path, frame: np.ndarray) -> Iterator[tuple[np.ndarray, np.nda
             raise ValueError(f"{source}: mesh '{geometry}' has vertices that are not finite")
         visual = mesh.visual
         coordinates = getattr(visual, "uv", None)
-        yield mesh.vertices, mesh.faces, mesh.vertex_normals, coordinates, visual
+        yield mesh.vertices, mesh.faces, _normals(mesh.vertices, mesh.faces), coordinates, visual
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Means over the faces of each vertex; files have several vertices where an edge is sharp."""
+    corners = vertices[faces]
+    out = np.zeros_like(vertices)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    for corner in range(3):
+        np.add.at(out, faces[:, corner], across)
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    return np.where(length > 0, out / np.maximum(length, 1e-300), (0, 0, 1))
 
 
 class _Writer:

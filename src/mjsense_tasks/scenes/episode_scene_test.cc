@@ -406,7 +406,7 @@ TEST(EpisodeScene, AMoodSetsWhatAMaterialShows) {
   }
   EXPECT_EQ(seen.size(), 2u);
   files.cfg.moods[1].vary[0].what = VaryKind::kGeom;
-  EXPECT_THAT(testing::error_of([&] { validate(files.cfg, ""); }),
+  EXPECT_THAT(error_of([&] { validate(files.cfg, ""); }),
               HasSubstr("shows applies to materials only"));
 }
 
