@@ -148,7 +148,8 @@ def row(r: dict[str, Any]) -> str:
     slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
     return (
-        f"{label(r['task'], r['robot'], r['scene'])} {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
+        f"{label(r['task'], r['robot'], r['scene'])} {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | "
+        f"{r['retried']:.0%} | "
         f"{slanted} | {r['first_action_ms']:.0f} | {r['steps_per_second']:.0f} | {why} |"
     )
 

@@ -39,7 +39,8 @@ def add_arguments(parser: Parser) -> None:
         "--host",
         default="127.0.0.1",
         metavar="TEXT",
-        help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every program on the network can use the policy.",
+        help="Address to listen at; by default 127.0.0.1, this computer only. With 0.0.0.0, every program on the "
+        "network can use the policy.",
     )
     parser.add_argument("--port", type=int, default=8000, help="Port; by default 8000; 0: any free one.")
     parser.add_argument("--connections", type=int, default=64, metavar="N", help="Maximum number of connections; by default 64.")

@@ -165,10 +165,15 @@ def use(env: Any = None, shading: str = "classic", environment: str = "model") -
     Overlay texts are an error; `render_flag_overrides` and `scene_option` have the same limits as in ``mjsense.Renderer``.
 
     Args:
+<<<<<<< HEAD
         env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that ``copy.deepcopy`` or
             pickle make use mjsense only with None.
         shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: by path tracing.
         environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
+=======
+        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that
+            ``copy.deepcopy`` or pickle make use mjsense only with None.
+>>>>>>> main
 
     Returns:
         `env`.
@@ -181,7 +186,8 @@ def use(env: Any = None, shading: str = "classic", environment: str = "model") -
     physics = engine.Physics if env is None else getattr(env, "physics", env)
     if env is not None and not isinstance(physics, engine.Physics):
         raise TypeError(
-            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() before environments are made"
+            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() "
+            "before environments are made"
         )
     engine.Physics.copy = _copy
     engine.Physics._make_rendering_contexts = _make_contexts

@@ -5,8 +5,8 @@
     env.reset()
     env.render()
 
-``use`` works for every environment with a ``MujocoRenderer``: Gymnasium's own, gymnasium-robotics, Meta-World. In a vector environment,
-call it in the function that makes each environment.
+``use`` works for every environment with a ``MujocoRenderer``: Gymnasium's own, gymnasium-robotics, Meta-World. In a vector
+environment, call it in the function that makes each environment.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from mjsense.rendering.renderer import Renderer, camera_of_name
 class Viewer(OffScreenViewer):
     """Gymnasium's offscreen viewer; ``render`` has its arguments and results.
 
-    Depth is 0 at the near plane and 1 at the far plane, as OpenGL stores it, and 1 where nothing is seen. Overlay texts are not drawn.
+    Depth is 0 at the near plane and 1 at the far plane, as OpenGL stores it, and 1 where nothing is seen. Overlay texts are not
+    drawn.
     """
 
     def __init__(
@@ -87,7 +88,8 @@ class Viewer(OffScreenViewer):
 
 
 def _drawn(env: Any) -> Any:
-    """The environment that has the ``MujocoRenderer``: `env`, or one that it contains, as gymnasium-robotics' kitchen and mazes do."""
+    """The environment that has the ``MujocoRenderer``: `env`, or one that it contains, as gymnasium-robotics' kitchen and mazes
+    do."""
     if isinstance(env, VectorEnv):
         raise TypeError(
             f"mjsense.compat.gymnasium.use: {env} is a vector environment; call use in the function that makes each environment"
@@ -97,7 +99,8 @@ def _drawn(env: Any) -> Any:
         if isinstance(getattr(each, "mujoco_renderer", None), MujocoRenderer):
             return each
     raise TypeError(
-        f"mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}"
+        "mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type "
+        f"gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}"
     )
 
 

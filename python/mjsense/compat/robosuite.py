@@ -51,7 +51,8 @@ class RenderContext:
         mujoco.mjv_updateScene(model, data, self.vopt, self.pert, self.cam, mujoco.mjtCatBit.mjCAT_ALL, self.scn)
 
     def read_pixels(self, width: int, height: int, depth: bool = False, segmentation: bool = False) -> Any:
-        """rgb uint8 [H, W, 3], or (object type, id) int32 [H, W, 2] with `segmentation`; with `depth` a pair with float32 [H, W], 0 to 1."""
+        """rgb uint8 [H, W, 3], or (object type, id) int32 [H, W, 2] with `segmentation`; with `depth` a pair with float32 [H, W],
+        0 to 1."""
         color = "segmentation" if segmentation else "rgb"
         images = self._renderer.render_images((color, "depth") if depth else (color,), height=height, width=width)
         image = images[color][::-1]

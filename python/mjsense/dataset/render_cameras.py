@@ -31,15 +31,15 @@ _DEFAULT_SIZE = (640, 480)
 
 @functools.cache
 def image_options() -> dict[str, str]:
-    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras, but for the size, which each
-    camera has. The camera's name of a switch begins with ``use_``."""
+    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras, but for the size,
+    which each camera has. The camera's name of a switch begins with ``use_``."""
     fields = declared_fields("CameraSensorCfg").keys() - {"width", "height"}
     return {name: field for name in declared_fields("ImageCfg") for field in (name, f"use_{name}") if field in fields}
 
 
 def recorded_images(settings: Mapping[str, Any], given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Values of :func:`image_options`: those of `given` that are not None, otherwise of a recording with these settings. One that is older
-    than an option has its default.
+    """Values of :func:`image_options`: those of `given` that are not None, otherwise of a recording with these settings. One that
+    is older than an option has its default.
 
     Raises:
         ValueError: If the recording names a file as environment and `given` has none.
@@ -48,7 +48,8 @@ def recorded_images(settings: Mapping[str, Any], given: Mapping[str, Any] | None
     own = {name: given[name] for name in images if given and given.get(name) is not None}
     if "environment" not in own and shows_file({**images, **own}):
         raise ValueError(
-            f"environment '{printable(images['environment'][:100])}': the recording names a file, and files are not taken from a recording; "
+            f"environment '{printable(images['environment'][:100])}': the recording names a file, and files are not "
+            "taken from a recording; "
             "pass the option environment"
         )
     return {**images, **own}
@@ -191,7 +192,8 @@ class CameraSystem:
             raise ValueError(f"camera_system '{name}': {episode.path} was recorded without a robot; use add_cameras")
         if not is_known_thing(robot):
             raise ValueError(
-                f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from a recording; use add_cameras"
+                f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from "
+                "a recording; use add_cameras"
             )
         self._robot = _core.Robot(robot)
         self._system = _core.CameraSystem(name, self._robot.file, ROBOT_PREFIX, self._robot.base)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluation of policies: fixed episodes of a task are played and recorded, and their results are counted. Modules are imported when they
-are used."""
+"""Evaluation of policies: fixed episodes of a task are played and recorded, and their results are counted. Modules are imported
+when they are used."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frozen benchmarks: a folder that fixes the episodes of an evaluation, so that it can be repeated elsewhere and later.
 
-``benchmark.json`` states the options of the recording, the numbers of the episodes, and the checksums of all files. ``starts/`` is a
-recording of the first observations of these episodes: their states, models, instructions and images. The episodes are sampled again
-when the benchmark is played, and refused unless they are equal to the stored ones, bit for bit. A folder is only data: it names things that
-mjsense contains, neither files nor code. The benchmarks of the package, such as ``benchmark:pick``, are one file each, with checksums of
-the starts instead of their recording.
+``benchmark.json`` states the options of the recording, the numbers of the episodes, and the checksums of all files. ``starts/``
+is a recording of the first observations of these episodes: their states, models, instructions and images. The episodes are
+sampled again when the benchmark is played, and refused unless they are equal to the stored ones, bit for bit. A folder is only
+data: it names things that mjsense contains, neither files nor code. The benchmarks of the package, such as ``benchmark:pick``,
+are one file each, with checksums of the starts instead of their recording.
 """
 
 from __future__ import annotations
@@ -132,7 +132,8 @@ class Benchmark:
             for world, number in _started(env, self.episodes):
                 if difference := compare(env, world, stored[number]):
                     raise ValueError(
-                        f"benchmark '{self.folder}': episode {number} does not start as when the benchmark was made: {difference}. It was "
+                        f"benchmark '{self.folder}': episode {number} does not start as when the benchmark was "
+                        f"made: {difference}. It was "
                         f"made by mjsense {self.version}, and this is {_core.__version__}."  # pyright: ignore[reportAttributeAccessIssue]
                     )
         finally:
@@ -160,8 +161,8 @@ def create_benchmark(
         out: Folder, which must not exist.
         episodes: Number of episodes. Attempts whose start cannot be played are left out.
         progress: As in :func:`mjsense.record`.
-        options: Options of :func:`mjsense.evaluate` that affect the data, such as ``robot``, ``scene``, ``split``, ``seed``, ``cameras`` and
-            ``horizon``.
+        options: Options of :func:`mjsense.evaluate` that affect the data, such as ``robot``, ``scene``, ``split``, ``seed``,
+            ``cameras`` and ``horizon``.
     """
     folder = Path(out)
     if folder.exists():

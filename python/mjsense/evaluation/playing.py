@@ -93,28 +93,29 @@ def evaluate(
 ) -> Results:
     """Plays episodes of a task with a policy, each once, and returns their results.
 
-    Every episode is recorded into ``out/house_<house>/``, failed ones too, as :func:`mjsense.record` does: it can be viewed, replayed and
-    exported. ``out/results.parquet`` and ``out/report.html`` are the results, and ``out/evaluation.json`` says what was evaluated. There is
-    no action noise. The starts depend only on the seed and the number of the episode, and so do the results of a policy that is a
-    function of its observations. An interrupted evaluation continues with ``resume=True``.
+    Every episode is recorded into ``out/house_<house>/``, failed ones too, as :func:`mjsense.record` does: it can be viewed,
+    replayed and exported. ``out/results.parquet`` and ``out/report.html`` are the results, and ``out/evaluation.json`` says what
+    was evaluated. There is no action noise. The starts depend only on the seed and the number of the episode, and so do the
+    results of a policy that is a function of its observations. An interrupted evaluation continues with ``resume=True``.
 
     Args:
-        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or a benchmark, which fixes all options that affect the
+        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or a benchmark, which fixes all options that
+            affect the
             data: its folder, or ``benchmark:pick`` and similar, which the package contains.
         robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
-        policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function ``obs -> actions``, or
-            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``lerobot:DIR``, ``python:MODULE:CLASS`` or
-            ``FILE.py:CLASS``.
+        policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function
+            ``obs -> actions``, or a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``lerobot:DIR``,
+            ``python:MODULE:CLASS`` or ``FILE.py:CLASS``.
         out: Output directory.
         episodes: Number of episodes, which are then those from 0 on, or a list of their numbers. A benchmark states them itself.
         scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
             scene.
         policy_options: Arguments of the policy's class.
         execution_horizon: Number of actions of a chunk that are executed before the policy is called again; by default all.
-        ensemble: The executed action is the mean of all chunks that have one for the step, with the weights ``exp(-ensemble * i)``, ``i = 0``
-            for the oldest; by default that of the newest chunk.
-        latency: Time from an observation until the actions that answer it are executed, rounded up to control steps; ``measured``: the
-            wall-clock time that the policy needs for all worlds, with which results vary. [s]
+        ensemble: The executed action is the mean of all chunks that have one for the step, with the weights
+            ``exp(-ensemble * i)``, ``i = 0`` for the oldest; by default that of the newest chunk.
+        latency: Time from an observation until the actions that answer it are executed, rounded up to control steps;
+            ``measured``: the wall-clock time that the policy needs for all worlds, with which results vary. [s]
 
         Options:
         arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example

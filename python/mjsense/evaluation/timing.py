@@ -38,15 +38,16 @@ class _Answer:
 class Timed(Policy):
     """Another policy whose chunks of actions are executed as on a robot.
 
-    The policy is called at an observation and answers with ``H`` actions. ``execution_horizon`` of them are executed, then it is called again
-    (by default all). With a latency of ``L`` steps, every action is executed ``L`` steps later than without it; until the first answer
-    arrives, the robot holds its position, later it executes what is left of the previous answers and then holds.
+    The policy is called at an observation and answers with ``H`` actions. ``execution_horizon`` of them are executed, then it is
+    called again (by default all). With a latency of ``L`` steps, every action is executed ``L`` steps later than without it;
+    until the first answer arrives, the robot holds its position, later it executes what is left of the previous answers and then
+    holds.
 
     Args:
         policy: The policy that is called.
         execution_horizon: Number of actions of a chunk that are executed before the policy is called again; None: all.
-        ensemble: None: the newest answer is executed. A number ``m``: the mean of all answers that have an action for the step, with the
-            weights ``exp(-m * i)``, ``i = 0`` for the oldest.
+        ensemble: None: the newest answer is executed. A number ``m``: the mean of all answers that have an action for the step,
+            with the weights ``exp(-m * i)``, ``i = 0`` for the oldest.
         latency: Delay of the answers, rounded up to whole control steps. [s]
     """
 
@@ -128,7 +129,8 @@ class Timed(Policy):
         executed = self.execution_horizon or chunk.shape[1]
         if executed > chunk.shape[1]:
             raise ValueError(
-                f"policy '{self.name}': the execution horizon is {executed}, but act() returned chunks of {chunk.shape[1]} actions"
+                f"policy '{self.name}': the execution horizon is {executed}, but act() returned chunks of "
+                f"{chunk.shape[1]} actions"
             )
         late = math.ceil(seconds / self.sim.step_dt - 1e-9)
         self._mjs_delays[due] = seconds
@@ -139,7 +141,8 @@ class Timed(Policy):
         self._mjs_next[due] = self._mjs_step[due] + executed
 
     def _action(self, world: int) -> tuple[np.ndarray, _Answer, bool] | None:
-        """The action of this step ``[n]``, the newest answer, and whether its last executed action is this one; None: there is no action."""
+        """The action of this step ``[n]``, the newest answer, and whether its last executed action is this one; None: there is no
+        action."""
         step, answers = int(self._mjs_step[world]), self._mjs_answers[world]
         arrived = [answer for answer in answers if answer.arrival <= step < answer.arrival + len(answer.actions)]
         while answers and answers[0].arrival + len(answers[0].actions) <= step + 1:
@@ -168,7 +171,8 @@ class Timed(Policy):
             chunk = self._chunk("", groups.pop("action"), len(self.action_low))
         elif missing := self.action_groups.keys() - groups.keys():
             raise ValueError(
-                f"policy '{self.name}': act() returned no command for '{min(missing)}'; execution horizon, ensembling and latency need "
+                f"policy '{self.name}': act() returned no command for '{min(missing)}'; execution horizon, "
+                "ensembling and latency need "
                 "commands for all move groups"
             )
         else:

@@ -28,7 +28,8 @@ _SCENES = {
     "light": '[[vary]]\nwhat = "light"\npattern = ".*"\nbrightness = [0.4, 1.6]\nhue = 20\nangle = 20\n',
     "texture": (
         '[[vary]]\nwhat = "material"\npattern = "(?!robot_0/).*"\nbrightness = [0.6, 1.3]\nhue = 40\nsaturation = 0.25\n\n'
-        '[[vary]]\nwhat = "geom"\npattern = "(?!robot_0/).*"\noptional = true\nbrightness = [0.6, 1.3]\nhue = 40\nsaturation = 0.25\n'
+        '[[vary]]\nwhat = "geom"\npattern = "(?!robot_0/).*"\noptional = true\nbrightness = [0.6, 1.3]\nhue = '
+        "40\nsaturation = 0.25\n"
     ),
     "distractors": "count = [1000, 1000]\n",  # all that the scene has
     "start": "[robot]\npos_spread = [0.05, 0.05]\nyaw_spread = 10\n",
@@ -75,7 +76,8 @@ def sensitivity(vary: Iterable[str], **options: Any) -> Sensitivity:
 
     Args:
         vary: Names of factors: ``light``, ``camera``, ``texture``, ``distractors``, ``instruction``, ``start``, ``latency=0.1``.
-        options: Arguments of :func:`mjsense.evaluation.evaluate`. The evaluations are in the folders ``out/unchanged``, ``out/light`` and so on.
+        options: Arguments of :func:`mjsense.evaluation.evaluate`. The evaluations are in the folders ``out/unchanged``,
+            ``out/light`` and so on.
 
     Raises:
         ValueError: A factor is not known, or changes nothing in this task.

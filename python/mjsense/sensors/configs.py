@@ -990,6 +990,6 @@ __all__ = [
     "SceneHeadlightCfg", "SceneMoodCfg", "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg",
     "SceneVaryCfg", "SensorCfg", "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TerrainCfg",
     "TerrainHeightSensorCfg", "UserPatternCfg", "replace",
-]  # fmt: skip
+]
 
 show_field_docs(__name__)

@@ -183,13 +183,16 @@ def record(
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        format: ``lerobot``, or another of :data:`mjsense.exporting.FORMATS` that is written while recording: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        format: ``lerobot``, or another of :data:`mjsense.exporting.FORMATS` that is written while recording: write the recording
+            as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in
+            ``OUT.recording`` and converted meanwhile.
         map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
-        trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
-        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
-            data set is complete.
-        ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does, which has more
-            options. ``out`` may then be an address such as ``s3://bucket/pick``.
+        trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places
+            an object.
+        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is
+            removed when the data set is complete.
+        ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does,
+            which has more options. ``out`` may then be an address such as ``s3://bucket/pick``.
         progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
             True where stderr is a terminal or a notebook.
     """

@@ -13,7 +13,8 @@ Tasks, policies, robots and sensors that are written for MolmoSpaces run in mjse
 A task is one of mjsense's tasks (:attr:`BaseMujocoTask.played`) with the sensors that you compose. ``mjsense.make_vec``,
 ``mjsense.make`` and ``mjsense.record`` accept it, and it has MolmoSpaces' ``reset``, ``step`` and ``get_observations``.
 
-Not supported: scenes, objects and assets of MolmoSpaces, its planners, and the bundles of sensors that its documentation advises against.
+Not supported: scenes, objects and assets of MolmoSpaces, its planners, and the bundles of sensors that its documentation advises
+against.
 """
 
 from mjsense.compat.molmospaces.env.abstract_sensors import Sensor, SensorSuite

@@ -289,7 +289,8 @@ def _take(env: Any, camera_name: str, kind: str) -> np.ndarray | None:
 
 
 class Frames:
-    """Images of several cameras of one state, which are drawn together. Each equals the one that molmo-spaces' own calls would give."""
+    """Images of several cameras of one state, which are drawn together. Each equals the one that molmo-spaces' own calls would
+    give."""
 
     def __init__(self, env: Any, wanted: dict[str, list[str]]) -> None:
         self._state = _state_of(env)

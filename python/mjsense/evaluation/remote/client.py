@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections to a policy server: one for each world and episode, because servers keep the state of an episode for each connection."""
+"""Connections to a policy server: one for each world and episode, because servers keep the state of an episode for each
+connection."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ class Connections:
         """Closes all connections."""
 
     def server(self) -> dict[str, Any]:
-        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is closed again."""
+        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is
+        closed again."""
         return self._run(self._greeting())
 
     def begin(self, worlds: Iterable[int]) -> None:
@@ -157,7 +159,8 @@ class Connections:
                 print(f"Waiting for the policy server at {self.url}: {plain(last) or type(last).__name__}", file=sys.stderr)
             if self._loop.time() + delay > end:
                 raise ConnectionError(
-                    f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: {plain(last) or type(last).__name__}"
+                    f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: "
+                    f"{plain(last) or type(last).__name__}"
                 )
             await asyncio.sleep(delay)
             delay = min(2 * delay, _MAX_DELAY)

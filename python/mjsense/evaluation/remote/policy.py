@@ -21,14 +21,14 @@ from mjsense.tasks.task import group_slices
 class RemotePolicy(Policy):
     """A policy behind openpi's protocol, such as one of ``mjsense serve``, openpi's ``serve_policy.py`` or MolmoSpaces' server.
 
-    The worlds of a step send their observations at the same time, each on a connection of its own. Each episode has a new connection,
-    because servers keep the state of an episode for each connection. A server that answers one connection only until it is closed needs
-    ``num_worlds=1``. If a connection is lost, the message is sent again on a new one.
+    The worlds of a step send their observations at the same time, each on a connection of its own. Each episode has a new
+    connection, because servers keep the state of an episode for each connection. A server that answers one connection only until
+    it is closed needs ``num_worlds=1``. If a connection is lost, the message is sent again on a new one.
 
     Args:
         url: ``ws://HOST:PORT`` or ``wss://HOST:PORT``.
-        adapter: ``droid``, ``features``, ``streams`` or a TOML file: the names and conventions of the messages. By default ``streams``, if
-            the server is ``mjsense serve``; other servers need one.
+        adapter: ``droid``, ``features``, ``streams`` or a TOML file: the names and conventions of the messages. By default
+            ``streams``, if the server is ``mjsense serve``; other servers need one.
         timeout: Time in which the server must answer. [s]
         patience: Time for which a server that cannot be reached is tried again. [s]
     """
@@ -100,7 +100,8 @@ class RemotePolicy(Policy):
         for world in worlds:
             if self._connections.lost.get(world, 0) > lost[world]:
                 print(
-                    f"{self._place(world)}: the connection was lost. A new one continues the episode; a policy that keeps a state begins anew.",
+                    f"{self._place(world)}: the connection was lost. A new one continues the episode; a policy that "
+                    "keeps a state begins anew.",
                     file=sys.stderr,
                 )
         chunks = {world: self._commands(world, answers[world]) for world in worlds}
@@ -109,7 +110,8 @@ class RemotePolicy(Policy):
         for world in worlds:
             if lengths[world] != steps:
                 raise ValueError(
-                    f"{self._place(world)}: the server's answer has {lengths[world]} actions, and {steps} in {self._place(worlds[0])}"
+                    f"{self._place(world)}: the server's answer has {lengths[world]} actions, and {steps} in "
+                    f"{self._place(worlds[0])}"
                 )
         made: dict[str, np.ndarray] = {}
         for group in self._adapter.actions:

@@ -22,13 +22,14 @@ class BadRequest(ValueError):
 
 
 class ServedPolicy:
-    """One policy for all connections, which are its worlds. It is called for one connection at a time, so that an answer depends neither on
-    the other clients nor on the time of their messages.
+    """One policy for all connections, which are its worlds. It is called for one connection at a time, so that an answer depends
+    neither on the other clients nor on the time of their messages.
 
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`.
         options: Arguments of the policy.
-        task: Task and further arguments of :func:`mjsense.make_vec`, whose streams and move groups a :class:`mjsense.Policy` needs; empty: none.
+        task: Task and further arguments of :func:`mjsense.make_vec`, whose streams and move groups a :class:`mjsense.Policy`
+            needs; empty: none.
         connections: Maximum number of connections.
     """
 
@@ -47,7 +48,8 @@ class ServedPolicy:
             return
         if not task:
             raise ValueError(
-                f"policy '{self._name}' is a mjsense.Policy, which knows the robot: name a task, and the robot if it is not the task's "
+                f"policy '{self._name}' is a mjsense.Policy, which knows the robot: name a task, and the robot if "
+                "it is not the task's "
                 "(--task, --robot)"
             )
         self._env = make_vec(**task, num_envs=1)
@@ -122,7 +124,8 @@ class ServedPolicy:
         groups = [] if self._alone else self._groups
         if not groups or given.keys() != set(groups):
             raise ValueError(
-                f"policy '{self._name}': act() returned commands for {', '.join(given) or 'no group'}; expected {', '.join(groups) or 'an array'}"
+                f"policy '{self._name}': act() returned commands for {', '.join(given) or 'no group'}; expected "
+                f"{', '.join(groups) or 'an array'}"
             )
         return np.concatenate([as_numbers(given[group]) for group in groups], -1)
 

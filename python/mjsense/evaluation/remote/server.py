@@ -27,17 +27,19 @@ _INTERNAL_ERROR, _TRY_AGAIN_LATER = 1011, 1013  # codes of closed connections
 class PolicyServer:
     """Offers a policy at ``ws://HOST:PORT`` by openpi's protocol, until it is closed. ``GET /healthz`` answers OK.
 
-    A message is a map from names of sensors or streams to arrays, ``{"qpos/arm": [7], "wrist_camera": [H, W, 3], "prompt": "Pick up the
-    mug"}``, in which maps may be nested. The answer is ``{"actions": [H, n], "server_timing": {"infer_ms": 1.2}}``. A connection is an
-    episode: the policy's ``reset`` is called before its first message. All connections share one policy, whose world ids are their numbers.
-    It is called for one message at a time. Messages that are wrong, and exceptions of the policy, are answered by their text, after which
-    the connection is closed.
+    A message is a map from names of sensors or streams to arrays,
+    ``{"qpos/arm": [7], "wrist_camera": [H, W, 3], "prompt": "Pick up the mug"}``, in which maps may be nested. The answer is
+    ``{"actions": [H, n], "server_timing": {"infer_ms": 1.2}}``. A connection is an
+    episode: the policy's ``reset`` is called before its first message. All connections share one policy, whose world ids are
+    their numbers. It is called for one message at a time. Messages that are wrong, and exceptions of the policy, are answered by
+    their text, after which the connection is closed.
 
     Args:
-        policy: See :func:`mjsense.evaluation.policy_from`. Policies that are computed together with their episode, such as ``planner``, cannot
-            be served.
+        policy: See :func:`mjsense.evaluation.policy_from`. Policies that are computed together with their episode, such as
+            ``planner``, cannot be served.
         task: Task whose streams and robot the policy knows; only a :class:`mjsense.Policy` needs it.
-        task_options: Further arguments of :func:`mjsense.make_vec`, such as ``robot``, ``camera_system``, ``width`` and ``height``.
+        task_options: Further arguments of :func:`mjsense.make_vec`, such as ``robot``, ``camera_system``, ``width`` and
+            ``height``.
         policy_options: Arguments of the policy.
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.

@@ -24,7 +24,8 @@ _POLL = 0.005  # s between two looks for events while the worlds wait
 
 
 class Teleoperation(Policy):
-    """Drives one arm and its gripper as a person wants, in real time. The arm has the controller ``ee_pose``; other move groups hold.
+    """Drives one arm and its gripper as a person wants, in real time. The arm has the controller ``ee_pose``; other move groups
+    hold.
 
     An episode ends when the task ends it, or when the person does.
     """
@@ -184,8 +185,8 @@ def play(
     open_browser: bool = True,
     **options: Any,
 ) -> RecordSummary:
-    """Records demonstrations by a person who drives the robot in the browser, as any policy's episodes. The page shows the scene, the
-    images of the cameras and a handle at the tool, which is dragged or moved by keys. An episode ends when the task succeeds.
+    """Records demonstrations by a person who drives the robot in the browser, as any policy's episodes. The page shows the scene,
+    the images of the cameras and a handle at the tool, which is dragged or moved by keys. An episode ends when the task succeeds.
 
     Args:
         task, robot, scene: As in :func:`record`.
@@ -241,8 +242,8 @@ def play(
         ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         Others:
         seed: Random seed of the starts.
-        host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with the printed
-            address, which contains a token.
+        host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with
+            the printed address, which contains a token.
         port: Port of the server; if it is taken, the next free one; 0: any free one.
         open_browser: Open the page in the default browser.
         options: Further options of :func:`record`, such as ``append=True``.

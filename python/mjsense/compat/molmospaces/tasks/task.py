@@ -31,8 +31,8 @@ class TaskConfig(PeerTaskConfig):
 class BaseMujocoTask:
     """One of mjsense's tasks with the sensors that ``_create_sensor_suite_from_config`` composes.
 
-    ``mjsense.make_vec(MyTask)``, ``mjsense.make(MyTask)`` and ``mjsense.record(MyTask, out=...)`` accept it; the robot and the policy add
-    their sensors. Without them it runs one world: ``reset()``, ``step(action)``, ``get_observations()``.
+    ``mjsense.make_vec(MyTask)``, ``mjsense.make(MyTask)`` and ``mjsense.record(MyTask, out=...)`` accept it; the robot and the
+    policy add their sensors. Without them it runs one world: ``reset()``, ``step(action)``, ``get_observations()``.
     """
 
     played: str = "pick"
