@@ -19,9 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "names",
         nargs="+",
         metavar="NAME",
-        help="install: sources of objects, such as robosuite or libero. convert: a .glb, .gltf or .obj file, and the folder to make.",
+        help="install: sources of objects, such as robosuite. convert: a .glb, .gltf or .obj file, and the folder to make.",
     )
-    parser.add_argument("--up", choices=["y", "z"], help="convert: the axis that points up in the file; by default y, and z for .obj.")
+    parser.add_argument(
+        "--up", choices=["y", "z"], help="convert: the axis that points up in the file; by default y, and z for .obj."
+    )
     parser.add_argument("--scale", type=float, default=1.0, metavar="X", help="convert: metres of one unit of the file.")
     parser.add_argument("--no-contacts", action="store_true", help="convert: leave out the convex hulls for contacts.")
 

@@ -113,7 +113,7 @@ def use(env: Any, shading: str = "classic", environment: str = "model") -> Any:
 
     Args:
         env: The environment.
-        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: by path tracing.
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path tracing.
         environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
 
     Raises:

@@ -70,7 +70,7 @@ def use(shading: str = "classic", environment: str = "model") -> None:
     """Makes all robosuite environments of this process that are made from now on draw with mjsense.
 
     Args:
-        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: by path tracing.
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path tracing.
         environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
 
     Raises:

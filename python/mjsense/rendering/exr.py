@@ -51,7 +51,9 @@ def radiance_file(path: str, content: bytes) -> bytes:
         raise ValueError(f"environment '{path}': its channels have other sizes than its window")
     if not (rgb >= 0).all() or not (rgb <= _LARGEST).all():
         y, x, c = np.argwhere(~((rgb >= 0) & (rgb <= _LARGEST)))[0]
-        raise ValueError(f"environment '{path}': radiance {rgb[y, x, c]:g} in column {x}, row {y}; values are from 0 to {_LARGEST:g}")
+        raise ValueError(
+            f"environment '{path}': radiance {rgb[y, x, c]:g} in column {x}, row {y}; values are from 0 to {_LARGEST:g}"
+        )
     mantissa, exponent = np.frexp(rgb.max(-1))
     scale = np.where(mantissa > 0, np.ldexp(1.0, 8 - np.maximum(exponent, -127)), 0)
     rgbe = np.zeros((height, width, 4), np.uint8)

@@ -24,11 +24,13 @@ _MAX_PIXELS = 8192 * 8192
 _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
-def convert_assets(source: str | Path, out: str | Path, *, up: str | None = None, scale: float = 1.0, contacts: bool = True) -> Path:
+def convert_assets(
+    source: str | Path, out: str | Path, *, up: str | None = None, scale: float = 1.0, contacts: bool = True
+) -> Path:
     """Writes a .glb, .gltf or .obj file as a folder with MJCF, meshes and textures.
 
-    Materials keep their base colour, metallic, roughness, normal, occlusion, emissive and opacity textures as MuJoCo's texture roles. Every mesh is
-    one visual geom; with `contacts` its convex hull takes part in contacts.
+    Materials keep their base colour, metallic, roughness, normal, occlusion, emissive and opacity textures as MuJoCo's
+    texture roles. Every mesh is one visual geom; with `contacts` its convex hull takes part in contacts.
 
     Args:
         source: The file.
@@ -129,7 +131,13 @@ class _Writer:
         self._count = 0
 
     def add(
-        self, vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray, coordinates: np.ndarray | None, visual: Any, contacts: bool
+        self,
+        vertices: np.ndarray,
+        faces: np.ndarray,
+        normals: np.ndarray,
+        coordinates: np.ndarray | None,
+        visual: Any,
+        contacts: bool,
     ) -> None:
         name = f"mesh_{self._count}"
         self._count += 1
@@ -199,7 +207,9 @@ class _Writer:
 
     def _pixels(self, image: Any, mode: str) -> np.ndarray:
         if image.size[0] * image.size[1] > _MAX_PIXELS:
-            raise ValueError(f"{self._source}: a texture has {image.size[0]} x {image.size[1]} pixels: at most {_MAX_PIXELS} are read")
+            raise ValueError(
+                f"{self._source}: a texture has {image.size[0]} x {image.size[1]} pixels: at most {_MAX_PIXELS} are read"
+            )
         return np.asarray(image.convert(mode))
 
     def _add_layer(self, material: ElementTree.Element, role: str, pixels: np.ndarray, linear: bool = False) -> None:
