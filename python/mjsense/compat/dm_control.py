@@ -162,26 +162,21 @@ def _camera_render(
 def use(env: Any = None, shading: str = "classic", environment: str = "model") -> Any:
     """Makes dm_control's images come from mjsense: ``Physics.render``, ``Camera`` and the wrappers that call them.
 
-        Overlay texts are an error; `render_flag_overrides` and `scene_option` have the same limits as in ``mjsense.Renderer``.
+    Overlay texts are an error; `render_flag_overrides` and `scene_option` have the same limits as in ``mjsense.Renderer``.
 
-        Args:
-    <<<<<<< HEAD
-            env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that ``copy.deepcopy`` or
-                pickle make use mjsense only with None.
-            shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path
-                tracing.
-            environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
-    =======
-            env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that
-                ``copy.deepcopy`` or pickle make use mjsense only with None.
-    >>>>>>> main
+    Args:
+        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that
+            ``copy.deepcopy`` or pickle make use mjsense only with None.
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path
+            tracing.
+        environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
 
-        Returns:
-            `env`.
+    Returns:
+        `env`.
 
-        Raises:
-            TypeError: If `env` has no physics of dm_control.
-            ValueError: For an unknown `shading`.
+    Raises:
+        TypeError: If `env` has no physics of dm_control.
+        ValueError: For an unknown `shading`.
     """
     look = Look(shading, environment).checked("mjsense.compat.dm_control.use")
     physics = engine.Physics if env is None else getattr(env, "physics", env)
