@@ -125,6 +125,8 @@ def use(env: Any, shading: str = "classic", environment: str = "model") -> Any:
     name = getattr(_drawn(env), "camera_name", None)
     if name is not None:
         camera_of_name(renderer.model, name)
+    if (earlier := renderer._viewers.pop("mjsense", None)) is not None:  # of another call, with other shading
+        earlier.close()
     get_viewer = renderer._get_viewer
 
     def viewer_of(render_mode: str | None) -> Any:

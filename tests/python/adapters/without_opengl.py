@@ -48,6 +48,10 @@ mjsense.compat.robosuite.use(**physical)
 for name, image in {"cheetah": cheetah(), "Lift": lift(), "Meta-World": reach(**physical)}.items():
     assert image.std() > 10, name
     assert (image != images[name]).mean() > 0.5, name
+env = mjsense.compat.gymnasium.use(gymnasium.make("Meta-World/MT1", env_name="reach-v3", render_mode="rgb_array"))
+env.reset(seed=0)
+classic = env.render().copy()
+assert (mjsense.compat.gymnasium.use(env, **physical).render() != classic).mean() > 0.5
 for function in (mjsense.compat.dm_control.use, mjsense.compat.robosuite.use, reach):
     try:
         function(shading="pbrr")
