@@ -275,6 +275,9 @@ def render(
     shading: Literal["classic", "pbr", "path"] | None = None,
     samples_per_pixel: int | None = None,
     exposure: float | None = None,
+    exposure_mode: Literal["fixed", "auto"] | None = None,
+    exposure_time_constant: float | None = None,
+    imager: Literal["none", "d435", "zed_mini"] | None = None,
     tone_mapping: Literal["neutral", "filmic", "linear", "agx"] | None = None,
     white_balance: float | None = None,
     environment: str | None = None,
@@ -334,12 +337,18 @@ def render(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading. By default as recorded.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness. By default as recorded.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``. By default as
+            recorded.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. By
+            default as recorded. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera. By default as
+            recorded.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white. By default as recorded.
         white_balance: Colour temperature of the light that appears white. By default as recorded. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background. By default as recorded.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background. By default as recorded.
         environment_intensity: Factor of the light from the surroundings. By default as recorded.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. By default as recorded. [degrees]

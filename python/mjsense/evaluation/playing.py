@@ -58,7 +58,10 @@ def evaluate(
     shading: Literal["classic", "pbr", "path"] = "classic",
     samples_per_pixel: int = 64,
     exposure: float = 8.0,
-    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral",
+    exposure_mode: Literal["fixed", "auto"] = "fixed",
+    exposure_time_constant: float = 0.5,
+    imager: Literal["none", "d435", "zed_mini"] = "none",
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic",
     white_balance: float = 6504.0,
     environment: str = "model",
     environment_intensity: float = 1.0,
@@ -140,12 +143,15 @@ def evaluate(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white.
         white_balance: Colour temperature of the light that appears white. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background.
         environment_intensity: Factor of the light from the surroundings.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. [degrees]

@@ -162,7 +162,7 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
     sum.add(text.data(), text.size());
     settings["camera_file"] = sum.text();
   }
-  if (cfg.shading == sensors::Shading::kPbr && render::is_environment_file(cfg.environment)) {
+  if (cfg.shading != sensors::Shading::kClassic && render::is_environment_file(cfg.environment)) {
     const std::string bytes = render::read_environment_file(cfg.environment);
     record::Checksum sum;
     sum.add(bytes.data(), bytes.size());
