@@ -25,7 +25,8 @@ def tensor(array: Any) -> Any:
 
 
 def ids(env_ids: Any) -> Any:
-    """Converts mjlab's env_ids (tensor, slice or None) to the indices or mask that mjsense accepts; None means all environments."""
+    """Converts mjlab's env_ids (tensor, slice or None) to the indices or mask that mjsense accepts; None means all
+    environments."""
     if env_ids is None or (isinstance(env_ids, slice) and env_ids == slice(None)):
         return None
     return env_ids.detach().cpu().numpy() if hasattr(env_ids, "detach") else env_ids  # pyright: ignore

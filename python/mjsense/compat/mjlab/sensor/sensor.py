@@ -40,8 +40,8 @@ class SensorCfg:
 class Sensor(Generic[T]):
     """Base of the sensors of a :class:`mjsense.compat.mjlab.scene.Scene`; ``T`` is the type of ``data``.
 
-    A user-defined subclass implements ``_compute_data()`` and, if needed, ``edit_spec``, ``initialize``, ``update`` and ``reset``.
-    Its value is computed when it is read for the first time after a step, a ``forward()`` or a reset.
+    A user-defined subclass implements ``_compute_data()`` and, if needed, ``edit_spec``, ``initialize``, ``update`` and
+    ``reset``. Its value is computed when it is read for the first time after a step, a ``forward()`` or a reset.
     """
 
     requires_sensor_context: bool = False
@@ -140,7 +140,8 @@ class NativeSensor(Sensor[T]):
 
 
 class GivenSensor(Sensor[Any]):
-    """Wraps a :class:`mjsense.Sensor` of the scene: arrays are returned as tensors, all other attributes are those of the sensor."""
+    """Wraps a :class:`mjsense.Sensor` of the scene: arrays are returned as tensors, all other attributes are those of the
+    sensor."""
 
     def __init__(self, native: mjsense.Sensor) -> None:
         self.native = native

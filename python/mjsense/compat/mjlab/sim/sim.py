@@ -43,7 +43,8 @@ class MujocoCfg:
 
 @dataclass(kw_only=True)
 class SimulationCfg:
-    """Only ``mujoco`` has an effect, and with ``backend="warp"`` ``nconmax`` and ``njmax``: otherwise there are no limits on contacts."""
+    """Only ``mujoco`` has an effect, and with ``backend="warp"`` ``nconmax`` and ``njmax``: otherwise there are no limits on
+    contacts."""
 
     nconmax: int | None = None
     njmax: int | None = None
