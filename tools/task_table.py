@@ -4,8 +4,8 @@
     python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT[/SCENE]] ...]
 
 Plays every pair of CASES without cameras. Each attempt is an episode with a different seed; failures are recorded, too. Scenes of
-packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page. The page is written
-after each pair.
+packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page. The page is
+written after each pair.
 """
 
 from __future__ import annotations
@@ -153,8 +153,9 @@ def row(r: dict[str, Any]) -> str:
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
     low, high = wilson(r["succeeded"], r["episodes"])
     return (
-        f"{label(r['task'], r['robot'], r['scene'])} {r['succeeded']} of {r['episodes']} | {100 * low:.0f} to {100 * high:.0f} % | "
-        f"{r['length']:.0f} | {r['retried']:.0%} | {slanted} | {r['steps_per_second']:.0f} | {why} |"
+        f"{label(r['task'], r['robot'], r['scene'])} {r['succeeded']} of {r['episodes']} | "
+        f"{100 * low:.0f} to {100 * high:.0f} % | {r['length']:.0f} | {r['retried']:.0%} | {slanted} | "
+        f"{r['steps_per_second']:.0f} | {why} |"
     )
 
 
