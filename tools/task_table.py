@@ -172,8 +172,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--only", nargs="*", default=[], metavar="TASK[/ROBOT[/SCENE]]")
     arguments = parser.parse_args()
-    before, rest = PAGE.read_text().split(BEGIN, 1)
-    old, after = rest.split(END, 1)
+    old = PAGE.read_text().split(BEGIN)[1].split(END)[0]
     rows = {case: line for case in CASES for line in old.splitlines() if line.startswith(label(*case))}
     for case in CASES:
         task, robot, scene = case
@@ -187,6 +186,8 @@ def main() -> None:
             print(f"{task}/{robot} in {scene}: skipped: {error}", flush=True)
             continue
         print(rows[case], flush=True)
+        before, rest = PAGE.read_text().split(BEGIN, 1)
+        _, after = rest.split(END, 1)
         PAGE.write_text(f"{before}{BEGIN}\n{table([rows[case] for case in CASES if case in rows])}\n{END}{after}")
 
 
