@@ -4,8 +4,8 @@
     python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT[/SCENE]] ...]
 
 Plays every pair of CASES without cameras. Each attempt is an episode with a different seed; failures are recorded, too. Scenes of
-packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page. The page is written
-after each pair.
+packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page. The page is
+written after each pair.
 """
 
 from __future__ import annotations
@@ -153,8 +153,9 @@ def row(r: dict[str, Any]) -> str:
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
     low, high = wilson(r["succeeded"], r["episodes"])
     return (
-        f"{label(r['task'], r['robot'], r['scene'])} {r['succeeded']} of {r['episodes']} | {100 * low:.0f} to {100 * high:.0f} % | "
-        f"{r['length']:.0f} | {r['retried']:.0%} | {slanted} | {r['steps_per_second']:.0f} | {why} |"
+        f"{label(r['task'], r['robot'], r['scene'])} {r['succeeded']} of {r['episodes']} | "
+        f"{100 * low:.0f} to {100 * high:.0f} % | {r['length']:.0f} | {r['retried']:.0%} | {slanted} | "
+        f"{r['steps_per_second']:.0f} | {why} |"
     )
 
 
@@ -171,8 +172,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=50)
     parser.add_argument("--only", nargs="*", default=[], metavar="TASK[/ROBOT[/SCENE]]")
     arguments = parser.parse_args()
-    before, rest = PAGE.read_text().split(BEGIN, 1)
-    old, after = rest.split(END, 1)
+    old = PAGE.read_text().split(BEGIN)[1].split(END)[0]
     rows = {case: line for case in CASES for line in old.splitlines() if line.startswith(label(*case))}
     for case in CASES:
         task, robot, scene = case
@@ -186,6 +186,8 @@ def main() -> None:
             print(f"{task}/{robot} in {scene}: skipped: {error}", flush=True)
             continue
         print(rows[case], flush=True)
+        before, rest = PAGE.read_text().split(BEGIN, 1)
+        _, after = rest.split(END, 1)
         PAGE.write_text(f"{before}{BEGIN}\n{table([rows[case] for case in CASES if case in rows])}\n{END}{after}")
 
 

@@ -316,8 +316,8 @@ def _call(name: str) -> Callable[[Any, Any], None]:
     return call
 
 
-# Graphs. Warp records kernels while a graph is captured on the CPU, and runs them when it is launched. A kernel that calls a function of this
-# process has its place among them.
+# Graphs. Warp records kernels while a graph is captured on the CPU, and runs them when it is launched. A kernel that calls a
+# function of this process has its place among them.
 
 
 @wp.func_native("((void (*)(long long))function)(argument);")

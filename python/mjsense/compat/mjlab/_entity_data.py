@@ -93,7 +93,7 @@ class EntityData:
         self._write("qpos", np.arange(first, first + 7), pose, env_ids)
 
     def write_root_velocity(self, velocity: Any, env_ids: Any = None, *, of_mass: bool = False, in_body: bool = False) -> None:
-        """Linear velocity of the root's origin, or of its centre of mass, and angular velocity, in the world's frame or in the root's."""
+        """Linear velocity of the root's origin or centre of mass, and angular velocity; in the frame of the world or the root."""
         first, dof = self._root()
         rows = ids(env_ids)
         quat = self._field("qpos")[slice(None) if rows is None else rows][:, first + 3 : first + 7]
